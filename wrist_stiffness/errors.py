@@ -1,0 +1,41 @@
+"""Every error that a user of the wrist can meet, under one base class.
+
+A message is one line that names the value, the place and the limit.  The command line turns a
+`WristError` into that line and exit code 2; a node turns it into a diagnostic and a safe output.
+"""
+
+
+class WristError(Exception):
+    """Base of all errors that have an answer outside the code."""
+
+
+class InputError(WristError):
+    """A value that somebody typed or sent is not usable (NaN, missing joint, wrong shape)."""
+
+
+class GeometryError(WristError):
+    """A geometry file is incomplete, contradictory or outside its limits."""
+
+
+class UnreachablePoseError(WristError):
+    """The closure of the five-bar has no solution at these angles, or the normal is out of reach."""
+
+
+class SingularPoseError(WristError):
+    """The pose is nearer to a singularity than the geometry file allows."""
+
+
+class LoadRangeError(WristError):
+    """A load is outside the range for which the table was made."""
+
+
+class FrameError(WristError):
+    """A message is expressed in a frame that is neither known nor mapped."""
+
+
+class TableError(WristError):
+    """A table is damaged, foreign, of another version or of another geometry."""
+
+
+class RecordingError(WristError):
+    """A recording cannot be read or written as asked."""
