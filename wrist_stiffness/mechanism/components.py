@@ -1,0 +1,94 @@
+"""Names of the wrist's parts, and what an elastic part is to the mechanism.
+
+The finite-element room makes `ElasticComponents` once; the mechanism only turns and assembles it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LINKS = ("link_1", "link_2", "link_3")
+JOINTS = ("joint_1", "joint_2", "joint_3", "joint_4", "joint_5")
+PASSIVE_JOINTS = ("joint_2", "joint_3", "joint_4")
+MOTORS = ("motor_1", "motor_2")
+
+ELASTIC = (*LINKS, *JOINTS)
+"""The elastic components, in the order of every array with a component axis."""
+
+CARRIER = {
+    "link_1": "link_1",
+    "link_2": "link_2",
+    "link_3": "link_3",
+    "joint_1": "frame",
+    "joint_2": "link_1",
+    "joint_3": "link_3",
+    "joint_4": "link_2",
+    "joint_5": "frame",
+}
+"""The body with which a component turns: bushings sit on the pin, those of the motors in the frame."""
+
+ENDS = {"link_1": ("joint_1", "joint_2"), "link_2": ("joint_5", "joint_4"), "link_3": ("joint_4", "joint_3")}
+"""The joints at the motor-side and at the platform-side bore of each link."""
+
+
+@dataclass(frozen=True)
+class FlangeContact:
+    """Condensed one-sided contact of the flanges of one passive joint's bushing.
+
+    A unit contact force of sector i pushes the hub away from the flange.  With W the wrench
+    through the bushing (at O) and x the slide of the joint along its axis,
+
+        delta = C W + screw @ force        gap = gap0 + sign * x + screw.T @ W + approach @ force
+
+    Everything is at O in F with the wrist at home; it turns with the bushing's carrier.
+
+    Parameters
+    ----------
+    sign : (m,) float
+        +1 where a positive slide opens the gap (flange on the motor side of the hub face along the
+        joint axis), -1 where it closes it.
+    screw : (6, m) float
+        Screw of the bushing for a unit contact force of each sector [m/N, rad/N].
+    approach : (m, m) float
+        Opening of each gap by the unit forces, without the slide [m/N]; symmetric.
+    weight_approach : (m, 3) float
+        Opening of each gap by a unit acceleration field on the bushing itself [m/(m/s^2)].
+    gap : (m,) float
+        Gap of the unloaded bushing with the slide at zero [m].
+    """
+
+    sign: Array
+    screw: Array
+    approach: Array
+    weight_approach: Array
+    gap: Array
+
+
+@dataclass(frozen=True)
+class ElasticComponents:
+    """All elastic parts, condensed onto rigid interface frames, at O in F with the wrist at home.
+
+    Parameters
+    ----------
+    flexibility : (8, 6, 6) float
+        Screw of the platform side against the motor side for a unit wrench at O, in the order of
+        `ELASTIC`; symmetric positive definite [m/N, rad/N, rad/(N m)].
+    weight_motor_side, weight_platform_side : (8, 6, 3) float
+        Wrench at O for a unit acceleration field along x, y, z of the body, condensed consistently
+        onto the two interface frames [N/(m/s^2), N m/(m/s^2)]; their sum is the part's weight.
+    platform_weight : (6, 3) float
+        The same for the rigid platform.
+    contact : dict of str to FlangeContact
+        Flange contact by passive joint; a joint without flanges is absent.
+    """
+
+    flexibility: Array
+    weight_motor_side: Array
+    weight_platform_side: Array
+    platform_weight: Array
+    contact: dict[str, FlangeContact]
