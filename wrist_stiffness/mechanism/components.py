@@ -32,7 +32,11 @@ CARRIER = {
 }
 """The body with which a component turns: bushings sit on the pin, those of the motors in the frame."""
 
-ENDS = {"link_1": ("joint_1", "joint_2"), "link_2": ("joint_5", "joint_4"), "link_3": ("joint_4", "joint_3")}
+ENDS = {
+    "link_1": ("joint_1", "joint_2"),
+    "link_2": ("joint_5", "joint_4"),
+    "link_3": ("joint_4", "joint_3"),
+}
 """The joints at the motor-side and at the platform-side bore of each link."""
 
 

@@ -66,7 +66,12 @@ class _Block:
         return value
 
     def number(
-        self, key: str, scale: float = 1.0, above: float = -np.inf, below: float = np.inf, optional: bool = False
+        self,
+        key: str,
+        scale: float = 1.0,
+        above: float = -np.inf,
+        below: float = np.inf,
+        optional: bool = False,
     ) -> float:
         value = self._take(key)
         if value is None and optional:
@@ -82,9 +87,13 @@ class _Block:
         try:
             vector = np.array(value, dtype=float)
         except (TypeError, ValueError) as error:
-            raise GeometryError(f"{self.place}.{key}: {value!r} is not a list of {size} numbers") from error
+            raise GeometryError(
+                f"{self.place}.{key}: {value!r} is not a list of {size} numbers"
+            ) from error
         if vector.shape != (size,) or not np.all(np.isfinite(vector)):
-            raise GeometryError(f"{self.place}.{key}: {value!r} is not a list of {size} finite numbers")
+            raise GeometryError(
+                f"{self.place}.{key}: {value!r} is not a list of {size} finite numbers"
+            )
         return vector * scale
 
     def direction(self, key: str) -> Array:
@@ -103,9 +112,13 @@ class _Block:
             words = source.values() if isinstance(source, Mapping) else [source]
             for word in words:
                 if word not in SOURCES:
-                    raise GeometryError(f"{self.place}.source: {word!r} is not one of {', '.join(SOURCES)}")
+                    raise GeometryError(
+                        f"{self.place}.source: {word!r} is not one of {', '.join(SOURCES)}"
+                    )
             if isinstance(source, Mapping) and (extra := set(source) - set(self.values) - {"rest"}):
-                raise GeometryError(f"{self.place}.source names unknown keys: {', '.join(sorted(extra))}")
+                raise GeometryError(
+                    f"{self.place}.source names unknown keys: {', '.join(sorted(extra))}"
+                )
         elif any(not isinstance(value, Mapping) for value in self.values.values()):
             raise GeometryError(f"{self.place}: source is missing (one of {', '.join(SOURCES)})")
         if unknown := set(self.values) - self.used:
@@ -163,7 +176,9 @@ def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> 
     root = _Block(values, place)
     schema = root.number("schema")
     if schema != SCHEMA:
-        raise GeometryError(f"{place}.schema: {schema:g} is not {SCHEMA}, the version that this program reads")
+        raise GeometryError(
+            f"{place}.schema: {schema:g} is not {SCHEMA}, the version that this program reads"
+        )
     materials = _each(root.block("materials"), _material)
     axes_block = root.block("axes")
     axes = {joint: axes_block.direction(joint) for joint in JOINTS}
@@ -219,7 +234,9 @@ def mechanism_of(geometry: Geometry) -> Mechanism:
 
 def _checksum(values: Mapping[str, Any]) -> str:
     """SHA-256 of the values, in an order and layout of its own."""
-    return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    return hashlib.sha256(
+        json.dumps(values, sort_keys=True, separators=(",", ":")).encode()
+    ).hexdigest()
 
 
 def _each(block: _Block, build: Callable[[_Block], T]) -> dict[str, T]:
@@ -272,7 +289,9 @@ def _bushing(block: _Block, joint: str, materials: dict[str, Material]) -> Bushi
         for i, key in enumerate(("inner_gap_um", "outer_gap_um")):
             gap = block.number(key, 1e-6, optional=True)
             if gap < 0.0:
-                raise GeometryError(f"{block.place}.{key}: {gap * 1e6:g} is negative (0 = touching, null = no flange)")
+                raise GeometryError(
+                    f"{block.place}.{key}: {gap * 1e6:g} is negative (0 = touching, null = no flange)"
+                )
             gaps[i] = None if np.isnan(gap) else gap
     bushing = BushingDimensions(
         radius=block.number("radius_mm", 1e-3),
@@ -293,7 +312,9 @@ def _bushing(block: _Block, joint: str, materials: dict[str, Material]) -> Bushi
             f"the sleeve, {sleeve * 1e3:g}"
         )
     if abs(bushing.radius) <= bushing.length / 2.0:
-        raise GeometryError(f"{block.place}.radius_mm: {bushing.radius * 1e3:g}: the bushing reaches past O")
+        raise GeometryError(
+            f"{block.place}.radius_mm: {bushing.radius * 1e3:g}: the bushing reaches past O"
+        )
     return bushing
 
 
@@ -307,8 +328,15 @@ def _platform(block: _Block, materials: dict[str, Material]) -> tuple[PlatformDi
     try:
         points = np.array(points_raw, dtype=float) * 1e-3
     except (TypeError, ValueError) as error:
-        raise GeometryError(f"{block.place}.readout_points_mm: not a list of points of 3 numbers") from error
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.all(np.isfinite(points)):
+        raise GeometryError(
+            f"{block.place}.readout_points_mm: not a list of points of 3 numbers"
+        ) from error
+    if (
+        points.ndim != 2
+        or points.shape[1] != 3
+        or len(points) < 4
+        or not np.all(np.isfinite(points))
+    ):
         raise GeometryError(
             f"{block.place}.readout_points_mm: shape {points.shape}, needs at least 4 points of 3 finite numbers"
         )

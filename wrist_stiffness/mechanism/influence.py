@@ -47,7 +47,9 @@ class Influence:
 
     def of_components(self) -> Array:
         """G of all elastic components in the order of `ELASTIC`, (..., 8, 3, 3)."""
-        return np.where(IN_LIMB_1[:, None, None], self.limb_1[..., None, :, :], self.limb_2[..., None, :, :])
+        return np.where(
+            IN_LIMB_1[:, None, None], self.limb_1[..., None, :, :], self.limb_2[..., None, :, :]
+        )
 
     def slides(self) -> Array:
         """Slides of joint_2, joint_3, joint_4 for a translation of each component, (..., 8, 3, 3)."""

@@ -95,7 +95,9 @@ class Mechanism:
         }
         for names, (u, v) in pairs.items():
             if np.linalg.norm(np.cross(u, v)) < HOME_TOLERANCE:
-                raise GeometryError(f"home axes of {names} are parallel: {u.tolist()}, {v.tolist()}")
+                raise GeometryError(
+                    f"home axes of {names} are parallel: {u.tolist()}, {v.tolist()}"
+                )
         determinant = float(self.b0 @ np.cross(self.d0, self.c0))
         if abs(determinant) < HOME_TOLERANCE:
             raise GeometryError(
@@ -174,7 +176,9 @@ class Mechanism:
         turn_1, turn_2, b, d, p, q, radicand = self._close(theta)
         if not np.all(radicand > 0.0):
             bad = np.argwhere(~(np.atleast_1d(radicand) > 0.0))[0]
-            angles = np.degrees(np.reshape(theta, (-1, 2))[np.ravel_multi_index(bad, np.atleast_1d(radicand).shape)])
+            angles = np.degrees(
+                np.reshape(theta, (-1, 2))[np.ravel_multi_index(bad, np.atleast_1d(radicand).shape)]
+            )
             raise UnreachablePoseError(
                 f"motor angles ({angles[0]:.3f}, {angles[1]:.3f}) deg: the loop does not close "
                 f"(angle between joint_2 and joint_4 outside its limits)"
@@ -250,7 +254,11 @@ class Mechanism:
             c = triad(b, n) @ home.T @ self.c0
             for branch_2 in (1.0, -1.0):
                 d = _cone_intersection(
-                    np.broadcast_to(self.a2, c.shape), c, self.d0 @ self.a2, self.c0 @ self.d0, branch_2
+                    np.broadcast_to(self.a2, c.shape),
+                    c,
+                    self.d0 @ self.a2,
+                    self.c0 @ self.d0,
+                    branch_2,
                 )
                 theta = np.stack(
                     [_angle_about(self.a1, self.b0, b), _angle_about(self.a2, self.d0, d)], axis=-1
@@ -282,10 +290,16 @@ class Mechanism:
         """
         solutions = self.inverse(normal)
         step = np.angle(np.exp(1j * (solutions - np.asarray(theta)[..., None, :])))
-        distance = np.where(np.isnan(step[..., 0]), np.inf, np.sum(np.nan_to_num(step) ** 2, axis=-1))
+        distance = np.where(
+            np.isnan(step[..., 0]), np.inf, np.sum(np.nan_to_num(step) ** 2, axis=-1)
+        )
         if np.any(np.min(distance, axis=-1) == np.inf):
-            bad = np.reshape(normal, (-1, 3))[np.argmax(np.ravel(np.min(distance, axis=-1)) == np.inf)]
-            raise UnreachablePoseError(f"platform normal {np.round(bad, 6).tolist()} is out of reach")
+            bad = np.reshape(normal, (-1, 3))[
+                np.argmax(np.ravel(np.min(distance, axis=-1)) == np.inf)
+            ]
+            raise UnreachablePoseError(
+                f"platform normal {np.round(bad, 6).tolist()} is out of reach"
+            )
         best = np.argmin(distance, axis=-1)[..., None, None]
         return np.asarray(theta) + np.take_along_axis(step, best, axis=-2)[..., 0, :]
 

@@ -81,6 +81,8 @@ def block_diagonal(rotation: Array) -> Array:
 
 def translate_wrench(wrench: Array, point: Array) -> Array:
     """Return at O the wrench (..., 6) that is given at `point` (..., 3): moment plus point x force."""
-    out = np.array(np.broadcast_to(wrench, (*np.broadcast_shapes(wrench.shape[:-1], point.shape[:-1]), 6)))
+    out = np.array(
+        np.broadcast_to(wrench, (*np.broadcast_shapes(wrench.shape[:-1], point.shape[:-1]), 6))
+    )
     out[..., 3:] += cross(np.asarray(point), out[..., :3])
     return out

@@ -1,0 +1,132 @@
+"""Where the wrist may work: operative workspace, map domain, distance to their borders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Limits
+from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism
+from wrist_stiffness.mechanism.vectors import triad
+
+BORDER_POINTS = 721
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Joint-space regions of one wrist.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The kinematic scheme.
+    limits : Limits
+        Tilt, margin and singularity limits.
+    """
+
+    mechanism: Mechanism
+    limits: Limits
+
+    @cached_property
+    def operative_border(self) -> Array:
+        """Motor angles on the border of the operative workspace, a closed line (n, 2) [rad].
+
+        Raises
+        ------
+        UnreachablePoseError
+            If the wrist cannot reach the operative tilt in every direction.
+        """
+        azimuth = np.linspace(0.0, 2.0 * np.pi, BORDER_POINTS)
+        n0 = self.mechanism.n0
+        across = triad(n0, self.mechanism.b0)[:, 1:] @ np.stack([np.cos(azimuth), np.sin(azimuth)])
+        tilt = self.limits.operative_tilt
+        normals = np.cos(tilt) * n0 + np.sin(tilt) * across.T
+        return self.mechanism.inverse_near(normals, np.zeros((BORDER_POINTS, 2)))
+
+    @cached_property
+    def rectangle(self) -> tuple[Array, Array]:
+        """Lower and upper motor angles of the map domain, (2,) each [rad].
+
+        The bounding rectangle of the operative workspace, widened by the margin about its centre.
+        """
+        lower, upper = self.operative_border.min(axis=0), self.operative_border.max(axis=0)
+        centre, half = (lower + upper) / 2.0, (upper - lower) / 2.0
+        return centre - self.limits.map_margin * half, centre + self.limits.map_margin * half
+
+    def operative(self, theta: Array) -> NDArray[np.bool_]:
+        """Tell which poses lie in the operative workspace, (...) for `theta` (..., 2) [rad]."""
+        theta = np.asarray(theta, dtype=float)
+        inside = self.domain(theta)
+        inside[inside] = self.mechanism.tilt(theta[inside]) <= self.limits.operative_tilt
+        return inside
+
+    def domain(self, theta: Array) -> NDArray[np.bool_]:
+        """Tell which poses lie in the map domain, (...) for `theta` (..., 2) [rad]."""
+        theta = np.asarray(theta, dtype=float)
+        lower, upper = self.rectangle
+        inside = np.asarray(np.all((theta >= lower) & (theta <= upper), axis=-1))
+        inside &= self.mechanism.reachable(theta)
+        determinant = self.mechanism.forward(theta[inside]).singularity
+        inside[inside] = np.abs(determinant) >= self.limits.singularity
+        return inside
+
+    def grid(self, per_axis: int) -> Array:
+        """Return the poses of an equally spaced grid over the rectangle that lie in the domain.
+
+        Parameters
+        ----------
+        per_axis : int
+            Points along each motor angle; 5 gives the paper's 25 poses.
+
+        Returns
+        -------
+        (n, 2) float
+            Motor angles [rad].
+        """
+        lower, upper = self.rectangle
+        axes = [np.linspace(lower[i], upper[i], per_axis) for i in range(2)]
+        poses = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        return poses[self.domain(poses)]
+
+    def configuration(self, theta: Array) -> Configuration:
+        """Forward kinematics of one pose that must lie in the map domain.
+
+        Parameters
+        ----------
+        theta : (2,) float
+            Motor angles [rad].
+
+        Returns
+        -------
+        Configuration
+            The rigid wrist.
+
+        Raises
+        ------
+        UnreachablePoseError
+            If the pose is outside the domain's rectangle or the loop does not close.
+        SingularPoseError
+            If |D| is below its limit.
+        """
+        theta = np.asarray(theta, dtype=float)
+        lower, upper = self.rectangle
+        if not np.all((theta >= lower) & (theta <= upper)):
+            angles, low, high = np.degrees(theta), np.degrees(lower), np.degrees(upper)
+            raise UnreachablePoseError(
+                f"motor angles ({angles[0]:.3f}, {angles[1]:.3f}) deg outside the table's domain "
+                f"({low[0]:.2f} to {high[0]:.2f}, {low[1]:.2f} to {high[1]:.2f})"
+            )
+        configuration = self.mechanism.forward(theta)
+        determinant = abs(float(configuration.singularity))
+        if determinant < self.limits.singularity:
+            angles = np.degrees(theta)
+            raise SingularPoseError(
+                f"motor angles ({angles[0]:.3f}, {angles[1]:.3f}) deg: |D| = {determinant:.3f} "
+                f"below the limit {self.limits.singularity:g}"
+            )
+        return configuration
