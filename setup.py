@@ -1,0 +1,69 @@
+"""Installs the package with pip or colcon (ament_python)."""
+
+import re
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "wrist_stiffness"
+HERE = Path(__file__).parent
+VERSION = re.findall(r'__version__ = "(.+)"', (HERE / NAME / "__init__.py").read_text())[0]
+NODES = ("pose_error_predictor", "angle_corrector", "cell_simulator")
+
+
+def shared(pattern: str) -> tuple[str, list[str]]:
+    """Return a data_files entry that puts the files of one folder under share/."""
+    files = sorted(str(path.relative_to(HERE)) for path in HERE.glob(pattern))
+    return f"share/{NAME}/{Path(pattern).parent}", files
+
+
+setup(
+    name=NAME,
+    version=VERSION,
+    description="Online error compensation of a flexible 2-DOF spherical parallel wrist",
+    long_description="Online error compensation of a flexible 2-DOF spherical parallel wrist: "
+    "a solid finite-element sweep becomes a lookup table, and ROS 2 nodes predict the pose error "
+    "and correct the motor angles.",
+    license="Apache-2.0",
+    maintainer="wrist_stiffness maintainers",
+    maintainer_email="maintainers@wrist-stiffness.example",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        shared("launch/*.launch.py"),
+        shared("config/*.yaml"),
+        shared("precomputed/*.npz"),
+    ],
+    zip_safe=False,
+    python_requires=">=3.11",
+    install_requires=["numpy>=1.26", "scipy>=1.11", "PyYAML>=6.0", "mcap>=1.1"],
+    extras_require={
+        # On a robot rclpy and the messages come from the ROS installation, not from here.
+        "ros": [
+            "ros-jazzy-rclpy==7.1.6",
+            "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
+            "ros-jazzy-common-interfaces==5.3.6",
+        ],
+        "fem": ["netgen-mesher>=6.2.2404", "scikit-fem>=10"],
+        "plot": ["matplotlib>=3.8"],
+        "workbench": ["nicegui>=2", "plotly>=5"],
+        "verify": ["acrod>=1.2", "rosbags>=0.10"],
+        # colcon finds pytest through this extra and would run no test without it.
+        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100"],
+        "dev": [
+            "ruff>=0.9",
+            "mypy>=1.13",
+            "types-PyYAML",
+            "colcon-common-extensions>=0.3",
+            "setuptools<80",
+        ],
+    },
+    entry_points={
+        "console_scripts": [
+            f"wrist-stiffness = {NAME}.cli.main:main",
+            *(f"{node} = {NAME}.ros.{node}:main" for node in NODES),
+        ]
+    },
+)

@@ -1,0 +1,164 @@
+import argparse
+import io
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+import wrist_stiffness
+from wrist_stiffness.cli.main import COMMANDS, EPILOG, build_parser, main
+from wrist_stiffness.cli.progress import Progress
+from wrist_stiffness.errors import GeometryError
+
+
+def command(run):
+    """Return a command module `try` with one required number."""
+
+    def add_parser(commands):
+        parser = commands.add_parser("try")
+        parser.add_argument("--number", type=float, required=True)
+        parser.set_defaults(run=run)
+
+    return SimpleNamespace(add_parser=add_parser)
+
+
+def raising(error):
+    def run(arguments):
+        raise error
+
+    return run
+
+
+TRY = ["try", "--number", "3.5"]
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_the_answer_of_the_command_is_the_exit_code(code):
+    seen = []
+
+    def run(arguments):
+        seen.append(arguments.number)
+        return code
+
+    assert main(TRY, [command(run)]) == code
+    assert seen == [3.5]
+
+
+def test_wrist_error_is_one_line_on_stderr(capsys):
+    error = GeometryError("link_1: radius_mm is -3, must be > 0")
+    assert main(TRY, [command(raising(error))]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err) == ("", "wrist-stiffness: error: link_1: radius_mm is -3, must be > 0\n")
+
+
+def test_a_fault_of_the_program_is_not_hidden():
+    with pytest.raises(ZeroDivisionError):
+        main(TRY, [command(raising(ZeroDivisionError()))])
+
+
+def test_interrupt_exits_with_130(capsys):
+    assert main(TRY, [command(raising(KeyboardInterrupt()))]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        ([], "COMMAND"),
+        (["tri"], "'tri'"),
+        (["try"], "--number"),
+        (["try", "--number", "x"], "'x'"),
+    ],
+)
+def test_wrong_use_is_one_line_that_names_it(argv, named, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(argv, [command(lambda arguments: 0)])
+    assert caught.value.code == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert named in err
+
+
+def test_version_and_module_entry():
+    ran = subprocess.run(
+        [sys.executable, "-m", "wrist_stiffness", "--version"], capture_output=True, text=True
+    )
+    assert (ran.returncode, ran.stdout) == (0, f"wrist-stiffness {wrist_stiffness.__version__}\n")
+
+
+def test_closed_pipe_is_quiet():
+    program = (
+        "import sys; from types import SimpleNamespace as S; from wrist_stiffness.cli.main import "
+        "main\n"
+        "def run(arguments):\n"
+        "    sys.stdin.read()\n"
+        "    print('x' * 1_000_000)\n"
+        "    return 0\n"
+        "add = lambda commands: commands.add_parser('try').set_defaults(run=run)\n"
+        "sys.exit(main(['try'], [S(add_parser=add)]))\n"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=pipe, stdout=pipe, stderr=pipe
+    ) as child:
+        child.stdout.close()
+        child.stdin.close()
+        assert child.stderr.read() == b""
+    assert child.returncode == 141
+
+
+@pytest.mark.xfail(raises=SystemExit, reason="the commands are being written")
+def test_commands_that_the_help_teaches_exist():
+    parser = build_parser(COMMANDS)
+    lines = [line.strip().split("  ")[0] for line in EPILOG.splitlines()]
+    taught = [line.split()[1:] for line in lines if line.startswith("wrist-stiffness ")]
+    assert len(taught) == 3
+    for argv in taught:
+        assert isinstance(parser.parse_args(argv), argparse.Namespace)
+
+
+def test_looking_for_help_loads_no_heavy_library():
+    program = (
+        "import sys; from wrist_stiffness.cli.main import COMMANDS, build_parser\n"
+        "build_parser(COMMANDS).format_help()\n"
+        "print({'numpy', 'scipy', 'yaml', 'mcap', 'matplotlib'} & sys.modules.keys())\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (ran.stderr, ran.stdout) == ("", "set()\n")
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def run_progress(stream, seconds_per_step, steps=100):
+    now_s = [0.0]
+    progress = Progress("poses", stream, clock=lambda: now_s[0])
+    for done in range(1, steps + 1):
+        now_s[0] += seconds_per_step
+        progress(done, steps)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+def test_a_short_computation_shows_no_progress(stream):
+    assert run_progress(stream(), seconds_per_step=0.019) == ""
+
+
+def test_a_file_gets_a_plain_line_every_ten_percent():
+    lines = run_progress(io.StringIO(), seconds_per_step=1.0).splitlines()
+    assert lines[0] == "poses: 10 % (10 of 100)"
+    assert lines[-1] == "poses: 100 % (100 of 100)"
+    assert len(lines) == 10
+
+
+def test_a_terminal_gets_a_bar_with_the_time_left():
+    shown = run_progress(Terminal(), seconds_per_step=1.0).split("\r")
+    assert shown[0] == ""
+    assert shown[1].startswith("poses [..............................]   2 % 98 s left")
+    assert "[###############...............]  50 % 50 s left" in shown[49]
+    assert shown[-1].startswith("poses [##############################] 100 % 100 s")
+    assert shown[-1].endswith("\n")
+    assert len({len(line.rstrip("\n")) for line in shown[1:]}) == 1

@@ -1,0 +1,10 @@
+import os
+
+# Every worker has a ROS domain of its own, so that tests with live nodes do not hear each other.
+# Workers inherit the variables of the process that started them. Domains above 101 clash with
+# ports that Linux hands out.
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 90))
+worker = os.environ.get("PYTEST_XDIST_WORKER")
+if worker is not None:
+    os.environ["ROS_DOMAIN_ID"] = str(int(os.environ["ROS_DOMAIN_ID"]) + int(worker[2:]) % 11)

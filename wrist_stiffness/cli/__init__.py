@@ -1,0 +1,1 @@
+"""The command line: a thin shell that reads arguments, calls one workflow and prints its result."""

@@ -1,0 +1,116 @@
+"""The command `wrist-stiffness`: runs one command, turns errors into exit codes."""
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from typing import NoReturn, Protocol
+
+from wrist_stiffness import __version__
+from wrist_stiffness.errors import WristError
+
+PROG = "wrist-stiffness"
+
+EXIT_DONE = 0
+EXIT_NO = 1
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+EXIT_PIPE_CLOSED = 141
+
+DESCRIPTION = """\
+Predict, correct and explain the pose error of a flexible two-degree-of-freedom wrist."""
+
+EPILOG = """\
+Three commands to begin with (each uses the shipped wrist where none is named):
+  wrist-stiffness table show                     how stiff is it, and where?
+  wrist-stiffness simulate -o first_recording    a virtual cell to practise on
+  wrist-stiffness replay first_recording -o corrected
+                                                 predicted error and corrected commands
+
+'wrist-stiffness COMMAND --help' explains a command.
+Exit codes: 0 done, 1 the answer is no, 2 wrong use or bad input."""
+
+
+class CommandModule(Protocol):
+    """What a module of this folder offers to become a command.
+
+    `add_parser` adds its parser and names the function to run with
+    `parser.set_defaults(run=run)`; `run(arguments)` returns an exit code.  `run` imports the
+    workflow it needs, so that `--help` and the other commands do not wait for it.
+    """
+
+    def add_parser(self, commands: "argparse._SubParsersAction[OneLineParser]") -> None:
+        """Add this command's parser."""
+
+
+COMMANDS: tuple[CommandModule, ...] = ()
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line, without the usage text before it."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with code 2 and one line on stderr."""
+        self.exit(EXIT_BAD_INPUT, f"{PROG}: error: {message} (see '{self.prog} --help')\n")
+
+
+def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
+    """Return the parser of all commands.
+
+    Parameters
+    ----------
+    commands
+        Modules in the order in which the help lists them.
+
+    Returns
+    -------
+    OneLineParser
+        Its result has the attribute `run`, a function of the parsed arguments.
+    """
+    parser = OneLineParser(
+        prog=PROG,
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"{PROG} {__version__}")
+    subparsers = parser.add_subparsers(metavar="COMMAND", title="commands", required=True)
+    for command in commands:
+        command.add_parser(subparsers)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv
+        Arguments without the program name; those of the process if None.
+    commands
+        The commands on offer; those of the package if None.
+
+    Returns
+    -------
+    int
+        0 done, 1 the answer is no, 2 bad input, 130 interrupted, 141 the reader of stdout left.
+
+    Raises
+    ------
+    SystemExit
+        From argparse: 0 after `--help` and `--version`, 2 on wrong use.
+    """
+    arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
+    try:
+        code: int = arguments.run(arguments)
+        sys.stdout.flush()
+    except WristError as error:
+        print(f"{PROG}: error: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # Python flushes stdout once more at exit, which would print a traceback.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_PIPE_CLOSED
+    return code

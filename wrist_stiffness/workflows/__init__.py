@@ -1,0 +1,1 @@
+"""One function per command: it calls the rooms in order and returns data, printing nothing."""

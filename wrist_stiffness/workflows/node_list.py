@@ -1,0 +1,51 @@
+"""The nodes of a wrist and of the virtual cell: one list for the launch file and for `cell`."""
+
+import sys
+from dataclasses import dataclass, field
+
+ParameterValue = bool | int | float | str
+
+
+@dataclass(frozen=True)
+class NodeEntry:
+    """One node to start.
+
+    Parameters
+    ----------
+    executable
+        Name of the executable and of the module in `wrist_stiffness.ros`.
+    name
+        Name of the node.
+    parameters
+        Values by parameter name.
+    remappings
+        (standard, actual) topic names.
+    """
+
+    executable: str
+    name: str
+    parameters: dict[str, ParameterValue] = field(default_factory=dict)
+    remappings: tuple[tuple[str, str], ...] = ()
+
+    def command(self) -> list[str]:
+        """Return the process arguments that start this node with the running interpreter."""
+        arguments = [sys.executable, "-m", f"wrist_stiffness.ros.{self.executable}", "--ros-args"]
+        arguments += ["-r", f"__node:={self.name}"]
+        for parameter, value in self.parameters.items():
+            text = str(value).lower() if isinstance(value, bool) else str(value)
+            arguments += ["-p", f"{parameter}:={text}"]
+        for standard, actual in self.remappings:
+            arguments += ["-r", f"{standard}:={actual}"]
+        return arguments
+
+
+WRIST_NODES = tuple(
+    NodeEntry(executable=name, name=name) for name in ("pose_error_predictor", "angle_corrector")
+)
+"""The nodes beside a real wrist."""
+
+SIMULATOR_NODE = NodeEntry(executable="cell_simulator", name="cell_simulator")
+"""The virtual wrist, with its motors, load and pose sensor."""
+
+CELL_NODES = (*WRIST_NODES, SIMULATOR_NODE)
+"""The whole virtual cell."""
