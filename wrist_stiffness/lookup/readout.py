@@ -1,0 +1,195 @@
+"""Platform error from points on the platform, before and after the load.
+
+Two fits for two kinds of points:
+
+- `fit_platform_error` is the method of the paper (Palmieri 2015, section 4, Eqs. 1-10) for FEM
+  readouts: unconstrained least squares, polar factor, mean of the point-wise shifts.  It needs
+  points that are not coplanar.
+- `fit_markers` is the constrained rigid fit for measured markers.  It tolerates coplanar points
+  and lost markers, and noise disturbs it less because it never estimates the six strains.
+
+Both return T_err with P_D = T_err P_U for points in the fixed axes of F, so the rotation is
+R_err = R_D R_U^T (left-multiplied) and s is the shift of the platform's point at the origin O.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.errors import InputError
+
+MIN_SPREAD_RATIO = 0.1
+"""Smallest usable extent of the points relative to their largest (ratio of singular values)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformError:
+    """Rigid motion of the platform from its nominal to its actual pose, about O in F.
+
+    Parameters
+    ----------
+    shift : (..., 3) array
+        Shift s of the platform's point at O [m].
+    rotation : (..., 3, 3) array
+        R_err = R_D R_U^T, a proper rotation.
+    """
+
+    shift: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    @property
+    def shift_norm(self) -> NDArray[np.float64]:
+        """Length of s, (...,) [m]."""
+        return np.linalg.norm(self.shift, axis=-1)
+
+    @property
+    def phi(self) -> NDArray[np.float64]:
+        """Angle of R_err in [0, pi], (...,) [rad].
+
+        From sine and cosine together: the arccos of the trace alone loses every angle
+        below 1e-8 rad.
+        """
+        r = self.rotation
+        twice_sine = np.linalg.norm(
+            [
+                r[..., 2, 1] - r[..., 1, 2],
+                r[..., 0, 2] - r[..., 2, 0],
+                r[..., 1, 0] - r[..., 0, 1],
+            ],
+            axis=0,
+        )
+        return np.arctan2(twice_sine, np.trace(r, axis1=-2, axis2=-1) - 1.0)
+
+
+def fit_platform_error(points_undeformed: ArrayLike, points_deformed: ArrayLike) -> PlatformError:
+    """Fit the platform error to FEM readouts, Eqs. (1)-(10) of Palmieri (2015).
+
+    The fit works on the displacements and on centred points: with H their least-squares gradient,
+    the first estimate of Eq. (4) is I + H.  Rounding then stays near 2e-16 rad in phi and, for
+    points centimetres from O, 1e-17 m in s, wherever O lies; only the rounding of the given
+    coordinates is added.
+
+    Parameters
+    ----------
+    points_undeformed : (n, 3) or (..., n, 3) array
+        Readout points of the rigid wrist in F [m]: one set for all, or one per pose.
+    points_deformed : (..., n, 3) array
+        The same points under load in F [m].
+
+    Returns
+    -------
+    PlatformError
+        shift (..., 3) [m] and rotation (..., 3, 3).
+
+    Raises
+    ------
+    InputError
+        Fewer than four points, shapes that do not match, values that are not finite, or points
+        near a plane (sigma_min / sigma_max of the centred points below `MIN_SPREAD_RATIO`).
+    """
+    undeformed = _as_points(points_undeformed, "undeformed readout points")
+    deformed = _as_points(points_deformed, "deformed readout points")
+    _require_same_points(undeformed, deformed)
+    _require_finite(undeformed, "undeformed readout points")
+    _require_finite(deformed, "deformed readout points")
+    _require_spread(undeformed, 3, "readout points", "they lie near a plane")
+
+    displacement = deformed - undeformed
+    gradient = np.swapaxes(np.linalg.pinv(_centred(undeformed)) @ displacement, -1, -2)  # Eq. (4)
+    rotation = _nearest_rotation(np.eye(3) + gradient)  # Eq. (5)
+    turned = undeformed @ np.swapaxes(rotation - np.eye(3), -1, -2)
+    return PlatformError((displacement - turned).mean(axis=-2), rotation)  # Eqs. (8), (10)
+
+
+def fit_markers(points_reference: ArrayLike, points_measured: ArrayLike) -> PlatformError:
+    """Fit the platform error to measured markers: the rigid motion with the least squared misfit.
+
+    Parameters
+    ----------
+    points_reference : (n, 3) array
+        Nominal marker positions of the rigid wrist in F [m].
+    points_measured : (n, 3) array
+        Measured positions in F [m]; a marker with any NaN coordinate is lost and left out.
+
+    Returns
+    -------
+    PlatformError
+        shift (3,) [m] and rotation (3, 3).
+
+    Raises
+    ------
+    InputError
+        Fewer than three markers seen, markers near a line (second singular value of the centred
+        points below `MIN_SPREAD_RATIO` of the first), shapes that do not match, infinite values.
+    """
+    reference = _as_points(points_reference, "reference markers")
+    measured = _as_points(points_measured, "measured markers")
+    if reference.ndim != 2 or measured.ndim != 2:
+        raise InputError(
+            f"markers: shapes {reference.shape} and {measured.shape}; one set (n, 3) each expected"
+        )
+    _require_same_points(reference, measured)
+    _require_finite(reference, "reference markers")
+    seen = ~np.isnan(measured).any(axis=-1)
+    reference, measured = reference[seen], measured[seen]
+    _require_finite(measured, "measured markers")
+    _require_spread(reference, 2, "reference markers", "they lie near a line")
+    _require_spread(measured, 2, "measured markers", "they lie near a line")
+
+    rotation = Rotation.align_vectors(_centred(measured), _centred(reference))[0].as_matrix()
+    turned = reference.mean(axis=0) @ (rotation - np.eye(3)).T
+    return PlatformError((measured - reference).mean(axis=0) - turned, rotation)
+
+
+def _centred(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return points - points.mean(axis=-2, keepdims=True)
+
+
+def _nearest_rotation(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthogonal polar factor of (..., 3, 3) matrices, with det = +1."""
+    u, _, vt = np.linalg.svd(matrix)
+    # A reflection is no platform motion: turn the direction of the smallest singular value.
+    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    return u @ vt
+
+
+def _as_points(points: ArrayLike, what: str) -> NDArray[np.float64]:
+    array = np.asarray(points, dtype=float)
+    if array.ndim < 2 or array.shape[-1] != 3:
+        raise InputError(f"{what}: shape {array.shape}; (..., n, 3) expected")
+    return array
+
+
+def _require_same_points(before: NDArray[np.float64], after: NDArray[np.float64]) -> None:
+    try:
+        np.broadcast_shapes(before.shape[:-2], after.shape[:-2])
+    except ValueError as error:
+        raise InputError(
+            f"points before {before.shape} and after {after.shape}: numbers of poses do not match"
+        ) from error
+    if before.shape[-2] != after.shape[-2]:
+        raise InputError(
+            f"{before.shape[-2]} points before and {after.shape[-2]} after: the same expected"
+        )
+
+
+def _require_finite(points: NDArray[np.float64], what: str) -> None:
+    if not np.isfinite(points).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(points))[0])
+        raise InputError(f"{what}: {points[place]} at index {place}; finite metres expected")
+
+
+def _require_spread(points: NDArray[np.float64], dimensions: int, what: str, fault: str) -> None:
+    """Reject points whose extent in the given number of dimensions is too small for a fit."""
+    count = points.shape[-2]
+    if count < dimensions + 1:
+        raise InputError(f"{what}: {count} given; at least {dimensions + 1} needed")
+    sigma = np.linalg.svd(_centred(points), compute_uv=False)
+    largest = np.maximum(sigma[..., 0], np.finfo(float).tiny)
+    ratio = float(np.min(sigma[..., dimensions - 1] / largest))
+    if ratio < MIN_SPREAD_RATIO:
+        raise InputError(
+            f"{what}: {fault}: ratio of singular values {ratio:.3g}, limit {MIN_SPREAD_RATIO}"
+        )
