@@ -2,7 +2,9 @@
 PYTHON ?= python3
 VENV ?= .venv
 EXTRAS = ros,fem,plot,verify,test,dev
-READY = $(VENV)/.ready
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
+READY = $(VENV)/.ready-$(VERSION)
+OTHER = $(filter-out $(READY),$(wildcard $(VENV)/.ready-*))
 RUN = $(VENV)/bin/python -m
 TESTERS := $(shell nproc 2>/dev/null || echo 2)
 
@@ -24,8 +26,10 @@ help:
 demo: $(READY)
 	$(RUN) wrist_stiffness.workflows.demo -o demo
 
+# The workers share the cores: threads of their own below them would only get in the way.
+test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(RUN) pytest -n $(TESTERS) $(PYTEST_ARGS) test
+	$(RUN) pytest -n $(TESTERS) test
 
 lint: $(READY)
 	$(RUN) ruff check .
@@ -40,9 +44,9 @@ clean:
 	find wrist_stiffness test -name __pycache__ -prune -exec rm -rf {} +
 
 $(READY): setup.py constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' || \
-	  { echo "error: $(PYTHON) is not Python 3.11 or 3.12; choose one: make PYTHON=python3.11" >&2; exit 1; }
-	$(PYTHON) -m venv $(VENV)
+	@echo "$(VERSION)" | grep -qx '3\.1[12]' || \
+	  { echo "error: $(PYTHON) is not Python 3.11 or 3.12; use make PYTHON=python3.11" >&2; exit 1; }
+	$(PYTHON) -m venv $(if $(OTHER),--clear) $(VENV)
 	$(RUN) pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
 	$(RUN) pip install --quiet --disable-pip-version-check -c constraints.txt \
 	  --no-build-isolation -e '.[$(EXTRAS)]'
