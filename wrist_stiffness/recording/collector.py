@@ -1,0 +1,226 @@
+"""Rows of one topic, collected from its payloads, and what was wrong with them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.messages import JointState, Message, PoseArray, Temperature
+
+FloatArray = NDArray[np.float64]
+TimeArray = NDArray[np.int64]
+Rows = dict[str, NDArray[Any]]
+"""Columns by name, all of one length."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What was wrong with `count` messages of a topic, first at a log time [ns]."""
+
+    topic: str
+    kind: str
+    count: int
+    first_log_time_ns: int
+
+    def __str__(self) -> str:
+        """Return the fault as one line."""
+        return f"{self.topic}: {self.count} × {self.kind}, first at {self.first_log_time_ns} ns"
+
+
+Extract = Callable[[Batch], Rows | str]
+"""Takes a batch; returns its rows, or the name of the fault for which it has none."""
+IGNORED = "names none of the joints"
+_MISSING_JOINT = "joint missing"
+_MARKER_COUNT = "other number of markers than at first"
+
+
+def _stack(batch: Batch, *paths: str) -> FloatArray:
+    return np.stack([batch.columns[path] for path in paths], axis=1)
+
+
+def _xyz(prefix: str) -> tuple[str, ...]:
+    return tuple(f"{prefix}.{axis}" for axis in "xyz")
+
+
+def joint_rows(joints: tuple[str, ...]) -> Extract:
+    """Return the extraction of named joints from joint states, in the order of the names.
+
+    Parameters
+    ----------
+    joints : tuple[str, ...]
+        Names; other joints are ignored.
+
+    Returns
+    -------
+    Extract
+        Gives position, velocity and effort, each (m, number of joints).
+    """
+
+    def extract(batch: Batch) -> Rows | str:
+        message = batch.first
+        assert isinstance(message, JointState)  # the collector decodes this type only
+        found = [message.name.index(joint) for joint in joints if joint in message.name]
+        if not found:
+            return IGNORED
+        if len(found) < len(joints) or len(message.position) != len(message.name):
+            return _MISSING_JOINT
+        absent = np.full((batch.indices.size, len(joints)), np.nan)
+        columns = {
+            name: batch.columns[name][:, found]
+            if len(getattr(message, name)) == len(message.name)
+            else absent
+            for name in ("velocity", "effort")
+        }
+        return {"position": batch.columns["position"][:, found], **columns}
+
+    return extract
+
+
+def wrench_rows(batch: Batch) -> Rows:
+    """Return wrenches (m, 6) [N, N m], force first."""
+    return {"wrench": _stack(batch, *_xyz("wrench.force"), *_xyz("wrench.torque"))}
+
+
+def pose_rows(prefix: str) -> Extract:
+    """Return the extraction of poses at an attribute path, with covariance or NaN."""
+
+    def extract(batch: Batch) -> Rows:
+        covariance = batch.columns.get("pose.covariance")
+        count = batch.indices.size
+        return {
+            "position": _stack(batch, *_xyz(f"{prefix}.position")),
+            "quaternion": _stack(batch, *_xyz(f"{prefix}.orientation"), f"{prefix}.orientation.w"),
+            "covariance": np.full((count, 6, 6), np.nan)
+            if covariance is None
+            else covariance.reshape(count, 6, 6),
+        }
+
+    return extract
+
+
+def marker_rows() -> Extract:
+    """Return the extraction of markers (m, k, 3) [m]; the first message sets k."""
+    expected: list[int] = []
+
+    def extract(batch: Batch) -> Rows | str:
+        assert isinstance(batch.first, PoseArray)  # the collector decodes this type only
+        count = len(batch.first.poses)
+        expected.append(count)
+        if count != expected[0]:
+            return _MARKER_COUNT
+        if not count:
+            return {"position": np.empty((batch.indices.size, 0, 3))}
+        paths = [_xyz(f"poses.{marker}.position") for marker in range(count)]
+        return {"position": np.stack([_stack(batch, *path) for path in paths], axis=1)}
+
+    return extract
+
+
+def temperature_rows(batch: Batch) -> Rows:
+    """Return temperatures (m,) [°C]."""
+    return {"value": batch.columns["temperature"]}
+
+
+def float_rows(batch: Batch) -> Rows:
+    """Return plain numbers (m,)."""
+    return {"value": batch.columns["data"]}
+
+
+@dataclass
+class Collector:
+    """Rows and faults of one topic.
+
+    Attributes
+    ----------
+    topic : str
+        Name in the recording.
+    message_type : type[Message]
+        Class of its messages.
+    extract : Extract
+        Makes rows of a batch.
+    finite : tuple[str, ...]
+        Columns in which NaN is a fault; a lost marker or an absent velocity is none.
+    blocks : list[Rows]
+        Rows so far.
+    counts : dict[str, list[int]]
+        Log times [ns] of the messages that gave no row, by kind of fault.
+    """
+
+    topic: str
+    message_type: type[Message]
+    extract: Extract
+    finite: tuple[str, ...]
+    blocks: list[Rows] = field(default_factory=list)
+    counts: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+
+    def add(self, log_times: list[int], payloads: list[bytes]) -> None:
+        """Append payloads with their log times [ns]."""
+        times = np.array(log_times, dtype=np.int64)
+        batches, undecodable = decode_batches(self.message_type, payloads)
+        self._count("payload cannot be decoded", times[undecodable])
+        parts: list[Rows] = []
+        order: list[NDArray[np.intp]] = []
+        for batch in batches:
+            rows = self.extract(batch)
+            if isinstance(rows, str):
+                self._count(rows, times[batch.indices])
+                continue
+            stamps = batch.columns.get("header.stamp_ns", times[batch.indices])
+            frame = batch.first.header.frame_id if hasattr(batch.first, "header") else ""
+            parts.append(
+                {
+                    "time_ns": stamps,
+                    "log_time_ns": times[batch.indices],
+                    "frame_id": np.full(batch.indices.size, frame),
+                    **rows,
+                }
+            )
+            order.append(batch.indices)
+        if parts:
+            received = np.argsort(np.concatenate(order))
+            self.blocks.append({key: value[received] for key, value in _joined(parts).items()})
+
+    def rows(self) -> Rows:
+        """Return all rows in the order of reception, an empty dict without any."""
+        return _joined(self.blocks) if self.blocks else {}
+
+    def faults(self) -> list[Fault]:
+        """Return what was wrong, one entry for each kind."""
+        rows = self.rows()
+        found = {kind: np.array(times) for kind, times in self.counts.items() if kind != IGNORED}
+        if rows:
+            log_times = rows["log_time_ns"]
+            for name in self.finite:
+                values = rows[name].reshape(log_times.size, -1)
+                found[f"{name} not finite"] = log_times[~np.isfinite(values).all(axis=1)]
+            # One temperature topic serves several components, each with stamps of its own.
+            groups = np.unique(rows["frame_id"]) if self.message_type is Temperature else [None]
+            steps = [self._steps(rows, group) for group in groups]
+            found["stamp repeated"] = np.concatenate([later[step == 0] for later, step in steps])
+            found["stamp running backwards"] = np.concatenate(
+                [later[step < 0] for later, step in steps]
+            )
+        return [
+            Fault(self.topic, kind, int(times.size), int(times.min()))
+            for kind, times in found.items()
+            if times.size
+        ]
+
+    @staticmethod
+    def _steps(rows: Rows, group: str | None) -> tuple[TimeArray, TimeArray]:
+        chosen = slice(None) if group is None else rows["frame_id"] == group
+        return rows["log_time_ns"][chosen][1:], np.diff(rows["time_ns"][chosen])
+
+    def _count(self, kind: str, times: TimeArray) -> None:
+        if times.size:
+            self.counts[kind].extend(times.tolist())
+
+
+def _joined(parts: list[Rows]) -> Rows:
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}

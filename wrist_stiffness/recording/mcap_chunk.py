@@ -1,0 +1,172 @@
+"""Stretches of message records inside an MCAP file, and the messages in them."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import lz4.frame  # type: ignore[import-untyped]
+import zstandard
+from mcap.opcode import Opcode
+
+from wrist_stiffness.errors import RecordingError
+
+RECORD_HEAD = struct.Struct("<BQ")
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A chunk record, or a run of message records that stand outside of any chunk.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    offset, size : int
+        Where the stored bytes begin in the file, and how many they are.
+    compression : str
+        Empty, ``zstd`` or ``lz4``.
+    uncompressed_size, crc : int
+        Size and CRC-32 after decompression; CRC 0 = not stated.
+    start_ns, end_ns : int
+        First and last log time.
+    """
+
+    path: Path
+    offset: int
+    size: int
+    compression: str
+    uncompressed_size: int
+    crc: int
+    start_ns: int
+    end_ns: int
+
+
+class StoredMessage(NamedTuple):
+    """A message as stored."""
+
+    log_time_ns: int
+    channel_id: int
+    payload: bytes
+
+
+def chunk_bytes(chunk: Chunk) -> bytes:
+    """Return the records of a chunk, decompressed and checked.
+
+    Parameters
+    ----------
+    chunk : Chunk
+        Where to read.
+
+    Returns
+    -------
+    bytes
+        MCAP records one after another.
+
+    Raises
+    ------
+    RecordingError
+        If the bytes cannot be read, decompressed, or do not match size or checksum.
+    """
+    place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
+    try:
+        with chunk.path.open("rb") as stream:
+            stream.seek(chunk.offset)
+            stored = stream.read(chunk.size)
+        records = _decompress(stored, chunk)
+    except (OSError, RuntimeError, zstandard.ZstdError, MemoryError) as error:
+        raise RecordingError(f"{place} cannot be read: {error}") from error
+    if len(records) != chunk.uncompressed_size:
+        raise RecordingError(
+            f"{place} has {len(records)} bytes, its header states {chunk.uncompressed_size}"
+        )
+    if chunk.crc and zlib.crc32(records) != chunk.crc:
+        raise RecordingError(f"{place} does not match its checksum {chunk.crc:#010x}")
+    return records
+
+
+def _decompress(stored: bytes, chunk: Chunk) -> bytes:
+    match chunk.compression:
+        case "":
+            return stored
+        case "zstd":
+            return zstandard.decompress(stored, max_output_size=chunk.uncompressed_size)
+        case "lz4":
+            return bytes(lz4.frame.decompress(stored))
+        case other:
+            raise RuntimeError(f"compression {other!r} is none of '', 'zstd', 'lz4'")
+
+
+def records_in(buffer: bytes, place: str) -> Iterator[tuple[int, int, int]]:
+    """Iterate over the records in a decompressed chunk.
+
+    Parameters
+    ----------
+    buffer : bytes
+        MCAP records.
+    place : str
+        Where the buffer comes from, for the error's text.
+
+    Yields
+    ------
+    tuple[int, int, int]
+        Opcode, and the slice of the record's content.
+
+    Raises
+    ------
+    RecordingError
+        If a record reaches beyond the buffer.
+    """
+    position, total = 0, len(buffer)
+    while position < total:
+        if position + RECORD_HEAD.size > total:
+            raise RecordingError(f"{place}: record head cut after {total - position} bytes")
+        opcode, length = RECORD_HEAD.unpack_from(buffer, position)
+        start = position + RECORD_HEAD.size
+        position = start + length
+        if position > total:
+            raise RecordingError(f"{place}: record of {length} bytes exceeds its chunk")
+        yield opcode, start, position
+
+
+def messages_in(chunk: Chunk) -> list[StoredMessage]:
+    """Return the messages of a chunk in log-time order, ties in the order of the file.
+
+    Parameters
+    ----------
+    chunk : Chunk
+        Where to read.
+
+    Returns
+    -------
+    list[StoredMessage]
+        All messages.
+
+    Raises
+    ------
+    RecordingError
+        If the chunk is damaged, or holds messages older than its header states: reading in order
+        without holding the whole file relies on that time.
+    """
+    buffer = chunk_bytes(chunk)
+    place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
+    messages = []
+    for opcode, start, end in records_in(buffer, place):
+        if opcode == Opcode.MESSAGE:
+            if end - start < MESSAGE_HEAD.size:
+                raise RecordingError(f"{place}: message record of {end - start} bytes is too short")
+            channel_id, _, log_time_ns, _ = MESSAGE_HEAD.unpack_from(buffer, start)
+            payload = buffer[start + MESSAGE_HEAD.size : end]
+            messages.append(StoredMessage(log_time_ns, channel_id, payload))
+    messages.sort(key=lambda message: message.log_time_ns)
+    if messages and messages[0].log_time_ns < chunk.start_ns:
+        raise RecordingError(
+            f"{place} holds log time {messages[0].log_time_ns} ns, "
+            f"before its stated start {chunk.start_ns} ns"
+        )
+    return messages

@@ -1,0 +1,312 @@
+"""The ROS 2 messages of the wrist's topics as frozen dataclasses.
+
+Each field carries its line of the official ``.msg`` file.  Encoding, decoding, the schema text in a
+recording and the type hash all follow from these lines, so a message is declared once.
+
+Two conventions differ from ``rclpy``'s classes: stamps and durations are one integer of
+nanoseconds (attribute ``stamp_ns`` for the field ``stamp``), and sequences are tuples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, ClassVar
+
+MSG_LINE = "msg_line"
+
+
+def line(text: str, default: Any) -> Any:
+    """Declare one field of a message.
+
+    Parameters
+    ----------
+    text : str
+        Line of the ``.msg`` file: type, name and, where the file has one, the default value.
+    default : Any
+        Value in Python where none is given; immutable.
+
+    Returns
+    -------
+    Any
+        The dataclass field.
+    """
+    return field(default=default, metadata={MSG_LINE: text})
+
+
+class Message:
+    """Base of all messages; `ros_type` is the full type name, ``package/msg/Type``."""
+
+    __slots__ = ()
+    ros_type: ClassVar[str]
+    constants: ClassVar[tuple[str, ...]] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Header(Message):
+    """Stamp [ns since the epoch of the recording's clock] and coordinate frame."""
+
+    ros_type = "std_msgs/msg/Header"
+    stamp_ns: int = line("builtin_interfaces/Time stamp", 0)
+    frame_id: str = line("string frame_id", "")
+
+
+@dataclass(frozen=True, slots=True)
+class String(Message):
+    """A text."""
+
+    ros_type = "std_msgs/msg/String"
+    data: str = line("string data", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Bool(Message):
+    """A truth value."""
+
+    ros_type = "std_msgs/msg/Bool"
+    data: bool = line("bool data", False)
+
+
+@dataclass(frozen=True, slots=True)
+class Float64(Message):
+    """A number; its unit belongs to the topic."""
+
+    ros_type = "std_msgs/msg/Float64"
+    data: float = line("float64 data", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MultiArrayDimension(Message):
+    """One dimension of an array: label, length and stride [elements]."""
+
+    ros_type = "std_msgs/msg/MultiArrayDimension"
+    label: str = line("string label", "")
+    size: int = line("uint32 size", 0)
+    stride: int = line("uint32 stride", 0)
+
+
+@dataclass(frozen=True, slots=True)
+class MultiArrayLayout(Message):
+    """Dimensions of an array, outermost first, and the offset of its first element."""
+
+    ros_type = "std_msgs/msg/MultiArrayLayout"
+    dim: tuple[MultiArrayDimension, ...] = line("MultiArrayDimension[] dim", ())
+    data_offset: int = line("uint32 data_offset", 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Float64MultiArray(Message):
+    """Numbers with a layout."""
+
+    ros_type = "std_msgs/msg/Float64MultiArray"
+    layout: MultiArrayLayout = line("MultiArrayLayout layout", MultiArrayLayout())
+    data: tuple[float, ...] = line("float64[] data", ())
+
+
+@dataclass(frozen=True, slots=True)
+class JointState(Message):
+    """Positions [rad], velocities [rad/s] and efforts [N m] by joint name; may be empty."""
+
+    ros_type = "sensor_msgs/msg/JointState"
+    header: Header = line("std_msgs/Header header", Header())
+    name: tuple[str, ...] = line("string[] name", ())
+    position: tuple[float, ...] = line("float64[] position", ())
+    velocity: tuple[float, ...] = line("float64[] velocity", ())
+    effort: tuple[float, ...] = line("float64[] effort", ())
+
+
+@dataclass(frozen=True, slots=True)
+class Temperature(Message):
+    """Temperature [°C] with its variance [K²], 0 = unknown."""
+
+    ros_type = "sensor_msgs/msg/Temperature"
+    header: Header = line("std_msgs/Header header", Header())
+    temperature: float = line("float64 temperature", 0.0)
+    variance: float = line("float64 variance", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Vector3(Message):
+    """A free vector."""
+
+    ros_type = "geometry_msgs/msg/Vector3"
+    x: float = line("float64 x", 0.0)
+    y: float = line("float64 y", 0.0)
+    z: float = line("float64 z", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Point(Message):
+    """A position [m]."""
+
+    ros_type = "geometry_msgs/msg/Point"
+    x: float = line("float64 x", 0.0)
+    y: float = line("float64 y", 0.0)
+    z: float = line("float64 z", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Quaternion(Message):
+    """A unit quaternion, scalar last."""
+
+    ros_type = "geometry_msgs/msg/Quaternion"
+    x: float = line("float64 x 0", 0.0)
+    y: float = line("float64 y 0", 0.0)
+    z: float = line("float64 z 0", 0.0)
+    w: float = line("float64 w 1", 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Pose(Message):
+    """Position [m] and orientation."""
+
+    ros_type = "geometry_msgs/msg/Pose"
+    position: Point = line("Point position", Point())
+    orientation: Quaternion = line("Quaternion orientation", Quaternion())
+
+
+@dataclass(frozen=True, slots=True)
+class PoseWithCovariance(Message):
+    """A pose and the row-major 6×6 covariance [m, rad], translation first, fixed axes."""
+
+    ros_type = "geometry_msgs/msg/PoseWithCovariance"
+    pose: Pose = line("Pose pose", Pose())
+    covariance: tuple[float, ...] = line("float64[36] covariance", (0.0,) * 36)
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench(Message):
+    """Force [N] and moment [N m]."""
+
+    ros_type = "geometry_msgs/msg/Wrench"
+    force: Vector3 = line("Vector3 force", Vector3())
+    torque: Vector3 = line("Vector3 torque", Vector3())
+
+
+@dataclass(frozen=True, slots=True)
+class WrenchStamped(Message):
+    """A wrench with stamp and frame."""
+
+    ros_type = "geometry_msgs/msg/WrenchStamped"
+    header: Header = line("std_msgs/Header header", Header())
+    wrench: Wrench = line("Wrench wrench", Wrench())
+
+
+@dataclass(frozen=True, slots=True)
+class PoseStamped(Message):
+    """A pose with stamp and frame."""
+
+    ros_type = "geometry_msgs/msg/PoseStamped"
+    header: Header = line("std_msgs/Header header", Header())
+    pose: Pose = line("Pose pose", Pose())
+
+
+@dataclass(frozen=True, slots=True)
+class PoseWithCovarianceStamped(Message):
+    """A pose with covariance, stamp and frame."""
+
+    ros_type = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    header: Header = line("std_msgs/Header header", Header())
+    pose: PoseWithCovariance = line("PoseWithCovariance pose", PoseWithCovariance())
+
+
+@dataclass(frozen=True, slots=True)
+class PoseArray(Message):
+    """Several poses of one stamp and frame."""
+
+    ros_type = "geometry_msgs/msg/PoseArray"
+    header: Header = line("std_msgs/Header header", Header())
+    poses: tuple[Pose, ...] = line("Pose[] poses", ())
+
+
+@dataclass(frozen=True, slots=True)
+class JointTrajectoryPoint(Message):
+    """State of the joints [rad, rad/s, rad/s², N m] at a time after the start [ns]."""
+
+    ros_type = "trajectory_msgs/msg/JointTrajectoryPoint"
+    positions: tuple[float, ...] = line("float64[] positions", ())
+    velocities: tuple[float, ...] = line("float64[] velocities", ())
+    accelerations: tuple[float, ...] = line("float64[] accelerations", ())
+    effort: tuple[float, ...] = line("float64[] effort", ())
+    time_from_start_ns: int = line("builtin_interfaces/Duration time_from_start", 0)
+
+
+@dataclass(frozen=True, slots=True)
+class JointTrajectory(Message):
+    """Points of a motion, in the order of `joint_names`."""
+
+    ros_type = "trajectory_msgs/msg/JointTrajectory"
+    header: Header = line("std_msgs/Header header", Header())
+    joint_names: tuple[str, ...] = line("string[] joint_names", ())
+    points: tuple[JointTrajectoryPoint, ...] = line("JointTrajectoryPoint[] points", ())
+
+
+@dataclass(frozen=True, slots=True)
+class KeyValue(Message):
+    """One named value of a diagnostic."""
+
+    ros_type = "diagnostic_msgs/msg/KeyValue"
+    key: str = line("string key", "")
+    value: str = line("string value", "")
+
+
+class DiagnosticLevel(IntEnum):
+    """Severity of a `DiagnosticStatus`."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticStatus(Message):
+    """State of one component, `level` as in `DiagnosticLevel`."""
+
+    ros_type = "diagnostic_msgs/msg/DiagnosticStatus"
+    constants = tuple(f"byte {level.name}={level.value}" for level in DiagnosticLevel)
+    level: int = line("byte level", 0)
+    name: str = line("string name", "")
+    message: str = line("string message", "")
+    hardware_id: str = line("string hardware_id", "")
+    values: tuple[KeyValue, ...] = line("KeyValue[] values", ())
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticArray(Message):
+    """States of several components at one stamp."""
+
+    ros_type = "diagnostic_msgs/msg/DiagnosticArray"
+    header: Header = line("std_msgs/Header header", Header())
+    status: tuple[DiagnosticStatus, ...] = line("DiagnosticStatus[] status", ())
+
+
+MESSAGE_TYPES: dict[str, type[Message]] = {
+    message_type.ros_type: message_type
+    for message_type in (
+        Header,
+        String,
+        Bool,
+        Float64,
+        MultiArrayDimension,
+        MultiArrayLayout,
+        Float64MultiArray,
+        JointState,
+        Temperature,
+        Vector3,
+        Point,
+        Quaternion,
+        Pose,
+        PoseWithCovariance,
+        Wrench,
+        WrenchStamped,
+        PoseStamped,
+        PoseWithCovarianceStamped,
+        PoseArray,
+        JointTrajectoryPoint,
+        JointTrajectory,
+        KeyValue,
+        DiagnosticStatus,
+        DiagnosticArray,
+    )
+}

@@ -1,0 +1,292 @@
+"""Reading of recordings: rosbag2 folders with MCAP storage, and bare MCAP files."""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording.cdr import decode
+from wrist_stiffness.recording.channel import Channel
+from wrist_stiffness.recording.mcap_chunk import Chunk, StoredMessage, messages_in
+from wrist_stiffness.recording.mcap_index import McapIndex, Span, index_mcap
+from wrist_stiffness.recording.messages import Message
+
+METADATA_FILE = "metadata.yaml"
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """One topic of a recording.
+
+    Attributes
+    ----------
+    name, ros_type : str
+        Topic and ``package/msg/Type``.
+    count : int
+        Number of messages.
+    first_ns, last_ns : int or None
+        Log time of the first and last message; None without messages.
+    is_readable : bool
+        Whether the type is one that this project decodes.
+    """
+
+    name: str
+    ros_type: str
+    count: int
+    first_ns: int | None
+    last_ns: int | None
+    is_readable: bool
+
+
+class RawMessage(NamedTuple):
+    """A message as stored: channel, log time and undecoded payload."""
+
+    channel: Channel
+    log_time_ns: int
+    payload: bytes
+
+
+class Recording:
+    """An opened recording; made by `open_recording`.
+
+    No file stays open between two reads, and any number of iterations may run side by side.
+
+    Attributes
+    ----------
+    path : Path
+        Folder or file.
+    topics : tuple[TopicInfo, ...]
+        By name; also those that cannot be decoded.
+    """
+
+    def __init__(self, path: Path, indices: list[McapIndex], flaws: list[str], strict: bool):
+        self.path = path
+        self._indices = indices
+        self._strict = strict
+        # Texts in order of discovery; a second reading meets the same flaws again.
+        self._flaws: dict[str, None] = {}
+        self._undecodable: Counter[str] = Counter()
+        for flaw in [*flaws, *(index.damage for index in indices if index.damage)]:
+            self._report(flaw)
+        self.topics = _topics_of(indices)
+
+    @property
+    def damage(self) -> str:
+        """What is wrong with the recording, empty where nothing is known to be.
+
+        Cuts are known from the start; chunks that fail their checksum and payloads that cannot be
+        decoded are known as soon as they have been read.
+        """
+        undecodable = (
+            f"{topic}: {count} messages cannot be decoded"
+            for topic, count in self._undecodable.items()
+        )
+        return "; ".join([*self._flaws, *undecodable])
+
+    @property
+    def skipped_topics(self) -> tuple[TopicInfo, ...]:
+        """Topics whose messages `messages` leaves out because their type is not known."""
+        return tuple(topic for topic in self.topics if not topic.is_readable)
+
+    def raw_messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
+        """Iterate over the stored messages, in log-time order, without decoding.
+
+        Parameters
+        ----------
+        topics : Collection[str], optional
+            Names to keep; None keeps all.
+
+        Yields
+        ------
+        RawMessage
+            Ties in log time come in the order of the file.  Memory is bounded by the chunks that
+            overlap in time.
+
+        Raises
+        ------
+        RecordingError
+            If the recording was opened as strict and a chunk is damaged.
+        """
+        chunks = [(chunk, index) for index in self._indices for chunk in index.chunks]
+        waiting = sorted(
+            ((chunk.start_ns, order) for order, (chunk, _) in enumerate(chunks)), reverse=True
+        )
+        # Each entry: time and position in the recording of the next message of an opened chunk.
+        opened: list[tuple[int, int, int, list[StoredMessage]]] = []
+        while waiting or opened:
+            while waiting and (not opened or waiting[-1][0] <= opened[0][0]):
+                _, order = waiting.pop()
+                stored = self._load(*chunks[order], topics)
+                if stored:
+                    heapq.heappush(opened, (stored[0].log_time_ns, order, 0, stored))
+            if not opened:
+                return
+            time_ns, order, position, stored = opened[0]
+            channels = chunks[order][1].channels
+            yield RawMessage(channels[stored[position].channel_id], time_ns, stored[position][2])
+            position += 1
+            if position < len(stored):
+                following = (stored[position].log_time_ns, order, position, stored)
+                heapq.heapreplace(opened, following)
+            else:
+                heapq.heappop(opened)
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:
+        """Iterate over the decoded messages in log-time order.
+
+        Parameters
+        ----------
+        topics : Collection[str], optional
+            Names to keep; None keeps all whose type is known.
+
+        Yields
+        ------
+        tuple[str, int, Message]
+            Topic, log time [ns], message.
+
+        Raises
+        ------
+        RecordingError
+            If the recording was opened as strict and a chunk or a payload is damaged.
+        """
+        self._undecodable.clear()
+        for channel, log_time_ns, payload in self.raw_messages(topics):
+            message_type = channel.message_type
+            if message_type is None:
+                continue
+            try:
+                message = decode(message_type, payload)
+            except RecordingError as error:
+                if self._strict:
+                    place = f"{self.path}: {channel.topic} at log time {log_time_ns} ns"
+                    raise RecordingError(f"{place}: {error}") from error
+                self._undecodable[channel.topic] += 1
+                continue
+            yield channel.topic, log_time_ns, message
+
+    def _load(
+        self, chunk: Chunk, index: McapIndex, topics: Collection[str] | None
+    ) -> list[StoredMessage]:
+        try:
+            stored = messages_in(chunk)
+        except RecordingError as error:
+            self._report(f"{error}, its messages are left out")
+            return []
+        known = index.channels
+        orphans = sum(message.channel_id not in known for message in stored)
+        if orphans:
+            self._report(
+                f"{chunk.path.name}: {orphans} messages at byte {chunk.offset} have no channel"
+            )
+        return [
+            message
+            for message in stored
+            if message.channel_id in known
+            and (topics is None or known[message.channel_id].topic in topics)
+        ]
+
+    def _report(self, flaw: str) -> None:
+        if self._strict:
+            raise RecordingError(f"{self.path}: {flaw}")
+        self._flaws[flaw] = None
+
+
+def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Recording:
+    """Open a recording for reading.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        A rosbag2 folder or an MCAP file.
+    strict : bool
+        Raise at the first damage instead of giving what is there.
+
+    Returns
+    -------
+    Recording
+        Its topics are known; messages are read when asked for.
+
+    Raises
+    ------
+    RecordingError
+        If the path is missing, empty, no recording, or of a storage other than MCAP; with `strict`
+        also if it is cut.
+    """
+    path = Path(path)
+    flaws: list[str] = []
+    if path.is_dir():
+        files = _files_of_folder(path, flaws)
+    elif path.exists():
+        files = [path]
+    else:
+        raise RecordingError(f"{path} does not exist")
+    return Recording(path, [index_mcap(file) for file in files], flaws, strict)
+
+
+def _files_of_folder(folder: Path, flaws: list[str]) -> list[Path]:
+    metadata_path = folder / METADATA_FILE
+    present = sorted(folder.glob("*.mcap"))
+    if not metadata_path.exists():
+        # The recorder writes it last, so a crash leaves the storage files alone.
+        if not present:
+            raise RecordingError(f"{folder} is no recording: neither {METADATA_FILE} nor *.mcap")
+        flaws.append(f"{METADATA_FILE} is missing, files taken by name")
+        return present
+    listed = _listed_files(metadata_path)
+    missing = [file.name for file in listed if not file.exists()]
+    if missing and len(missing) == len(listed):
+        raise RecordingError(f"{folder}: {', '.join(missing)} of {METADATA_FILE} not found")
+    if missing:
+        flaws.append(f"{', '.join(missing)} of {METADATA_FILE} not found")
+    return [file for file in listed if file.exists()]
+
+
+def _listed_files(metadata_path: Path) -> list[Path]:
+    try:
+        information = yaml.safe_load(metadata_path.read_text(encoding="utf-8"))[
+            "rosbag2_bagfile_information"
+        ]
+        storage = information["storage_identifier"]
+        compression = information.get("compression_mode") or ""
+        names = [str(name) for name in information["relative_file_paths"]]
+    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split())
+        raise RecordingError(f"{metadata_path} is no rosbag2 metadata: {reason}") from error
+    if storage != "mcap":
+        raise RecordingError(f"{metadata_path}: storage {storage!r} is not read, only 'mcap'")
+    if compression.lower() not in ("", "none"):
+        raise RecordingError(
+            f"{metadata_path}: rosbag2 compression mode {compression!r} is not read, only MCAP's "
+            "own chunk compression"
+        )
+    if not names:
+        raise RecordingError(f"{metadata_path} lists no files")
+    return [metadata_path.parent / name for name in names]
+
+
+def _topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:
+    spans: dict[tuple[str, str, bool], Span | None] = {}
+    for index in indices:
+        for channel_id, channel in index.channels.items():
+            key = (channel.topic, channel.ros_type, channel.message_type is not None)
+            span, known = index.spans.get(channel_id), spans.get(key)
+            spans[key] = span.joined(known) if span and known else span or known
+    return tuple(
+        TopicInfo(
+            name=name,
+            ros_type=ros_type,
+            count=span.count if span else 0,
+            first_ns=span.first_ns if span else None,
+            last_ns=span.last_ns if span else None,
+            is_readable=is_readable,
+        )
+        for (name, ros_type, is_readable), span in sorted(spans.items(), key=lambda item: item[0])
+    )

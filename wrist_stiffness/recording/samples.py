@@ -1,0 +1,286 @@
+"""A recording as arrays, one set for each kind of topic.
+
+Values are given as they were recorded.  What is wrong with them is counted in `Samples.faults` and
+left to the reader: NaN stay, stamps stay in the order of reception even where they repeat or run
+backwards.  Only a message that cannot give a row (a joint missing, another number of markers, a
+payload that cannot be decoded) is left out, and counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording import topics as names
+from wrist_stiffness.recording.collector import (
+    Collector,
+    Extract,
+    Fault,
+    FloatArray,
+    Rows,
+    TimeArray,
+    float_rows,
+    joint_rows,
+    marker_rows,
+    pose_rows,
+    temperature_rows,
+    wrench_rows,
+)
+from wrist_stiffness.recording.messages import (
+    Float64,
+    JointState,
+    Message,
+    PoseArray,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Temperature,
+    WrenchStamped,
+)
+from wrist_stiffness.recording.reader import Recording
+
+TextArray = NDArray[np.str_]
+
+DEFAULT_JOINTS = ("motor_1_joint", "motor_2_joint")
+# Payloads held at a time before they become arrays.
+_BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class JointSamples:
+    """Two joints: stamps, log times (n,) [ns], positions, velocities, efforts (n, 2) [rad, N m].
+
+    Velocity and effort are NaN where the message has none.
+    """
+
+    time_ns: TimeArray
+    log_time_ns: TimeArray
+    frame_id: TextArray
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
+
+
+@dataclass(frozen=True)
+class WrenchSamples:
+    """Wrenches (n, 6) [N, N m], force first, as expressed in `frame_id` (n,)."""
+
+    time_ns: TimeArray
+    log_time_ns: TimeArray
+    frame_id: TextArray
+    wrench: FloatArray
+
+
+@dataclass(frozen=True)
+class PoseSamples:
+    """Positions (n, 3) [m], quaternions (n, 4) scalar last, covariances (n, 6, 6) or NaN."""
+
+    time_ns: TimeArray
+    log_time_ns: TimeArray
+    frame_id: TextArray
+    position: FloatArray
+    quaternion: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True)
+class MarkerSamples:
+    """Markers (n, k, 3) [m] in the order of the message; NaN = lost."""
+
+    time_ns: TimeArray
+    log_time_ns: TimeArray
+    frame_id: TextArray
+    position: FloatArray
+
+
+@dataclass(frozen=True)
+class ScalarSamples:
+    """Numbers (n,) of one sensor; a message without a header has its log time as stamp."""
+
+    time_ns: TimeArray
+    log_time_ns: TimeArray
+    value: FloatArray
+
+
+@dataclass(frozen=True)
+class Samples:
+    """All that the wrist's topics hold; a topic that is absent gives arrays of length 0.
+
+    `temperatures` are by component, `covariates` by the name below ``/covariates/``.
+    """
+
+    joints: JointSamples
+    commands: JointSamples
+    loads: WrenchSamples
+    poses: PoseSamples
+    frame_poses: PoseSamples
+    markers: MarkerSamples
+    temperatures: Mapping[str, ScalarSamples]
+    covariates: Mapping[str, ScalarSamples]
+    faults: tuple[Fault, ...]
+
+
+def read_samples(
+    recording: Recording,
+    *,
+    remaps: Mapping[str, str] | None = None,
+    joints: Sequence[str] = DEFAULT_JOINTS,
+) -> Samples:
+    """Read the wrist's topics of a recording into arrays.
+
+    Parameters
+    ----------
+    recording : Recording
+        From `open_recording`.
+    remaps : Mapping[str, str], optional
+        Name in the recording by standard name, for topics that are named otherwise there.
+    joints : Sequence[str]
+        Names of motor 1 and motor 2; other joints are ignored, and so are messages of a shared
+        joint state topic that name neither.
+
+    Returns
+    -------
+    Samples
+        In log-time order.
+
+    Raises
+    ------
+    RecordingError
+        If a mapped topic is absent, a topic has a type that it cannot have, or a joint state topic
+        never names both joints.
+    """
+    remaps = dict(remaps or {})
+    collectors = _collectors_of(recording, remaps, tuple(joints))
+    pending: dict[str, tuple[list[int], list[bytes]]] = {name: ([], []) for name in collectors}
+    for channel, log_time_ns, payload in recording.raw_messages(collectors.keys()):
+        log_times, payloads = pending[channel.topic]
+        log_times.append(log_time_ns)
+        payloads.append(payload)
+        if len(payloads) == _BLOCK:
+            collectors[channel.topic].add(log_times, payloads)
+            pending[channel.topic] = ([], [])
+    for name, (log_times, payloads) in pending.items():
+        collectors[name].add(log_times, payloads)
+
+    def of(standard: str) -> Rows:
+        collector = collectors.get(remaps.get(standard, standard))
+        return collector.rows() if collector else {}
+
+    def joint_samples(standard: str) -> JointSamples:
+        rows = of(standard)
+        collector = collectors.get(remaps.get(standard, standard))
+        if collector and collector.counts and not rows:
+            raise RecordingError(
+                f"{recording.path}: {collector.topic} never names {' and '.join(joints)} together"
+            )
+        return _made(JointSamples, rows, position=(2,), velocity=(2,), effort=(2,))
+
+    def group(standard: str) -> dict[str, Rows]:
+        rows = of(standard)
+        found = rows.get("frame_id", np.empty(0, np.str_))
+        return {
+            str(name): {key: column[found == name] for key, column in rows.items()}
+            for name in np.unique(found)
+        }
+
+    covariates = _covariates(recording, remaps)
+    return Samples(
+        joints=joint_samples(names.JOINT_STATES),
+        commands=joint_samples(names.MOTOR_COMMANDS),
+        loads=_made(WrenchSamples, of(names.LOAD_ESTIMATE), wrench=(6,)),
+        poses=_pose_samples(of(names.PLATFORM_POSE)),
+        frame_poses=_pose_samples(of(names.FRAME_POSE)),
+        markers=_made(MarkerSamples, of(names.PLATFORM_MARKERS), position=(0, 3)),
+        temperatures={
+            component: _made(ScalarSamples, rows, value=())
+            for component, rows in group(names.TEMPERATURES).items()
+        },
+        covariates={
+            name: _made(ScalarSamples, collectors[topic].rows(), value=())
+            for name, topic in covariates.items()
+        },
+        faults=tuple(fault for name in sorted(collectors) for fault in collectors[name].faults()),
+    )
+
+
+_Kind = TypeVar("_Kind")
+
+
+def _made(kind: Callable[..., _Kind], rows: Rows, **shapes: tuple[int, ...]) -> _Kind:
+    """Make samples of a kind; `shapes` are those of a row where there is none."""
+    columns: Rows = {
+        "time_ns": np.empty(0, np.int64),
+        "log_time_ns": np.empty(0, np.int64),
+        "frame_id": np.empty(0, np.str_),
+        **{name: np.empty((0, *shape)) for name, shape in shapes.items()},
+    }
+    columns.update(rows)
+    if kind is ScalarSamples:
+        del columns["frame_id"]
+    return kind(**columns)
+
+
+def _pose_samples(rows: Rows) -> PoseSamples:
+    return _made(PoseSamples, rows, position=(3,), quaternion=(4,), covariance=(6, 6))
+
+
+def _covariates(recording: Recording, remaps: Mapping[str, str]) -> dict[str, str]:
+    """Return the topic of each covariate by its name."""
+    found = {
+        info.name.removeprefix(names.COVARIATES): info.name
+        for info in recording.topics
+        if info.name.startswith(names.COVARIATES) and info.name not in remaps.values()
+    }
+    for standard, actual in remaps.items():
+        if standard.startswith(names.COVARIATES):
+            found[standard.removeprefix(names.COVARIATES)] = actual
+    return found
+
+
+def _collectors_of(
+    recording: Recording, remaps: Mapping[str, str], joints: tuple[str, ...]
+) -> dict[str, Collector]:
+    types = {info.name: info.ros_type for info in recording.topics}
+    absent = [actual for actual in remaps.values() if actual not in types]
+    if absent:
+        present = ", ".join(sorted(types)) or "none"
+        raise RecordingError(
+            f"{recording.path} has no topic {', '.join(absent)}; its topics are {present}"
+        )
+    wanted: dict[str, list[tuple[type[Message], Extract, tuple[str, ...]]]] = {
+        names.JOINT_STATES: [(JointState, joint_rows(joints), ("position",))],
+        names.MOTOR_COMMANDS: [(JointState, joint_rows(joints), ("position",))],
+        names.LOAD_ESTIMATE: [(WrenchStamped, wrench_rows, ("wrench",))],
+        names.PLATFORM_MARKERS: [(PoseArray, marker_rows(), ())],
+        names.TEMPERATURES: [(Temperature, temperature_rows, ("value",))],
+    }
+    for standard in (names.PLATFORM_POSE, names.FRAME_POSE):
+        wanted[standard] = [
+            (PoseStamped, pose_rows("pose"), ("position", "quaternion")),
+            (PoseWithCovarianceStamped, pose_rows("pose.pose"), ("position", "quaternion")),
+        ]
+    topics = {remaps.get(standard, standard): kinds for standard, kinds in wanted.items()}
+    for topic in _covariates(recording, remaps).values():
+        topics[topic] = [(Float64, float_rows, ("value",))]
+    return {
+        topic: _collector(recording, topic, types[topic], kinds)
+        for topic, kinds in topics.items()
+        if topic in types
+    }
+
+
+def _collector(
+    recording: Recording,
+    topic: str,
+    ros_type: str,
+    kinds: list[tuple[type[Message], Extract, tuple[str, ...]]],
+) -> Collector:
+    for message_type, extract, finite in kinds:
+        if message_type.ros_type == ros_type:
+            return Collector(topic, message_type, extract, finite)
+    expected = " or ".join(message_type.ros_type for message_type, _, _ in kinds)
+    raise RecordingError(f"{recording.path}: {topic} carries {ros_type}, not {expected}")

@@ -1,0 +1,267 @@
+"""Writing of recordings that ``ros2 bag``, Foxglove, PlotJuggler and rosbags open unchanged."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections import Counter
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+import yaml
+from mcap.writer import CompressionType, Writer
+
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording.cdr import encode
+from wrist_stiffness.recording.channel import Channel, channel_of
+from wrist_stiffness.recording.messages import Message
+from wrist_stiffness.recording.reader import METADATA_FILE
+
+METADATA_VERSION = 9
+_LAST_TIME_NS = 2**63 - 1
+_UNLIMITED = {"sec": 9223372036, "nsec": 854775807}
+# rclpy's default profile; "unlimited" is the largest duration that rmw knows.
+_QOS_PROFILE = {
+    "history": "keep_last",
+    "depth": 10,
+    "reliability": "reliable",
+    "durability": "volatile",
+    "deadline": _UNLIMITED,
+    "lifespan": _UNLIMITED,
+    "liveliness": "automatic",
+    "liveliness_lease_duration": _UNLIMITED,
+    "avoid_ros_namespace_conventions": False,
+}
+
+
+class RecordingWriter:
+    """Context manager that writes a rosbag2 folder, or one file where the path ends in ``.mcap``.
+
+    Messages go to a hidden neighbour of the path, which takes the final name when the ``with``
+    block ends without an exception; otherwise it is removed and nothing is left.  Memory is bounded
+    by one chunk.  The same messages give the same bytes: nothing in the file depends on clock,
+    path or host.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        Folder or file to make; its parent must exist.
+    overwrite : bool
+        Replace an existing recording.  Anything else under that name is never replaced.
+
+    Raises
+    ------
+    RecordingError
+        At the beginning of the ``with`` block, if the path exists or its parent does not.
+    """
+
+    def __init__(self, path: str | PathLike[str], *, overwrite: bool = False):
+        self.path = Path(path)
+        self._overwrite = overwrite
+        self._is_folder = self.path.suffix != ".mcap"
+        self._partial = self.path.with_name(f".{self.path.name}.{os.getpid()}.partial")
+        self._stream: BinaryIO | None = None
+        self._channels: dict[str, tuple[Channel, int]] = {}
+        self._counts: Counter[str] = Counter()
+        self._first_ns = _LAST_TIME_NS
+        self._last_ns = 0
+
+    def __enter__(self) -> RecordingWriter:
+        """Begin the recording under its temporary name."""
+        self._check_target()
+        try:
+            if self._is_folder:
+                self._partial.mkdir()
+            self._stream = self._storage_path.open("xb")
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+        self._mcap = Writer(self._stream, compression=CompressionType.ZSTD)
+        self._mcap.start(profile="ros2", library="wrist_stiffness")
+        return self
+
+    def write(self, topic: str, message: Message, log_time_ns: int) -> None:
+        """Append a message.
+
+        Parameters
+        ----------
+        topic : str
+            Absolute topic name.
+        message : Message
+            Class of `wrist_stiffness.recording.messages`; one class for each topic.
+        log_time_ns : int
+            Time of reception [ns]; need not increase.
+
+        Raises
+        ------
+        RecordingError
+            If the message cannot be encoded, the topic has another type, the time is out of range
+            or the disk refuses.
+        """
+        self.write_raw(channel_of(topic, type(message)), encode(message), log_time_ns)
+
+    def write_raw(self, channel: Channel, payload: bytes, log_time_ns: int) -> None:
+        """Append a payload as it is, of any type: copies from another recording, or from DDS.
+
+        Parameters
+        ----------
+        channel : Channel
+            Topic and type of the payload.
+        payload : bytes
+            In the channel's message encoding.
+        log_time_ns : int
+            Time of reception [ns]; need not increase.
+
+        Raises
+        ------
+        RecordingError
+            If the topic has another type, the time is out of range or the disk refuses.
+        """
+        if self._stream is None:
+            raise RecordingError(f"{self.path}: written to outside of its `with` block")
+        if not 0 <= log_time_ns <= _LAST_TIME_NS:
+            raise RecordingError(
+                f"{channel.topic}: log time {log_time_ns} ns is outside 0 … {_LAST_TIME_NS}"
+            )
+        try:
+            channel_id = self._register(channel)
+            self._mcap.add_message(channel_id, log_time_ns, payload, publish_time=log_time_ns)
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+        self._counts[channel.topic] += 1
+        self._first_ns = min(self._first_ns, log_time_ns)
+        self._last_ns = max(self._last_ns, log_time_ns)
+
+    def __exit__(
+        self,
+        exception_type: type[BaseException] | None,
+        exception: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Give the recording its name, or remove what was written of it."""
+        try:
+            if exception_type is None:
+                self._finish()
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+        finally:
+            if self._stream is not None:
+                self._stream.close()
+                self._stream = None
+            _remove(self._partial)
+
+    @property
+    def _storage_path(self) -> Path:
+        return self._partial / f"{self.path.name}_0.mcap" if self._is_folder else self._partial
+
+    def _check_target(self) -> None:
+        if not self.path.parent.is_dir():
+            raise RecordingError(f"{self.path}: folder {self.path.parent} does not exist")
+        if not self.path.exists():
+            return
+        if not self._overwrite:
+            raise RecordingError(f"{self.path} exists already and is not overwritten")
+        if self.path.is_dir() != self._is_folder or not _is_only_recording(self.path):
+            raise RecordingError(f"{self.path} is not only a recording and is never overwritten")
+
+    def _register(self, channel: Channel) -> int:
+        known = self._channels.get(channel.topic)
+        if known is None:
+            if not channel.topic.startswith("/"):
+                raise RecordingError(f"topic {channel.topic!r} does not begin with '/'")
+            schema_id = self._mcap.register_schema(
+                channel.ros_type, channel.schema_encoding, channel.schema_text
+            )
+            metadata = {
+                "offered_qos_profiles": yaml.dump([_QOS_PROFILE], Dumper=_PlainDumper).strip(),
+                "topic_type_hash": channel.type_hash,
+            }
+            channel_id = self._mcap.register_channel(
+                channel.topic, channel.message_encoding, schema_id, metadata
+            )
+            self._channels[channel.topic] = (channel, channel_id)
+            return channel_id
+        if known[0] is not channel and known[0].ros_type != channel.ros_type:
+            raise RecordingError(
+                f"{channel.topic} carries {known[0].ros_type}, not {channel.ros_type}"
+            )
+        return known[1]
+
+    def _finish(self) -> None:
+        assert self._stream is not None  # only called inside the `with` block
+        self._mcap.finish()
+        self._stream.flush()
+        os.fsync(self._stream.fileno())
+        self._stream.close()
+        if self._is_folder:
+            text = yaml.dump(self._metadata(), Dumper=_PlainDumper, sort_keys=False)
+            (self._partial / METADATA_FILE).write_text(text, encoding="utf-8")
+        if self._is_folder and self.path.exists():
+            # A folder cannot replace another in one step; the old one steps aside first.
+            replaced = self._partial.with_suffix(".replaced")
+            self.path.rename(replaced)
+            try:
+                self._partial.rename(self.path)
+            except OSError:
+                replaced.rename(self.path)
+                raise
+            _remove(replaced)
+        else:
+            os.replace(self._partial, self.path)
+
+    def _metadata(self) -> dict[str, Any]:
+        total = self._counts.total()
+        first_ns = self._first_ns if total else 0
+        times = {
+            "duration": {"nanoseconds": self._last_ns - first_ns},
+            "starting_time": {"nanoseconds_since_epoch": first_ns},
+            "message_count": total,
+        }
+        name = self._storage_path.name
+        return {
+            "rosbag2_bagfile_information": {
+                "version": METADATA_VERSION,
+                "storage_identifier": "mcap",
+                **times,
+                "topics_with_message_count": [
+                    {
+                        "topic_metadata": {
+                            "name": channel.topic,
+                            "type": channel.ros_type,
+                            "serialization_format": channel.message_encoding,
+                            "offered_qos_profiles": [_QOS_PROFILE],
+                            "type_description_hash": channel.type_hash,
+                        },
+                        "message_count": self._counts[channel.topic],
+                    }
+                    for channel, _ in self._channels.values()
+                ],
+                "compression_format": "",
+                "compression_mode": "",
+                "relative_file_paths": [name],
+                "files": [{"path": name, **times}],
+                "custom_data": None,
+                "ros_distro": "jazzy",
+            }
+        }
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """Writes repeated values in full: yaml-cpp's readers need no anchors then."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _is_only_recording(path: Path) -> bool:
+    if path.is_file():
+        return True
+    return all(entry.name == METADATA_FILE or entry.suffix == ".mcap" for entry in path.iterdir())
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
