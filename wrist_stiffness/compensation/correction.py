@@ -1,0 +1,105 @@
+"""Correct commanded motor angles for the predicted error, as far as two motors can."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import log_motion
+from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
+
+STEP_TOLERANCE = 1e-9
+"""A fixed-point step below this ends the search [rad]; 1e-5 of an encoder step."""
+
+MAX_ITERATIONS = 20
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Corrected motor angles and what remains.
+
+    Parameters
+    ----------
+    delta : (2,) float
+        To be added to the command [rad].
+    before, after : (6,) float
+        Residual twist, actual minus desired, at O in F without and with the correction [m, rad].
+    prediction : Prediction
+        At the corrected angles.
+    """
+
+    delta: Array
+    before: Array
+    after: Array
+    prediction: Prediction
+
+
+def correct(model: ErrorModel, command: Array, load: Load, objective: Objective) -> Correction:
+    """Find the angles at which the predicted pose meets the objective of the commanded one.
+
+    The error depends on the corrected angles, so this is a fixed point: task(T_pred(theta + delta)
+    FK(theta + delta)) = task(FK(theta)), stepped by the pseudo-inverse of the task's Jacobian.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Predicts the error.
+    command : (2,) float
+        Commanded motor angles [rad].
+    load : Load
+        A load in F stays fixed while the angles are iterated, one in U turns with them.
+    objective : Objective
+        What to make right.
+
+    Returns
+    -------
+    Correction
+        Angles to add, residual twists before and after.
+
+    Raises
+    ------
+    UnreachablePoseError, SingularPoseError, LoadRangeError
+        If the command or the corrected angles are outside the table's domain or load range.
+    InputError
+        If the fixed point is not reached.
+    """
+    prediction = model.predict(command, load)
+    desired = prediction.configuration
+    task = objective.matrix(desired)
+    step_of_task = np.linalg.pinv(task[:, 3:] @ model.table.mechanism.jacobian(desired))
+    before = residual_twist(prediction, desired.platform)
+    after, delta = before, np.zeros(2)
+    for _ in range(MAX_ITERATIONS):
+        step = -step_of_task @ (task @ after)
+        if np.max(np.abs(step)) < STEP_TOLERANCE:
+            return Correction(delta, before, after, prediction)
+        delta = delta + step
+        prediction = model.predict(command + delta, load, prediction.active)
+        after = residual_twist(prediction, desired.platform)
+    raise InputError(
+        f"correction: no fixed point after {MAX_ITERATIONS} steps, last step "
+        f"{np.degrees(np.max(np.abs(step))):.2e} deg"
+    )
+
+
+def residual_twist(prediction: Prediction, desired: Array) -> Array:
+    """Return log(T_err T_nominal T_desired^-1), actual minus desired.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        Predicted error at the angles that are driven.
+    desired : (3, 3) float
+        Desired rotation U -> F of the platform, its point at O resting at O.
+
+    Returns
+    -------
+    (6,) float
+        Twist at O in F [m, rad].
+    """
+    rotation, shift = prediction.motion
+    return log_motion(rotation @ prediction.configuration.platform @ desired.T, shift)

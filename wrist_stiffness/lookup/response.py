@@ -1,0 +1,79 @@
+"""Platform twist under a load: the linear part, and contact where flanges touch.
+
+    0 <= lambda  perpendicular to  gap + B' W + sum_k N_k delta_k + A lambda >= 0
+    xi = C W + weight twist + sum_k G_k delta_k + B lambda
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.contact import solve_contact
+from wrist_stiffness.mechanism.statics import ContactOperators
+
+
+@dataclass(frozen=True)
+class Response:
+    """Elastic answer of the wrist.
+
+    Parameters
+    ----------
+    twist : (..., 6) float
+        Platform twist at O in F, first order [m, rad].
+    force : (..., m) float
+        Contact force of each sector [N].
+    active : (..., m) bool
+        Sectors in contact.
+    """
+
+    twist: Array
+    force: Array
+    active: NDArray[np.bool_]
+
+
+def respond(
+    operators: ContactOperators,
+    wrench: Array,
+    twist: Array | None = None,
+    opening: Array | None = None,
+    active: NDArray[np.bool_] | None = None,
+) -> Response:
+    """Solve for the platform's twist under a load, with contact.
+
+    Parameters
+    ----------
+    operators : ContactOperators
+        Of shape (...).
+    wrench : (..., 6) float
+        Load on the platform at O in F [N, N m].
+    twist : (..., 6) float, optional
+        Twist that other screws at components add by G [m, rad].
+    opening : (..., m) float, optional
+        Opening of the gaps by the same screws [m].
+    active : (m,) bool, optional
+        First guess of the sectors in contact.
+
+    Returns
+    -------
+    Response
+        Twist, contact forces and active sectors of shape (...).
+    """
+    free = operators.weight_twist + np.einsum("...ij,...j->...i", operators.compliance, wrench)
+    if twist is not None:
+        free = free + twist
+    gap = operators.gap + np.einsum("...im,...i->...m", operators.force_twist, wrench)
+    if opening is not None:
+        gap = gap + opening
+    force = np.zeros_like(gap)
+    closed = np.zeros(gap.shape, dtype=bool)
+    guess = active
+    for pose in np.ndindex(gap.shape[:-1]):
+        force[pose], closed[pose] = solve_contact(operators.approach[pose], gap[pose], guess)
+        # Neighbouring poses share most of their contact state.
+        guess = closed[pose]
+    moved = free + np.einsum("...im,...m->...i", operators.force_twist, force)
+    return Response(moved, force, closed)

@@ -1,0 +1,170 @@
+"""The lookup table of one wrist: what the offline sweep leaves for the nodes.
+
+It holds the condensed parts (from which every operator is a closed form of the pose) and, at the
+nodes of a grid, the operators and the paper's s and phi for its biharmonic splines.  The header
+says which of the two `evaluation` uses; the other one is its judge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from wrist_stiffness.errors import LoadRangeError
+from wrist_stiffness.lookup.biharmonic import BiharmonicSpline, Kernel
+from wrist_stiffness.lookup.operators import SectorLayout, unpack
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
+from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism
+from wrist_stiffness.mechanism.statics import ContactOperators, component_shares, contact_operators
+from wrist_stiffness.mechanism.workspace import Workspace
+
+Evaluation = Literal["closed_form", "spline"]
+EVALUATIONS: tuple[Evaluation, ...] = ("closed_form", "spline")
+
+MAP_COLUMNS = ("s_x", "s_y", "s_z", "s", "phi")
+"""Columns of the map of the rated load: shift of O in F, its length [m], rotation angle [rad]."""
+
+
+@dataclass(frozen=True)
+class TableHeader:
+    """Where a table comes from and how good it is.
+
+    Parameters
+    ----------
+    geometry : dict
+        The values of the geometry file.
+    interface : str
+        Interface model of the condensation: `rigid` or `distributing`.
+    evaluation : str
+        `closed_form` or `spline`: what the nodes use.
+    kernel : str
+        Kernel of the splines.
+    per_axis : int
+        Grid points along each motor angle.
+    mesh : dict
+        Element sizes [mm] and counts.
+    versions : dict
+        Solver and package versions.
+    errors : dict
+        Stated errors of the splines [relative to the local value].
+    """
+
+    geometry: dict[str, Any]
+    interface: str
+    evaluation: Evaluation
+    kernel: Kernel
+    per_axis: int
+    mesh: dict[str, Any]
+    versions: dict[str, str]
+    errors: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Lookup of one wrist.
+
+    Parameters
+    ----------
+    header : TableHeader
+        Provenance and stated errors.
+    components : ElasticComponents
+        Condensed parts at home.
+    nodes : (n, 2) float
+        Motor angles of the grid [rad].
+    operators : (n, columns) float
+        Operators at the nodes, as `lookup.operators.pack` orders them.
+    map_values : (n, 5) float
+        `MAP_COLUMNS` at the nodes for the rated load alone, from the readout fit, Eqs. (1)-(10).
+    checksum : str
+        SHA-256 of header and arrays; empty before the table is written.
+    """
+
+    header: TableHeader
+    components: ElasticComponents
+    nodes: Array
+    operators: Array
+    map_values: Array
+    checksum: str = ""
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """The geometry for which the table was made."""
+        return geometry_from_values(self.header.geometry, "the table's geometry")
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """Its kinematic scheme."""
+        return mechanism_of(self.geometry)
+
+    @cached_property
+    def workspace(self) -> Workspace:
+        """Its operative workspace and map domain."""
+        return Workspace(self.mechanism, self.geometry.limits)
+
+    @cached_property
+    def layout(self) -> SectorLayout:
+        """Which joint each contact sector belongs to."""
+        return SectorLayout.of(self.components)
+
+    @cached_property
+    def operator_spline(self) -> BiharmonicSpline:
+        """Spline of the operators over the motor angles."""
+        return BiharmonicSpline.fit(self.nodes, self.operators, self.header.kernel)
+
+    @cached_property
+    def map_spline(self) -> BiharmonicSpline:
+        """Spline of the rated load's s and phi: the paper's maps."""
+        return BiharmonicSpline.fit(self.nodes, self.map_values, self.header.kernel)
+
+    def operators_at(
+        self, configuration: Configuration, evaluation: Evaluation | None = None
+    ) -> ContactOperators:
+        """Elastic operators at a configuration.
+
+        Parameters
+        ----------
+        configuration : Configuration
+            Of shape (...), inside the map domain.
+        evaluation : str, optional
+            `closed_form` or `spline`; what the header says if None.
+
+        Returns
+        -------
+        ContactOperators
+            Of shape (...), with own weight in the geometry's gravity.
+        """
+        if (evaluation or self.header.evaluation) == "spline":
+            return unpack(self.operator_spline(configuration.theta), self.layout, configuration)
+        return contact_operators(configuration, self.components, self.geometry.gravity)
+
+    def shares(self, configuration: Configuration) -> Array:
+        """Share of each component in the platform's compliance, (..., 8, 6, 6)."""
+        return component_shares(configuration, self.components)
+
+    def check_load(self, wrench: Array) -> None:
+        """Refuse a load outside the range for which the table was made.
+
+        Parameters
+        ----------
+        wrench : (..., 6) float
+            Load on the platform at O [N, N m].
+
+        Raises
+        ------
+        LoadRangeError
+            If a force or a moment is larger than the geometry's limits or not finite.
+        """
+        limits = self.geometry.limits
+        halves = np.linalg.norm(np.reshape(wrench, (*np.shape(wrench)[:-1], 2, 3)), axis=-1)
+        force, moment = (float(np.max(halves[..., i], initial=0.0)) for i in range(2))
+        if not force <= limits.force:
+            raise LoadRangeError(f"load: force {force:.3g} N at O, the table ends at {limits.force:g} N")
+        if not moment <= limits.moment:
+            raise LoadRangeError(
+                f"load: moment {moment:.3g} N m at O, the table ends at {limits.moment:g} N m"
+            )

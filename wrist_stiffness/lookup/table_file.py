@@ -1,0 +1,210 @@
+"""Write and read a table (`.npz`): arrays plus a JSON header, checked by a checksum.
+
+The file is read with `allow_pickle=False`, written to a temporary name first and holds no clock, so
+the same geometry gives the same table.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.errors import TableError, WristError
+from wrist_stiffness.lookup.operators import SectorLayout
+from wrist_stiffness.lookup.table import EVALUATIONS, MAP_COLUMNS, Table, TableHeader
+from wrist_stiffness.mechanism.components import (
+    ELASTIC,
+    PASSIVE_JOINTS,
+    Array,
+    ElasticComponents,
+    FlangeContact,
+)
+
+SCHEMA = 1
+MAGIC = "wrist_stiffness table"
+
+UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; moment) at O in F"
+
+
+def save_table(table: Table, path: str | Path) -> Table:
+    """Write a table.
+
+    Parameters
+    ----------
+    table : Table
+        What to write.
+    path : path
+        Ends in `.npz`; an older file is replaced only when the new one is complete.
+
+    Returns
+    -------
+    Table
+        The same with its checksum.
+
+    Raises
+    ------
+    TableError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    arrays = _to_arrays(table)
+    checksum = _checksum(_header_values(table.header), arrays)
+    header = {
+        "magic": MAGIC,
+        "schema": SCHEMA,
+        "units": UNITS,
+        "geometry_sha256": table.geometry.sha256,
+        "checksum": checksum,
+        **_header_values(table.header),
+        "spline": {
+            "kernel": table.map_spline.kernel,
+            "trend": table.map_spline.trend,
+            "offset_rad": table.map_spline.offset.tolist(),
+            "scale_rad": table.map_spline.scale.tolist(),
+        },
+    }
+    try:
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(descriptor, "wb") as stream:
+                np.savez_compressed(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        except BaseException:
+            os.unlink(name)
+            raise
+    except OSError as error:
+        raise TableError(f"{path}: cannot be written: {error.strerror}") from error
+    return replace(table, checksum=checksum)
+
+
+def load_table(path: str | Path) -> Table:
+    """Read a table and check it.
+
+    Parameters
+    ----------
+    path : path
+        A file that `save_table` wrote.
+
+    Returns
+    -------
+    Table
+        Complete and with a checksum that fits.
+
+    Raises
+    ------
+    TableError
+        If the file is missing, no table, of another version, damaged or contradictory.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {key: archive[key] for key in archive.files}
+    except FileNotFoundError as error:
+        raise TableError(f"{path}: no such file") from error
+    except OSError as error:
+        raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, zipfile.BadZipFile, EOFError, KeyError, AttributeError, zlib.error) as error:
+        raise TableError(f"{path}: damaged or not a table: {' '.join(str(error).split())}") from error
+    try:
+        header = json.loads(str(arrays.pop("header")))
+    except (KeyError, ValueError) as error:
+        raise TableError(f"{path}: not a table of this program (no header)") from error
+    if not isinstance(header, dict) or header.get("magic") != MAGIC:
+        raise TableError(f"{path}: not a table of this program")
+    if header.get("schema") != SCHEMA:
+        raise TableError(
+            f"{path}: table of version {header.get('schema')!r}, this program reads version {SCHEMA}; "
+            "build it again with 'wrist-stiffness table build'"
+        )
+    try:
+        values = {field.name: header[field.name] for field in fields(TableHeader)}
+        checksum = _checksum(values, arrays)
+        if checksum != header["checksum"]:
+            raise TableError(
+                f"{path}: damaged: checksum {checksum[:12]} is not {header['checksum'][:12]} of its header"
+            )
+        table = _from_arrays(TableHeader(**values), arrays, checksum)
+        if table.geometry.sha256 != header["geometry_sha256"]:
+            raise TableError(f"{path}: geometry checksum does not fit the geometry in the header")
+    except KeyError as error:
+        raise TableError(f"{path}: damaged: {error} is missing") from error
+    except TableError:
+        raise
+    except (WristError, ValueError, TypeError) as error:
+        raise TableError(f"{path}: {error}") from error
+    _check(table, path)
+    return table
+
+
+def _check(table: Table, path: str | Path) -> None:
+    n, layout = len(table.nodes), SectorLayout.of(table.components)
+    for name, array, shape in (
+        ("nodes", table.nodes, (n, 2)),
+        ("operators", table.operators, (n, layout.columns)),
+        ("map_values", table.map_values, (n, len(MAP_COLUMNS))),
+        ("flexibility", table.components.flexibility, (len(ELASTIC), 6, 6)),
+    ):
+        if array.shape != shape:
+            raise TableError(f"{path}: {name} has shape {array.shape}, not {shape}")
+        if not np.all(np.isfinite(array)):
+            raise TableError(f"{path}: {name} holds values that are not finite")
+    if table.header.evaluation not in EVALUATIONS:
+        raise TableError(f"{path}: evaluation {table.header.evaluation!r} is not one of {EVALUATIONS}")
+
+
+def _header_values(header: TableHeader) -> dict[str, Any]:
+    return asdict(header)
+
+
+def _to_arrays(table: Table) -> dict[str, Array]:
+    parts = table.components
+    arrays = {
+        "nodes": table.nodes,
+        "operators": table.operators,
+        "map_values": table.map_values,
+        "flexibility": parts.flexibility,
+        "weight_motor_side": parts.weight_motor_side,
+        "weight_platform_side": parts.weight_platform_side,
+        "platform_weight": parts.platform_weight,
+    }
+    for joint, contact in parts.contact.items():
+        for field in fields(FlangeContact):
+            arrays[f"{joint}_{field.name}"] = getattr(contact, field.name)
+    return arrays
+
+
+def _from_arrays(header: TableHeader, arrays: Mapping[str, Array], checksum: str) -> Table:
+    contact = {
+        joint: FlangeContact(**{f.name: arrays[f"{joint}_{f.name}"] for f in fields(FlangeContact)})
+        for joint in PASSIVE_JOINTS
+        if f"{joint}_gap" in arrays
+    }
+    components = ElasticComponents(
+        flexibility=arrays["flexibility"],
+        weight_motor_side=arrays["weight_motor_side"],
+        weight_platform_side=arrays["weight_platform_side"],
+        platform_weight=arrays["platform_weight"],
+        contact=contact,
+    )
+    return Table(
+        header, components, arrays["nodes"], arrays["operators"], arrays["map_values"], checksum
+    )
+
+
+def _checksum(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+    digest = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
