@@ -39,3 +39,7 @@ class TableError(WristError):
 
 class RecordingError(WristError):
     """A recording cannot be read or written as asked."""
+
+
+class StaleLoadError(InputError):
+    """No load estimate belongs to a joint state: none yet, or the newest is too old."""

@@ -1,7 +1,7 @@
 """Platform twist under a load: the linear part, and contact where flanges touch.
 
-    0 <= lambda  perpendicular to  gap + B' W + sum_k N_k delta_k + A lambda >= 0
-    xi = C W + weight twist + sum_k G_k delta_k + B lambda
+0 <= lambda  perpendicular to  gap + B' W + sum_k N_k delta_k + A lambda >= 0
+xi = C W + weight twist + sum_k G_k delta_k + B lambda
 """
 
 from __future__ import annotations

@@ -163,7 +163,9 @@ class Table:
         halves = np.linalg.norm(np.reshape(wrench, (*np.shape(wrench)[:-1], 2, 3)), axis=-1)
         force, moment = (float(np.max(halves[..., i], initial=0.0)) for i in range(2))
         if not force <= limits.force:
-            raise LoadRangeError(f"load: force {force:.3g} N at O, the table ends at {limits.force:g} N")
+            raise LoadRangeError(
+                f"load: force {force:.3g} N at O, the table ends at {limits.force:g} N"
+            )
         if not moment <= limits.moment:
             raise LoadRangeError(
                 f"load: moment {moment:.3g} N m at O, the table ends at {limits.moment:g} N m"

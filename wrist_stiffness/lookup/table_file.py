@@ -113,8 +113,17 @@ def load_table(path: str | Path) -> Table:
         raise TableError(f"{path}: no such file") from error
     except OSError as error:
         raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, zipfile.BadZipFile, EOFError, KeyError, AttributeError, zlib.error) as error:
-        raise TableError(f"{path}: damaged or not a table: {' '.join(str(error).split())}") from error
+    except (
+        ValueError,
+        zipfile.BadZipFile,
+        EOFError,
+        KeyError,
+        AttributeError,
+        zlib.error,
+    ) as error:
+        raise TableError(
+            f"{path}: damaged or not a table: {' '.join(str(error).split())}"
+        ) from error
     try:
         header = json.loads(str(arrays.pop("header")))
     except (KeyError, ValueError) as error:
@@ -159,7 +168,9 @@ def _check(table: Table, path: str | Path) -> None:
         if not np.all(np.isfinite(array)):
             raise TableError(f"{path}: {name} holds values that are not finite")
     if table.header.evaluation not in EVALUATIONS:
-        raise TableError(f"{path}: evaluation {table.header.evaluation!r} is not one of {EVALUATIONS}")
+        raise TableError(
+            f"{path}: evaluation {table.header.evaluation!r} is not one of {EVALUATIONS}"
+        )
 
 
 def _header_values(header: TableHeader) -> dict[str, Any]:

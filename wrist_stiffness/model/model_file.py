@@ -65,7 +65,9 @@ def load_model(path: str | Path) -> ErrorModel:
         )
     evaluation = values.get("evaluation", table.header.evaluation)
     if evaluation not in EVALUATIONS:
-        raise InputError(f"{path}: evaluation {evaluation!r} is not one of {', '.join(EVALUATIONS)}")
+        raise InputError(
+            f"{path}: evaluation {evaluation!r} is not one of {', '.join(EVALUATIONS)}"
+        )
     return ErrorModel(name, table, evaluation, path)
 
 

@@ -1,0 +1,240 @@
+"""Convert in: motor angles by name, wrenches from any sensor frame to O, loads matched by stamp."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from wrist_stiffness.errors import FrameError, InputError, StaleLoadError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import cross
+from wrist_stiffness.model.error_model import Load
+
+BASE_FRAME = "wrist_base"
+PLATFORM_FRAME = "wrist_platform"
+CORRECTED_FRAME = "wrist_corrected"
+
+NANOSECONDS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class MotorNames:
+    """The two motor joints among the names of a joint state.
+
+    Parameters
+    ----------
+    motor_1, motor_2 : str
+        Joint names.
+    """
+
+    motor_1: str = "motor_1_joint"
+    motor_2: str = "motor_2_joint"
+
+    def places(self, names: Sequence[str]) -> tuple[int, int]:
+        """Return where the motors stand in a list of joint names.
+
+        Raises
+        ------
+        InputError
+            If a motor is missing or named twice.
+        """
+        found = []
+        for motor in (self.motor_1, self.motor_2):
+            count = list(names).count(motor)
+            if count != 1:
+                what = "is missing" if count == 0 else f"is named {count} times"
+                raise InputError(
+                    f"joint state: {motor} {what} among {', '.join(names) or 'no names'}"
+                )
+            found.append(list(names).index(motor))
+        return found[0], found[1]
+
+    def angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
+        """Return the motor angles of a joint state.
+
+        Parameters
+        ----------
+        names : sequence of str
+            In any order, other joints ignored.
+        positions : sequence of float
+            One a name [rad].
+
+        Returns
+        -------
+        (2,) float
+            Motor angles [rad].
+
+        Raises
+        ------
+        InputError
+            If a motor is missing, named twice, without a position or not finite.
+        """
+        places = self.places(names)
+        if len(positions) != len(names):
+            raise InputError(f"joint state: {len(positions)} positions for {len(names)} names")
+        theta = np.array([positions[place] for place in places], dtype=float)
+        if not np.all(np.isfinite(theta)):
+            raise InputError(f"joint state: motor angles ({theta[0]}, {theta[1]}) are not finite")
+        return theta
+
+
+@dataclass(frozen=True)
+class SensorFrame:
+    """A fixed transform from a sensor's frame to `wrist_base` or `wrist_platform`.
+
+    Parameters
+    ----------
+    parent : str
+        `wrist_base` or `wrist_platform`.
+    rotation : (3, 3) float
+        Turns sensor components into the parent's.
+    position : (3,) float
+        The sensor's origin in the parent [m].
+    acts_on : str
+        `platform`, or `environment` where the sensor reports the reaction.
+    """
+
+    parent: str
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    acts_on: Literal["platform", "environment"] = "platform"
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The frames in which a wrench may arrive.
+
+    Parameters
+    ----------
+    sensors : mapping of str to SensorFrame
+        By frame_id, beside `wrist_base` and `wrist_platform`.
+    """
+
+    sensors: Mapping[str, SensorFrame] = field(default_factory=dict)
+
+    def load(self, frame_id: str, force: Sequence[float], moment: Sequence[float]) -> Load:
+        """Move a wrench to O.
+
+        Parameters
+        ----------
+        frame_id : str
+            Frame of the message; its origin is the point of the moment.
+        force, moment : sequence of 3 float
+            [N], [N m].
+
+        Returns
+        -------
+        Load
+            At O, in F or U.
+
+        Raises
+        ------
+        FrameError
+            If the frame is neither known nor mapped.
+        InputError
+            If a component is not finite.
+        """
+        known = {BASE_FRAME: SensorFrame(BASE_FRAME), PLATFORM_FRAME: SensorFrame(PLATFORM_FRAME)}
+        frame = self.sensors.get(frame_id) or known.get(frame_id)
+        if frame is None:
+            names = ", ".join([*known, *self.sensors])
+            raise FrameError(f"load: frame '{frame_id}' is not known (known: {names})")
+        wrench = np.array([*force, *moment], dtype=float)
+        if not np.all(np.isfinite(wrench)):
+            raise InputError(f"load: wrench {wrench.tolist()} is not finite")
+        sign = 1.0 if frame.acts_on == "platform" else -1.0
+        turned_force = sign * (frame.rotation @ wrench[:3])
+        turned_moment = sign * (frame.rotation @ wrench[3:]) + cross(frame.position, turned_force)
+        return Load(np.concatenate([turned_force, turned_moment]), frame.parent == PLATFORM_FRAME)
+
+
+class LoadHistory:
+    """Loads by stamp: to a joint state belongs the newest load that is not younger.
+
+    Stamps alone decide, never arrival, so live nodes and replay agree wherever the load had
+    arrived.  Loads are held up to an age limit and never extrapolated.
+
+    Parameters
+    ----------
+    age_limit_s : float
+        Oldest load that is still used [s].
+    """
+
+    CAPACITY = 4096
+
+    def __init__(self, age_limit_s: float) -> None:
+        self._age_limit_ns = round(age_limit_s * NANOSECONDS)
+        self._stamps: list[int] = []
+        self._loads: list[Load] = []
+
+    def add(self, stamp_ns: int, load: Load) -> None:
+        """Keep a load; one with the same stamp is replaced, one out of order finds its place."""
+        place = bisect.bisect_left(self._stamps, stamp_ns)
+        if place < len(self._stamps) and self._stamps[place] == stamp_ns:
+            self._loads[place] = load
+            return
+        self._stamps.insert(place, stamp_ns)
+        self._loads.insert(place, load)
+        if len(self._stamps) > self.CAPACITY:
+            del self._stamps[0], self._loads[0]
+
+    def at(self, stamp_ns: int) -> tuple[int, Load]:
+        """Return stamp and load that belong to a joint state.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the joint state [ns].
+
+        Returns
+        -------
+        int, Load
+            Stamp [ns] and load.
+
+        Raises
+        ------
+        StaleLoadError
+            If there is none, or it is older than the age limit.
+        """
+        place = bisect.bisect_right(self._stamps, stamp_ns) - 1
+        if place < 0:
+            raise StaleLoadError("no load estimate with a stamp before the joint state")
+        age = stamp_ns - self._stamps[place]
+        if age > self._age_limit_ns:
+            raise StaleLoadError(
+                f"newest load estimate is {age / NANOSECONDS:.3f} s older than the joint state "
+                f"(limit {self._age_limit_ns / NANOSECONDS:g} s)"
+            )
+        return self._stamps[place], self._loads[place]
+
+    def mean_since(self, window_s: float) -> Load:
+        """Return the mean of the newest loads over a window, for the tare.
+
+        Parameters
+        ----------
+        window_s : float
+            Up to the newest stamp [s].
+
+        Returns
+        -------
+        Load
+            In the frame in which they came.
+
+        Raises
+        ------
+        StaleLoadError
+            If there is no load.
+        InputError
+            If loads in F and in U are mixed.
+        """
+        if not self._stamps:
+            raise StaleLoadError("tare: no load estimate has arrived")
+        start = bisect.bisect_left(self._stamps, self._stamps[-1] - round(window_s * NANOSECONDS))
+        loads = self._loads[start:]
+        if len({load.on_platform for load in loads}) > 1:
+            raise InputError("tare: loads in wrist_base and in wrist_platform are mixed")
+        return Load(np.mean([load.wrench for load in loads], axis=0), loads[0].on_platform)
