@@ -31,8 +31,6 @@ PRIMITIVES = {
     "float64": struct.Struct("d"),
 }
 _NANOSECONDS = 1_000_000_000
-# A sender may fill up the last word; more than that is another message type.
-_MAX_TRAILING = 3
 
 ByteOrder = Literal["<", ">"]
 
@@ -52,7 +50,8 @@ def encode(message: Message) -> bytes:
     Returns
     -------
     bytes
-        The payload, equal byte for byte to ``rclpy.serialization.serialize_message``.
+        The payload that ``rclpy.serialization.serialize_message`` gives, with zeros for padding:
+        Fast CDR leaves those bytes undefined.
 
     Raises
     ------
@@ -76,7 +75,8 @@ def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
     message_type : type[AnyMessage]
         Class of the message.
     payload : bytes
-        Encapsulation and body.
+        Encapsulation and body; bytes behind the last field are ignored, because
+        ``rclpy.serialization.serialize_message`` leaves some there behind empty sequences.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
     Raises
     ------
     RecordingError
-        If the payload is cut, too long, of another encapsulation or holds invalid text.
+        If the payload is cut, of another encapsulation or holds invalid text.
     """
     byte_order = byte_order_of(message_type, payload)
     body = payload[ENCAPSULATION_SIZE:]
@@ -99,10 +99,6 @@ def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
         raise RecordingError(
             f"{message_type.ros_type}: payload of {len(payload)} bytes cannot be decoded: {error}"
         ) from error
-    if not 0 <= len(body) - offset <= _MAX_TRAILING:
-        raise RecordingError(
-            f"{message_type.ros_type}: payload has {len(body)} bytes where its fields take {offset}"
-        )
     return message_type(*values)
 
 
