@@ -21,7 +21,7 @@ help:
 	@echo "make lint    ruff and mypy"
 	@echo "make tables  compute the shipped tables again from their geometry"
 	@echo "make clean   remove what make made, the virtual environment included"
-	@echo "Each sets itself up in $(VENV) with PYTHON=$(PYTHON) (3.11 or 3.12)."
+	@echo "Each sets itself up in VENV=$(VENV) with PYTHON=$(PYTHON) (3.11 or 3.12)."
 
 demo: $(READY)
 	$(RUN) wrist_stiffness.workflows.demo -o demo

@@ -38,7 +38,15 @@ setup(
     ],
     zip_safe=False,
     python_requires=">=3.11",
-    install_requires=["numpy>=1.26", "scipy>=1.11", "PyYAML>=6.0", "mcap>=1.1"],
+    # numpy, scipy and PyYAML no newer than in Ubuntu 24.04, the system of ROS 2 Jazzy.
+    install_requires=[
+        "numpy>=1.26",
+        "scipy>=1.11",
+        "PyYAML>=6.0",
+        "mcap>=1.1",
+        "lz4>=4.0",
+        "zstandard>=0.21",
+    ],
     extras_require={
         # On a robot rclpy and the messages come from the ROS installation, not from here.
         "ros": [
@@ -46,7 +54,7 @@ setup(
             "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
             "ros-jazzy-common-interfaces==5.3.6",
         ],
-        "fem": ["netgen-mesher>=6.2.2404", "scikit-fem>=10"],
+        "fem": ["netgen-mesher>=6.2.2404", "scikit-fem>=10", "pymetis>=2025.1"],
         "plot": ["matplotlib>=3.8"],
         "workbench": ["nicegui>=2", "plotly>=5"],
         "verify": ["acrod>=1.2", "rosbags>=0.10"],
@@ -57,7 +65,7 @@ setup(
             "mypy>=1.13",
             "types-PyYAML",
             "colcon-common-extensions>=0.3",
-            "setuptools<80",
+            "setuptools>=70.1,<80",
         ],
     },
     entry_points={

@@ -29,7 +29,8 @@ ROOMS_USED = {
 }
 ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
-    "fem": ROBOT | {"netgen", "skfem"},
+    "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both
+    "fem": ROBOT | {"netgen", "skfem", "pymetis"},
     "web": ROBOT | {"nicegui", "plotly"},
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
 }

@@ -42,6 +42,10 @@ def run(*arguments, cwd, **environment):
     return ran.stdout
 
 
+def modules(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*.py")}
+
+
 @pytest.fixture(scope="module")
 def source(tmp_path_factory):
     """Return a copy of what is installed, with one more file in config/."""
@@ -135,6 +139,7 @@ def test_pip_installs_commands_and_shipped_files(source, tmp_path):
         *(entry.executable for entry in CELL_NODES),
     }
     (site,) = tmp_path.glob("lib/python*/site-packages")
+    assert modules(site / "wrist_stiffness") == modules(source / "wrist_stiffness")
     module_file, found = run(sys.executable, "-P", "-c", ASK, cwd="/", PYTHONPATH=str(site)).split()
     assert Path(module_file).is_relative_to(site)
     assert Path(found) == tmp_path / "share/wrist_stiffness" / PROBE

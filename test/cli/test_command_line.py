@@ -1,5 +1,6 @@
 import argparse
 import io
+import os
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -93,14 +94,15 @@ def test_closed_pipe_is_quiet():
         "main\n"
         "def run(arguments):\n"
         "    sys.stdin.read()\n"
-        "    print('x' * 1_000_000)\n"
+        "    print('answer')\n"
         "    return 0\n"
         "add = lambda commands: commands.add_parser('try').set_defaults(run=run)\n"
         "sys.exit(main(['try'], [S(add_parser=add)]))\n"
     )
     pipe = subprocess.PIPE
+    buffered = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
     with subprocess.Popen(
-        [sys.executable, "-c", program], stdin=pipe, stdout=pipe, stderr=pipe
+        [sys.executable, "-c", program], stdin=pipe, stdout=pipe, stderr=pipe, env=buffered
     ) as child:
         child.stdout.close()
         child.stdin.close()
