@@ -1,0 +1,336 @@
+"""Build, check and show a lookup table."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from wrist_stiffness.errors import GeometryError, InputError
+from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
+from wrist_stiffness.lookup.table_file import load_table, save_table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry_file import load_geometry
+
+Progress = Callable[[int, int], None]
+
+REBUILT_TOLERANCE = 1e-6
+"""Relative difference of a rebuilt table that counts as the same: other BLAS, same mesh."""
+
+MICRO = 1e6
+CENTIDEGREES = 100.0 * 180.0 / np.pi
+
+
+def build(
+    geometry: str | Path,
+    output: str | Path,
+    evaluation: Evaluation = "closed_form",
+    interface: str = "rigid",
+    tolerance: float = 0.005,
+    per_axis: int | None = None,
+    progress: Progress = lambda done, of: None,
+) -> Table:
+    """Run the offline sweep and write its table.
+
+    Parameters
+    ----------
+    geometry : path
+        Geometry file.
+    output : path
+        Table file to write, `.npz`.
+    evaluation : str
+        What the nodes shall use, `closed_form` or `spline`.
+    interface : str
+        `rigid` or `distributing` walls.
+    tolerance : float
+        Largest relative interpolation error in the operative workspace.
+    per_axis : int or None
+        Fixed grid, 5 for the paper's 25 poses; None refines to the tolerance.
+    progress : callable
+        Called with steps done and in all.
+
+    Returns
+    -------
+    Table
+        As written.
+
+    Raises
+    ------
+    WristError
+        If the geometry is wrong, the tolerance is not met or the file cannot be written.
+    """
+    from wrist_stiffness.fem.sweep import BuildSettings, build_table
+
+    output = Path(output)
+    if output.suffix != ".npz":
+        raise InputError(f"{output}: a table's name ends in .npz")
+    if not output.parent.is_dir():
+        raise InputError(f"{output.parent}: no such folder")
+    load_geometry(geometry)
+    try:
+        values = yaml.safe_load(Path(geometry).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise GeometryError(f"{geometry}: cannot be read: {error.strerror}") from error
+    settings = BuildSettings(
+        evaluation=evaluation,
+        interface=interface,  # type: ignore[arg-type]
+        tolerance=tolerance,
+        per_axis=per_axis,
+    )
+    return save_table(build_table(values, settings, progress), output)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a check looked at.
+
+    Parameters
+    ----------
+    name, text : str
+        What was checked and what was found, with the limit.
+    passed : bool
+        Whether it holds.
+    """
+
+    name: str
+    text: str
+    passed: bool
+
+
+def check(
+    path: str | Path,
+    geometry: str | Path | None = None,
+    rebuild: bool = False,
+    progress: Progress = lambda done, of: None,
+) -> list[Finding]:
+    """Verify a table.
+
+    Parameters
+    ----------
+    path : path
+        Table file.
+    geometry : path, optional
+        Geometry file that the table must be of.
+    rebuild : bool
+        Also condense the parts and sweep again, and compare all numbers.
+    progress : callable
+        Called with steps done and in all.
+
+    Returns
+    -------
+    list of Finding
+        All checks; the table is good if all passed.
+
+    Raises
+    ------
+    TableError, GeometryError
+        If a file cannot be read at all.
+    """
+    from wrist_stiffness.fem.sweep import BuildSettings, build_table, interpolation_errors
+    from wrist_stiffness.fem.solids import MeshSettings
+
+    table = load_table(path)
+    findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]
+    if geometry is not None:
+        wanted = load_geometry(geometry).sha256
+        same = wanted == table.geometry.sha256
+        findings.append(
+            Finding(
+                "geometry",
+                f"made for {table.geometry.sha256[:12]}, {geometry} is {wanted[:12]}",
+                same,
+            )
+        )
+    findings.append(_definiteness(table))
+    errors = interpolation_errors(table)
+    for region in ("operative", "domain"):
+        for name in ("s", "phi"):
+            stated = table.header.errors["predicted"][region][name]
+            found = errors["predicted"][region][name]
+            findings.append(
+                Finding(
+                    f"spline {name} {region}",
+                    f"errs by {100 * found:.3f} % at {errors['unseen_poses']} unseen poses, "
+                    f"stated {100 * stated:.3f} %",
+                    found <= stated * (1.0 + REBUILT_TOLERANCE) + 1e-9,
+                )
+            )
+    if rebuild:
+        header = table.header
+        sizes = MeshSettings(**{key: 1e-3 * v for key, v in header.mesh["sizes_mm"].items()})
+        settings = BuildSettings(
+            sizes=sizes,
+            interface=header.interface,  # type: ignore[arg-type]
+            evaluation=header.evaluation,
+            kernel=header.kernel,
+            per_axis=header.per_axis,
+        )
+        again = build_table(header.geometry, settings, progress)
+        for name in ("operators", "map_values"):
+            old, new = getattr(table, name), getattr(again, name)
+            same_shape = old.shape == new.shape
+            difference = _difference(old, new) if same_shape else float("inf")
+            findings.append(
+                Finding(
+                    f"rebuilt {name}",
+                    f"differs by {difference:.1e} of its size (limit {REBUILT_TOLERANCE:.0e})",
+                    difference <= REBUILT_TOLERANCE,
+                )
+            )
+    return findings
+
+
+def _difference(old: Array, new: Array) -> float:
+    return float(np.max(np.abs(old - new) / np.max(np.abs(old), axis=0, initial=1e-300)))
+
+
+def _definiteness(table: Table) -> Finding:
+    from wrist_stiffness.fem.sweep import unseen_poses
+
+    configuration = table.mechanism.forward(unseen_poses(table.workspace))
+    lowest = min(
+        float(np.min(np.linalg.eigvalsh(_scaled(table.operators_at(configuration, way).compliance))))
+        for way in ("closed_form", "spline")
+    )
+    return Finding("compliance", f"smallest scaled eigenvalue {lowest:.1e}, must be > 0", lowest > 0)
+
+
+def _scaled(matrix: Array) -> Array:
+    """Scale a compliance to a unit diagonal, so that metres and radians weigh the same."""
+    size = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    scaled: Array = matrix / size[..., :, None] / size[..., None, :]
+    return scaled
+
+
+@dataclass(frozen=True)
+class MapSummary:
+    """Statistics of the rated load's map.
+
+    Parameters
+    ----------
+    operative : dict
+        Mean, min and max by quantity over the operative workspace, with the unit in the name.
+    domain_max : dict
+        Maxima over the whole map.
+    """
+
+    operative: dict[str, dict[str, float]]
+    domain_max: dict[str, float]
+
+
+def summarise(table: Table, poses: Array | None = None) -> MapSummary:
+    """Return the statistics of Tables 1 and 2 for a table.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+    poses : (n, 2) float, optional
+        Motor angles [rad]; a fine grid over the map if None.
+
+    Returns
+    -------
+    MapSummary
+        In micrometres and hundredths of a degree.
+    """
+    workspace = table.workspace
+    poses = workspace.grid(101) if poses is None else poses
+    values = table.map_spline(poses) * np.array([MICRO] * 4 + [CENTIDEGREES])
+    inside = values[workspace.operative(poses)]
+    names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_1e-2deg"]
+    operative = {
+        name: {
+            "mean": float(column.mean()),
+            "min": float(column.min()),
+            "max": float(column.max()),
+        }
+        for name, column in zip(names, inside.T, strict=True)
+    }
+    domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
+    return MapSummary(operative, domain)
+
+
+def show(path: str | Path, folder: str | Path) -> tuple[Table, list[Path]]:
+    """Draw the maps of a table: displacement and orientation error over the joint space.
+
+    Parameters
+    ----------
+    path : path
+        Table file.
+    folder : path
+        Where the PNG files go.
+
+    Returns
+    -------
+    Table
+        The lookup.
+    list of Path
+        `map_s.png` and `map_phi.png` (the paper's Figs. 5 and 6) in the folder.
+
+    Raises
+    ------
+    TableError
+        If the table cannot be read.
+    InputError
+        If the folder cannot be made.
+    """
+    from wrist_stiffness.workflows.plotting import draw_map
+
+    table = load_table(path)
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
+    pictures = []
+    for name, column, scale, label in (
+        ("map_s.png", 3, MICRO, "displacement error s of the platform's centre [µm]"),
+        ("map_phi.png", 4, CENTIDEGREES, "orientation error φ of the platform [10⁻² deg]"),
+    ):
+        draw_map(table, column, scale, label, folder / name)
+        pictures.append(folder / name)
+    return table, pictures
+
+
+def facts(table: Table) -> Iterable[tuple[str, str]]:
+    """Return what a person wants to know of a table, as (name, text)."""
+    header, limits = table.header, table.geometry.limits
+    lower, upper = (np.degrees(edge) for edge in table.workspace.rectangle)
+    errors = header.errors
+    yield "geometry", f"{table.geometry.name} ({table.geometry.status})"
+    yield "angles", f"motor 1 {lower[0]:.1f} to {upper[0]:.1f}, motor 2 {lower[1]:.1f} to {upper[1]:.1f} deg"
+    yield "loads", f"up to {limits.force:g} N and {limits.moment:g} N m at O"
+    yield "parts", f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces"
+    yield "contact", f"{len(table.layout.sign)} flange sectors"
+    yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
+    yield "evaluation", header.evaluation
+    yield "mesh error", f"{100 * errors['mesh_relative']:.2f} % of C (estimated from a coarser mesh)"
+    for region in ("operative", "domain"):
+        worst = errors["predicted"][region]
+        yield (
+            f"spline error, {region}",
+            f"s {100 * worst['s']:.3f} %, phi {100 * worst['phi']:.3f} % at unseen poses",
+        )
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Write a result as JSON, complete or not at all."""
+    import json
+
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def without_errors(table: Table) -> Table:
+    """Return a table without stated errors, to compare content alone."""
+    return replace(table, header=replace(table.header, errors={}))
