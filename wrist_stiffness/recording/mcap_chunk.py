@@ -17,6 +17,8 @@ from wrist_stiffness.errors import RecordingError
 
 RECORD_HEAD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
+# Recorders write about 1 MiB; a size beyond this one is damage, not a reason to take memory.
+_LARGEST_CHUNK = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,10 @@ def chunk_bytes(chunk: Chunk) -> bytes:
         If the bytes cannot be read, decompressed, or do not match size or checksum.
     """
     place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
+    if chunk.uncompressed_size > _LARGEST_CHUNK:
+        raise RecordingError(
+            f"{place} states {chunk.uncompressed_size} bytes, more than {_LARGEST_CHUNK}"
+        )
     try:
         with chunk.path.open("rb") as stream:
             stream.seek(chunk.offset)
