@@ -1,4 +1,4 @@
-"""The influence law against a full elastic model that knows nothing of G: bodies, springs, free pairs."""
+"""The influence law against a full elastic model of springs and free pairs, ignorant of G."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from wrist_stiffness.mechanism.statics import (
     turned_flexibilities,
     weight_response,
 )
-from wrist_stiffness.mechanism.vectors import block_diagonal, translate_wrench
+from wrist_stiffness.mechanism.vectors import block_diagonal
 
 # Frame on the motor side and on the platform side of each elastic component.
 FRAMES = {
@@ -237,7 +237,7 @@ def test_shares_add_up_and_are_positive(case):
 
 
 def test_contact_operators_equal_full_model_with_forced_contact(case):
-    """Contact forces put on the full model as pairs on walls and hubs open the gaps by A and move by B."""
+    """Contact forces put on walls and hubs of the full model open the gaps by A and move by B."""
     rng, mechanism, theta, components = case
     gravity = rng.normal(size=3) * 5.0
     configuration = mechanism.forward(theta)

@@ -6,6 +6,7 @@ The finite-element room makes `ElasticComponents` once; the mechanism only turns
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ CARRIER = {
     "joint_4": "link_2",
     "joint_5": "frame",
 }
-"""The body with which a component turns: bushings sit on the pin, those of the motors in the frame."""
+"""The body that a component turns with: a bushing sits on its pin, a motor's in the frame."""
 
 ENDS = {
     "link_1": ("joint_1", "joint_2"),
@@ -74,6 +75,34 @@ class FlangeContact:
 
 
 @dataclass(frozen=True)
+class ContactSectors:
+    """The sectors of all flanges in one row of m, joint after joint as in `PASSIVE_JOINTS`.
+
+    Parameters
+    ----------
+    component : (m,) int
+        Number in `ELASTIC` of the bushing that a sector belongs to.
+    slide : (m, 3) float
+        Opening of each gap for a unit slide of joint_2, joint_3 and joint_4.
+    screw : (m, 6) float
+        Screw of the bushing for a unit contact force of each sector [m/N, rad/N].
+    approach : (m, m) float
+        Opening of the gaps by unit forces without the slides, zero between joints [m/N].
+    weight_approach : (m, 3) float
+        Opening by a unit acceleration field on the bushing itself [m/(m/s^2)].
+    gap : (m,) float
+        Gap of the unloaded bushings with the slides at zero [m].
+    """
+
+    component: NDArray[np.intp]
+    slide: Array
+    screw: Array
+    approach: Array
+    weight_approach: Array
+    gap: Array
+
+
+@dataclass(frozen=True)
 class ElasticComponents:
     """All elastic parts, condensed onto rigid interface frames, at O in F with the wrist at home.
 
@@ -96,3 +125,21 @@ class ElasticComponents:
     weight_platform_side: Array
     platform_weight: Array
     contact: dict[str, FlangeContact]
+
+    @cached_property
+    def sectors(self) -> ContactSectors:
+        """All flange sectors stacked."""
+        joints = [joint for joint in PASSIVE_JOINTS if joint in self.contact]
+        sizes = [len(self.contact[joint].gap) for joint in joints]
+        m = sum(sizes)
+        slide, screw, weight = np.zeros((m, 3)), np.zeros((m, 6)), np.zeros((m, 3))
+        component, approach, gap = np.zeros(m, dtype=np.intp), np.zeros((m, m)), np.zeros(m)
+        start = 0
+        for joint, size in zip(joints, sizes, strict=True):
+            part, rows = self.contact[joint], slice(start, start + size)
+            component[rows] = ELASTIC.index(joint)
+            slide[rows, PASSIVE_JOINTS.index(joint)] = part.sign
+            screw[rows], weight[rows], gap[rows] = part.screw.T, part.weight_approach, part.gap
+            approach[rows, rows] = part.approach
+            start += size
+        return ContactSectors(component, slide, screw, approach, weight, gap)

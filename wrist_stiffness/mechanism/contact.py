@@ -3,7 +3,7 @@
     0 <= force  perpendicular to  opening = gap + A force >= 0,      A symmetric positive definite
 
 has one solution.  Block principal pivoting (Judice and Pires 1994) finds it in a few small solves
-from any guess of the active set; its fallback, one change at a time by the least index, always ends.
+from any guess of the active set; its fallback, one change at a time, always ends.
 """
 
 from __future__ import annotations

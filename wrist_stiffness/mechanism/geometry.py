@@ -36,7 +36,7 @@ class Material:
 
 @dataclass(frozen=True)
 class LinkDimensions:
-    """Circular arc bar about O between two joint axes, with one radial bore for the pin at each end.
+    """Circular arc bar about O between two joint axes, with a radial bore for the pin at each end.
 
     Parameters
     ----------

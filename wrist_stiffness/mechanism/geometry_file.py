@@ -9,14 +9,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import yaml
 
-from wrist_stiffness.errors import GeometryError, WristError
+from wrist_stiffness.errors import GeometryError
 from wrist_stiffness.mechanism.components import JOINTS, LINKS, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.geometry import (
     BushingDimensions,
@@ -27,102 +25,14 @@ from wrist_stiffness.mechanism.geometry import (
     PlatformDimensions,
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.vectors import unit
+from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
 
 SCHEMA = 1
 SOURCES = ("paper", "assumed", "calibrated", "measured")
-UNIT_TOLERANCE = 1e-6
-"""Home axes are typed with finite digits: they are made unit if their length is this close to 1."""
+READOUT_SPREAD = 0.1
+"""Least ratio of the readout points' spreads: Eqs. (1)-(10) amplify errors on flat sets."""
 
 T = TypeVar("T")
-
-
-@dataclass
-class _Block:
-    """One mapping of the file that knows where it stands, so that every error can say it."""
-
-    values: Mapping[str, Any]
-    place: str
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.values, Mapping):
-            raise GeometryError(f"{self.place}: expected a mapping, found {self.values!r}")
-        self.used: set[str] = set()
-
-    def _take(self, key: str) -> Any:
-        if key not in self.values:
-            raise GeometryError(f"{self.place}: {key} is missing")
-        self.used.add(key)
-        return self.values[key]
-
-    def block(self, key: str) -> _Block:
-        return _Block(self._take(key), f"{self.place}.{key}")
-
-    def text(self, key: str, allowed: tuple[str, ...] | None = None) -> str:
-        value = self._take(key)
-        if not isinstance(value, str) or (allowed and value not in allowed):
-            wanted = f"one of {', '.join(allowed)}" if allowed else "a text"
-            raise GeometryError(f"{self.place}.{key}: {value!r} is not {wanted}")
-        return value
-
-    def number(
-        self,
-        key: str,
-        scale: float = 1.0,
-        above: float = -np.inf,
-        below: float = np.inf,
-        optional: bool = False,
-    ) -> float:
-        value = self._take(key)
-        if value is None and optional:
-            return float("nan")
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-            raise GeometryError(f"{self.place}.{key}: {value!r} is not a finite number")
-        if not above < value < below:
-            raise GeometryError(f"{self.place}.{key}: {value} is not between {above} and {below}")
-        return float(value) * scale
-
-    def vector(self, key: str, scale: float = 1.0, size: int = 3) -> Array:
-        value = self._take(key)
-        try:
-            vector = np.array(value, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise GeometryError(
-                f"{self.place}.{key}: {value!r} is not a list of {size} numbers"
-            ) from error
-        if vector.shape != (size,) or not np.all(np.isfinite(vector)):
-            raise GeometryError(
-                f"{self.place}.{key}: {value!r} is not a list of {size} finite numbers"
-            )
-        return vector * scale
-
-    def direction(self, key: str) -> Array:
-        vector = self.vector(key)
-        length = float(np.linalg.norm(vector))
-        if abs(length - 1.0) > UNIT_TOLERANCE:
-            raise GeometryError(
-                f"{self.place}.{key}: {vector.tolist()} has length {length:.9g}, not 1 (within {UNIT_TOLERANCE:.0e})"
-            )
-        return unit(vector)
-
-    def done(self) -> None:
-        """Check the source of the block and that no key was left unread."""
-        if "source" in self.values:
-            source = self._take("source")
-            words = source.values() if isinstance(source, Mapping) else [source]
-            for word in words:
-                if word not in SOURCES:
-                    raise GeometryError(
-                        f"{self.place}.source: {word!r} is not one of {', '.join(SOURCES)}"
-                    )
-            if isinstance(source, Mapping) and (extra := set(source) - set(self.values) - {"rest"}):
-                raise GeometryError(
-                    f"{self.place}.source names unknown keys: {', '.join(sorted(extra))}"
-                )
-        elif any(not isinstance(value, Mapping) for value in self.values.values()):
-            raise GeometryError(f"{self.place}: source is missing (one of {', '.join(SOURCES)})")
-        if unknown := set(self.values) - self.used:
-            raise GeometryError(f"{self.place}: unknown key {', '.join(sorted(map(str, unknown)))}")
 
 
 def load_geometry(path: str | Path) -> Geometry:
@@ -144,13 +54,7 @@ def load_geometry(path: str | Path) -> Geometry:
         If the file cannot be read, a key is missing, unknown or outside its limits, or the home
         pose is singular.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise GeometryError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise GeometryError(f"{path}: not a YAML file: {' '.join(str(error).split())}") from error
-    return geometry_from_values(content, str(path))
+    return geometry_from_values(read_yaml(path, GeometryError), str(path))
 
 
 def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> Geometry:
@@ -173,7 +77,7 @@ def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> 
     GeometryError
         If a key is missing, unknown or outside its limits, or the home pose is singular.
     """
-    root = _Block(values, place)
+    root = Block(values, place, GeometryError, SOURCES)
     schema = root.number("schema")
     if schema != SCHEMA:
         raise GeometryError(
@@ -195,8 +99,9 @@ def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> 
     temperature = site.number("reference_temperature_degC", above=-273.15)
     site.done()
     name, status = root.text("name"), root.text("status", SOURCES)
-    if "note" in values:
+    if "note" in root.values:
         root.text("note")
+    root.no_more_keys()
     geometry = Geometry(
         name=name,
         status=status,
@@ -210,11 +115,9 @@ def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> 
         load_point=load_point,
         sha256=_checksum(values),
     )
-    if unknown := set(values) - root.used:
-        raise GeometryError(f"{place}: unknown key {', '.join(sorted(map(str, unknown)))}")
     try:
         mechanism_of(geometry)
-    except WristError as error:
+    except GeometryError as error:
         raise GeometryError(f"{place}.axes: {error}") from error
     return geometry
 
@@ -239,13 +142,13 @@ def _checksum(values: Mapping[str, Any]) -> str:
     ).hexdigest()
 
 
-def _each(block: _Block, build: Callable[[_Block], T]) -> dict[str, T]:
+def _each(block: Block, build: Callable[[Block], T]) -> dict[str, T]:
     built = {key: build(block.block(key)) for key in block.values}
     block.done()
     return built
 
 
-def _material(block: _Block) -> Material:
+def _material(block: Block) -> Material:
     material = Material(
         young=block.number("young_GPa", 1e9, above=0.0),
         poisson=block.number("poisson", above=-1.0, below=0.5),
@@ -256,11 +159,11 @@ def _material(block: _Block) -> Material:
     return material
 
 
-def _of_material(block: _Block, materials: dict[str, Material]) -> Material:
+def _of_material(block: Block, materials: dict[str, Material]) -> Material:
     return materials[block.text("material", tuple(materials))]
 
 
-def _link(block: _Block, materials: dict[str, Material]) -> LinkDimensions:
+def _link(block: Block, materials: dict[str, Material]) -> LinkDimensions:
     link = LinkDimensions(
         arc_radius=block.number("arc_radius_mm", 1e-3, above=0.0),
         section_radial=block.number("section_radial_mm", 1e-3, above=0.0),
@@ -279,20 +182,19 @@ def _link(block: _Block, materials: dict[str, Material]) -> LinkDimensions:
                 f"(section_axial_mm and twice overhang_mm leave {limit * 1e3:g})"
             )
     if link.section_radial >= 2.0 * link.arc_radius:
-        raise GeometryError(f"{block.place}.section_radial_mm: the bar reaches past O")
+        raise GeometryError(
+            f"{block.place}.section_radial_mm: {link.section_radial * 1e3:g} reaches past O "
+            f"(twice arc_radius_mm is {2e3 * link.arc_radius:g})"
+        )
     return link
 
 
-def _bushing(block: _Block, joint: str, materials: dict[str, Material]) -> BushingDimensions:
+def _bushing(block: Block, joint: str, materials: dict[str, Material]) -> BushingDimensions:
     gaps: list[float | None] = [None, None]
     if joint in PASSIVE_JOINTS:
         for i, key in enumerate(("inner_gap_um", "outer_gap_um")):
-            gap = block.number(key, 1e-6, optional=True)
-            if gap < 0.0:
-                raise GeometryError(
-                    f"{block.place}.{key}: {gap * 1e6:g} is negative (0 = touching, null = no flange)"
-                )
-            gaps[i] = None if np.isnan(gap) else gap
+            # 0 = touching, null = no flange.
+            gaps[i] = block.optional_number(key, 1e-6, at_least=0.0)
     bushing = BushingDimensions(
         radius=block.number("radius_mm", 1e-3),
         pin_diameter=block.number("pin_diameter_mm", 1e-3, above=0.0),
@@ -308,43 +210,24 @@ def _bushing(block: _Block, joint: str, materials: dict[str, Material]) -> Bushi
     sleeve = bushing.pin_diameter + 2.0 * bushing.wall
     if bushing.flange_diameter <= sleeve:
         raise GeometryError(
-            f"{block.place}.flange_diameter_mm: {bushing.flange_diameter * 1e3:g} is not larger than "
-            f"the sleeve, {sleeve * 1e3:g}"
+            f"{block.place}.flange_diameter_mm: {bushing.flange_diameter * 1e3:g} is not larger "
+            f"than the sleeve, {sleeve * 1e3:g}"
         )
     if abs(bushing.radius) <= bushing.length / 2.0:
         raise GeometryError(
-            f"{block.place}.radius_mm: {bushing.radius * 1e3:g}: the bushing reaches past O"
+            f"{block.place}.radius_mm: {bushing.radius * 1e3:g} puts the bushing over O "
+            f"(half of length_mm is {5e2 * bushing.length:g})"
         )
     return bushing
 
 
-def _platform(block: _Block, materials: dict[str, Material]) -> tuple[PlatformDimensions, Array]:
+def _platform(block: Block, materials: dict[str, Material]) -> tuple[PlatformDimensions, Array]:
     normal = block.direction("normal")
     centre = block.vector("centre_mm", 1e-3)
     diameter = block.number("diameter_mm", 1e-3, above=0.0)
     thickness = block.number("thickness_mm", 1e-3, above=0.0)
     material = _of_material(block, materials)
-    points_raw = block._take("readout_points_mm")
-    try:
-        points = np.array(points_raw, dtype=float) * 1e-3
-    except (TypeError, ValueError) as error:
-        raise GeometryError(
-            f"{block.place}.readout_points_mm: not a list of points of 3 numbers"
-        ) from error
-    if (
-        points.ndim != 2
-        or points.shape[1] != 3
-        or len(points) < 4
-        or not np.all(np.isfinite(points))
-    ):
-        raise GeometryError(
-            f"{block.place}.readout_points_mm: shape {points.shape}, needs at least 4 points of 3 finite numbers"
-        )
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if spread[2] < 0.1 * spread[0]:
-        raise GeometryError(
-            f"{block.place}.readout_points_mm: nearly coplanar, ratio {spread[2] / spread[0]:.3f} below 0.1"
-        )
+    points = _readout_points(block)
     load_at = block.text("load_at", ("O", "P0"))
     # The plate is rigid; its mass follows from its size, hubs and screws are not modelled.
     mass = material.density * np.pi / 4.0 * diameter**2 * thickness
@@ -362,13 +245,26 @@ def _platform(block: _Block, materials: dict[str, Material]) -> tuple[PlatformDi
     return platform, centre if load_at == "P0" else np.zeros(3)
 
 
-def _limits(block: _Block) -> Limits:
+def _readout_points(block: Block) -> Array:
+    key = "readout_points_mm"
+    points = block.rows(key, 1e-3, at_least=4)
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if not spread[2] >= READOUT_SPREAD * spread[0]:
+        ratio = spread[2] / spread[0] if spread[0] > 0.0 else 0.0
+        raise GeometryError(
+            f"{block.place}.{key}: nearly coplanar, smallest over largest spread is {ratio:.3f}, "
+            f"below {READOUT_SPREAD}"
+        )
+    return points
+
+
+def _limits(block: Block) -> Limits:
     degree = np.pi / 180.0
     limits = Limits(
         joint_lower=block.vector("joint_lower_deg", degree, size=2),
         joint_upper=block.vector("joint_upper_deg", degree, size=2),
         operative_tilt=block.number("operative_tilt_deg", degree, above=0.0, below=180.0),
-        map_margin=block.number("map_margin", above=0.999, below=10.0),
+        map_margin=block.number("map_margin", at_least=1.0, below=10.0),
         singularity=block.number("singularity", above=0.0, below=1.0),
         force=block.number("force_N", above=0.0),
         moment=block.number("moment_Nm", above=0.0),
@@ -376,5 +272,8 @@ def _limits(block: _Block) -> Limits:
     )
     block.done()
     if np.any(limits.joint_lower >= limits.joint_upper):
-        raise GeometryError(f"{block.place}.joint_lower_deg: not below joint_upper_deg")
+        low, high = (np.degrees(x).tolist() for x in (limits.joint_lower, limits.joint_upper))
+        raise GeometryError(
+            f"{block.place}.joint_lower_deg: {low} is not below joint_upper_deg, {high}"
+        )
     return limits

@@ -4,7 +4,7 @@ With e = (c x d)/|c x d| and Q = b e'/(e.b), used alike for translation and rota
 
     limb 1:  G = I - Q        limb 2:  G = Q        platform = sum_k G_k delta_k
 
-because the cylindrical joints take up any screw along their own axes.  The transposes carry wrenches.
+because the cylindrical joints take up any screw along their own axes.  Transposes carry wrenches.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.kinematics import Configuration
-from wrist_stiffness.mechanism.vectors import cross, dot, unit
 
 LIMB_1 = ("joint_1", "link_1", "joint_2")
 LIMB_2_BASE = ("joint_5", "link_2", "joint_4")
@@ -23,6 +22,42 @@ LIMB_2 = (*LIMB_2_BASE, "link_3", "joint_3")
 """Elastic components from the motor to the platform."""
 
 IN_LIMB_1 = np.array([name in LIMB_1 for name in ELASTIC])
+
+IDENTITY = np.eye(3)
+
+# G = I - Q in limb 1 and G = Q in limb 2, as one formula.
+_G_IDENTITY = np.where(IN_LIMB_1, 1.0, 0.0)[:, None, None] * IDENTITY
+_G_SIGN = np.where(IN_LIMB_1, -1.0, 1.0)[:, None, None]
+_SLIDE_SIGN = np.where(IN_LIMB_1, 1.0, -1.0)[:, None, None]
+# Slide of joint_2, joint_3, joint_4 over the dual vectors of b, c, d.
+_DUAL_SIGN = np.array([-1.0, 1.0, 1.0])[:, None]
+
+
+def _frame_laws() -> tuple[Array, Array]:
+    """Return how frames move with a screw at a component: X I + Y P.
+
+    Returns
+    -------
+    motor_side, platform_side : (2, 8, 8) float
+        Entries X[m, k] and Y[m, k] for the frame of component m and a screw at component k.
+    """
+    motor_side, platform_side = np.zeros((2, 2, len(ELASTIC), len(ELASTIC)))
+    number = {name: i for i, name in enumerate(ELASTIC)}
+    for chain in (LIMB_1, LIMB_2_BASE):
+        for place, moved in enumerate(chain):
+            motor_side[0, number[moved], [number[name] for name in chain[:place]]] = 1.0
+            platform_side[0, number[moved], [number[name] for name in chain[: place + 1]]] = 1.0
+    for moved, done in (("link_3", ()), ("joint_3", ("link_3",))):
+        for law, passed in ((motor_side, done), (platform_side, (*done, moved))):
+            for source in ELASTIC:
+                law[1, number[moved], number[source]] = 1.0 if source in LIMB_1 else -1.0
+                if source in LIMB_2_BASE or source in passed:
+                    law[0, number[moved], number[source]] = 1.0
+    return motor_side, platform_side
+
+
+MOTOR_SIDE_LAW, PLATFORM_SIDE_LAW = _frame_laws()
+"""Motion of the components' interface frames, (2, 8, 8) each, as `Influence.of_frames` puts it."""
 
 
 @dataclass(frozen=True)
@@ -47,14 +82,11 @@ class Influence:
 
     def of_components(self) -> Array:
         """G of all elastic components in the order of `ELASTIC`, (..., 8, 3, 3)."""
-        return np.where(
-            IN_LIMB_1[:, None, None], self.limb_1[..., None, :, :], self.limb_2[..., None, :, :]
-        )
+        return _G_IDENTITY + _G_SIGN * self.limb_2[..., None, :, :]
 
     def slides(self) -> Array:
-        """Slides of joint_2, joint_3, joint_4 for a translation of each component, (..., 8, 3, 3)."""
-        sign = np.where(IN_LIMB_1, 1.0, -1.0)
-        return sign[:, None, None] * self.slides_limb_1[..., None, :, :]
+        """Slides of joint_2 to joint_4 (rows) by a translation of a component, (..., 8, 3, 3)."""
+        return _SLIDE_SIGN * self.slides_limb_1[..., None, :, :]
 
     def of_frames(self) -> tuple[Array, Array]:
         """Motion of both interface frames of each component for a screw at each component.
@@ -64,27 +96,34 @@ class Influence:
         motor_side, platform_side : (..., 8, 8, 3, 3) float
             Entry [m, k] maps a screw at component k to the screw of component m's frame.
         """
-        shape = (*self.link_3.shape[:-2], len(ELASTIC), len(ELASTIC), 3, 3)
-        motor_side, platform_side = np.zeros(shape), np.zeros(shape)
-        number = {name: i for i, name in enumerate(ELASTIC)}
-        for chain in (LIMB_1, LIMB_2_BASE):
-            for place, moved in enumerate(chain):
-                for source in chain[: place + 1]:
-                    platform_side[..., number[moved], number[source], :, :] = np.eye(3)
-                    if source != moved:
-                        motor_side[..., number[moved], number[source], :, :] = np.eye(3)
-        before, after = -self.link_3, np.eye(3) - self.link_3
-        for moved, done in (("link_3", ()), ("joint_3", ("link_3",))):
-            for frames, passed in ((motor_side, done), (platform_side, (*done, moved))):
-                for source in ELASTIC:
-                    if source in LIMB_1:
-                        law = self.link_3
-                    elif source in LIMB_2_BASE or source in passed:
-                        law = after
-                    else:
-                        law = before
-                    frames[..., number[moved], number[source], :, :] = law
+        link_3 = self.link_3[..., None, None, :, :]
+        motor_side, platform_side = (
+            law[0, :, :, None, None] * IDENTITY + law[1, :, :, None, None] * link_3
+            for law in (MOTOR_SIDE_LAW, PLATFORM_SIDE_LAW)
+        )
         return motor_side, platform_side
+
+    def through_components(self, motor_side: Array, platform_side: Array) -> Array:
+        """Wrench that wrenches on the interface frames send through each component.
+
+        The transpose of `of_frames`.
+
+        Parameters
+        ----------
+        motor_side, platform_side : (..., 8, 6) float
+            Wrench at O on the two frames of each component.
+
+        Returns
+        -------
+        (..., 8, 6) float
+            Wrench at O through each component.
+        """
+        direct, by_link_3 = (
+            MOTOR_SIDE_LAW[part].T @ motor_side + PLATFORM_SIDE_LAW[part].T @ platform_side
+            for part in (0, 1)
+        )
+        halves = by_link_3.reshape(*by_link_3.shape[:-1], 2, 3) @ self.link_3[..., None, :, :]
+        return direct + halves.reshape(direct.shape)
 
 
 def influence(configuration: Configuration) -> Influence:
@@ -100,13 +139,8 @@ def influence(configuration: Configuration) -> Influence:
     Influence
         Projectors of shape (..., 3, 3).
     """
-    b, c, d = configuration.b, configuration.c, configuration.d
-    e = unit(cross(c, d))
-    q = (b[..., :, None] * e[..., None, :]) / dot(e, b)[..., None, None]
-    slides = np.empty((*b.shape[:-1], len(PASSIVE_JOINTS), 3))
-    for row, (normal, axis, sign) in enumerate(
-        ((e, b, -1.0), (cross(d, b), c, 1.0), (cross(b, c), d, 1.0))
-    ):
-        slides[..., row, :] = sign * normal / dot(normal, axis)[..., None]
-    link_3 = d[..., :, None] * slides[..., 2, None, :]
-    return Influence(np.eye(3) - q, q, slides, link_3)
+    dual = configuration.dual
+    # e/(e.b) and f/(f.d) are the dual vectors of b and d.
+    q = configuration.b[..., :, None] * dual[..., 0, None, :]
+    link_3 = configuration.d[..., :, None] * dual[..., 2, None, :]
+    return Influence(IDENTITY - q, q, _DUAL_SIGN * dual, link_3)

@@ -10,22 +10,39 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from wrist_stiffness.errors import GeometryError, SingularPoseError, UnreachablePoseError
+from wrist_stiffness.errors import (
+    GeometryError,
+    InputError,
+    SingularPoseError,
+    UnreachablePoseError,
+)
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.cones import (
+    GRAM_ROUNDING,
+    angle_about,
+    cone_intersection,
+    gram_determinant,
+    third_axis,
+)
 from wrist_stiffness.mechanism.vectors import (
     angle_between,
     cross,
     dot,
-    rotation_about,
     skew,
     triad,
     unit,
 )
 
+IDENTITY = np.eye(3)
+
 HOME_TOLERANCE = 1e-6
 """Least |sin| of an angle between neighbouring axes, and least |D|, that a home pose may have."""
+
+
+BODIES = ("frame", "link_1", "link_2", "platform", "link_3")
+"""Rigid bodies, in the order of `Configuration.bodies`."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +55,31 @@ class Configuration:
         Motor angles [rad].
     b, c, d : (..., 3) float
         Unit axes of joint_2, joint_3 and joint_4.
-    rotations : dict of str to (..., 3, 3) float
-        Rotation of `link_1`, `link_2`, `link_3` and `platform` from home.
+    singularity : (...) float
+        D = b . (d x c), zero where the platform gains a freedom (type 2).
+    dual : (..., 3, 3) float
+        Rows d x c, b x d and c x b over D, the basis dual to (b, c, d): they hold the influence.
+    bodies : (..., 5, 3, 3) float
+        Rotation of each of `BODIES` from home.
     """
 
     theta: Array
     b: Array
     c: Array
     d: Array
-    rotations: dict[str, Array]
+    singularity: Array
+    dual: Array
+    bodies: Array
+
+    @property
+    def rotations(self) -> dict[str, Array]:
+        """Rotation of each body from home by its name, (..., 3, 3)."""
+        return {name: self.bodies[..., i, :, :] for i, name in enumerate(BODIES)}
 
     @property
     def platform(self) -> Array:
         """Rotation U -> F of the rigid platform, (..., 3, 3)."""
-        return self.rotations["platform"]
-
-    @cached_property
-    def singularity(self) -> Array:
-        """D = b . (d x c), zero where the platform gains a freedom (type 2), (...)."""
-        return dot(self.b, cross(self.d, self.c))
+        return self.bodies[..., 3, :, :]
 
 
 @dataclass(frozen=True)
@@ -84,6 +107,7 @@ class Mechanism:
     n0: Array
 
     def __post_init__(self) -> None:
+        """Check the home pose."""
         pairs = {
             "joint_1 and joint_2": (self.a1, self.b0),
             "joint_2 and joint_3": (self.b0, self.c0),
@@ -96,13 +120,14 @@ class Mechanism:
         for names, (u, v) in pairs.items():
             if np.linalg.norm(np.cross(u, v)) < HOME_TOLERANCE:
                 raise GeometryError(
-                    f"home axes of {names} are parallel: {u.tolist()}, {v.tolist()}"
+                    f"home axes of {names} are parallel: {u.tolist()} and {v.tolist()} "
+                    f"(|sin| below {HOME_TOLERANCE:.0e})"
                 )
         determinant = float(self.b0 @ np.cross(self.d0, self.c0))
         if abs(determinant) < HOME_TOLERANCE:
             raise GeometryError(
-                f"home pose is singular: |D| = {abs(determinant):.2e}, axes of joint_2, joint_3 and "
-                f"joint_4 are coplanar (limit {HOME_TOLERANCE:.0e})"
+                f"home pose is singular: |D| = {abs(determinant):.2e} below {HOME_TOLERANCE:.0e}, "
+                "the home axes of joint_2, joint_3 and joint_4 are coplanar"
             )
 
     @cached_property
@@ -122,8 +147,37 @@ class Mechanism:
         """Return sigma = sign(c . (b x d)) at home: the branch of the closure, +1 or -1."""
         return float(np.sign(self.c0 @ np.cross(self.b0, self.d0)))
 
+    @cached_property
+    def _turn_parts(self) -> tuple[Array, Array, Array]:
+        """Constant, cosine and sine part of both motors' turns of x, y, z, b0 or d0, (2, 3, 4)."""
+        axes, driven = np.stack([self.a1, self.a2]), np.stack([self.b0, self.d0])
+        columns = np.concatenate([np.broadcast_to(IDENTITY, (2, 3, 3)), driven[:, :, None]], axis=2)
+        along = axes[:, :, None] * axes[:, None, :]
+        return along @ columns, (IDENTITY - along) @ columns, skew(axes) @ columns
+
+    @cached_property
+    def _home_inverse(self) -> Array:
+        """Inverse of the rows (b0, c0, b0 x c0) and (d0, c0, d0 x c0), (2, 3, 3)."""
+        driven = np.stack([self.b0, self.d0])
+        rows = [driven, np.broadcast_to(self.c0, (2, 3)), cross(driven, self.c0)]
+        return np.linalg.inv(np.stack(rows, axis=1))
+
+    @cached_property
+    def _cosines(self) -> tuple[float, float]:
+        """Cosines of alpha_2 and alpha_3."""
+        return float(self.b0 @ self.c0), float(self.c0 @ self.d0)
+
+    def _turned(self, theta: Array) -> Array:
+        """Turn x, y, z, b0 with motor 1 and x, y, z, d0 with motor 2: columns, (..., 2, 3, 4)."""
+        if not np.isfinite(theta).all():
+            bad = first_where(theta, ~np.isfinite(theta).all(axis=-1))
+            raise InputError(f"motor angles {angles_text(bad)}: not finite")
+        constant, cosine, sine = self._turn_parts
+        angle = theta[..., None, None]
+        return constant + np.cos(angle) * cosine + np.sin(angle) * sine
+
     def closure_radicand(self, theta: Array) -> Array:
-        """Square of c's component along b x d over |b x d|; negative where the loop cannot close.
+        """Gram determinant of b, c and d, which is D^2; negative where the loop cannot close.
 
         Parameters
         ----------
@@ -134,28 +188,23 @@ class Mechanism:
         -------
         (...) float
             Dimensionless, 1 at best.
-        """
-        return self._close(np.asarray(theta, dtype=float))[-1]
 
-    def _close(self, theta: Array) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-        turn_1 = rotation_about(self.a1, theta[..., 0])
-        turn_2 = rotation_about(self.a2, theta[..., 1])
-        b = turn_1 @ self.b0
-        d = turn_2 @ self.d0
-        cos_2, cos_3 = self.b0 @ self.c0, self.c0 @ self.d0
-        k = dot(b, d)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            p = (cos_2 - k * cos_3) / (1.0 - k * k)
-            q = (cos_3 - k * cos_2) / (1.0 - k * k)
-            radicand = (1.0 - p * cos_2 - q * cos_3) / (1.0 - k * k)
-        return turn_1, turn_2, b, d, p, q, radicand
+        Raises
+        ------
+        InputError
+            If an angle is not finite.
+        """
+        driven = self._turned(np.asarray(theta, dtype=float))[..., 3]
+        return gram_determinant(dot(driven[..., 0, :], driven[..., 1, :]), *self._cosines)
 
     def reachable(self, theta: Array) -> NDArray[np.bool_]:
-        """Tell where the loop closes, (...) for `theta` (..., 2) [rad]."""
-        return self.closure_radicand(theta) > 0.0
+        """Tell where the loop closes, (...) for finite `theta` (..., 2) [rad]."""
+        return self.closure_radicand(theta) > GRAM_ROUNDING
 
     def forward(self, theta: Array) -> Configuration:
         """Forward kinematics.
+
+        A stack of poses goes through the same formulas as one pose; the last digit may differ.
 
         Parameters
         ----------
@@ -169,31 +218,49 @@ class Mechanism:
 
         Raises
         ------
+        InputError
+            If an angle is not finite.
         UnreachablePoseError
             If the loop does not close at one of the poses (the first one is named).
         """
         theta = np.asarray(theta, dtype=float)
-        turn_1, turn_2, b, d, p, q, radicand = self._close(theta)
-        if not np.all(radicand > 0.0):
-            bad = np.argwhere(~(np.atleast_1d(radicand) > 0.0))[0]
-            angles = np.degrees(
-                np.reshape(theta, (-1, 2))[np.ravel_multi_index(bad, np.atleast_1d(radicand).shape)]
-            )
-            raise UnreachablePoseError(
-                f"motor angles ({angles[0]:.3f}, {angles[1]:.3f}) deg: the loop does not close "
-                f"(angle between joint_2 and joint_4 outside its limits)"
-            )
-        c = p[..., None] * b + q[..., None] * d
-        c += (self.assembly_mode * np.sqrt(radicand))[..., None] * cross(b, d)
-        # The closure is exact only to rounding; unit length keeps the triads orthonormal.
+        turned = self._turned(theta)
+        driven = turned[..., 3]
+        b, d = driven[..., 0, :], driven[..., 1, :]
+        k = dot(b, d)
+        gram = gram_determinant(k, *self._cosines)
+        if not (gram > GRAM_ROUNDING).all():
+            self._refuse_open_loop(theta, k, gram)
+        # D is the determinant of b, d and c.
+        determinant = self.assembly_mode * np.sqrt(gram)
+        across = cross(b, d)
+        c = third_axis(b, d, across, k, *self._cosines, determinant)
+        # The closure is exact only to rounding; unit length keeps the rotations orthonormal.
         c = unit(c)
-        rotations = {
-            "link_1": turn_1,
-            "link_2": turn_2,
-            "link_3": triad(d, c) @ triad(self.d0, self.c0).T,
-            "platform": triad(b, c) @ triad(self.b0, self.c0).T,
-        }
-        return Configuration(theta, b, c, d, rotations)
+        rows = np.empty((*theta.shape[:-1], 2, 3, 3))
+        rows[..., 0, :] = driven
+        rows[..., 1, :] = c[..., None, :]
+        rows[..., 2, :] = to_c = cross(driven, c[..., None, :])
+        bodies = np.empty((*theta.shape[:-1], len(BODIES), 3, 3))
+        bodies[..., 0, :, :] = IDENTITY
+        bodies[..., 1:3, :, :] = turned[..., :3]
+        bodies[..., 3:5, :, :] = np.swapaxes(self._home_inverse @ rows, -1, -2)
+        dual = np.empty((*theta.shape[:-1], 3, 3))
+        dual[..., 0, :] = to_c[..., 1, :]
+        dual[..., 1, :] = across
+        dual[..., 2, :] = -to_c[..., 0, :]
+        dual /= determinant[..., None, None]
+        return Configuration(theta, b, c, d, determinant, dual, bodies)
+
+    def _refuse_open_loop(self, theta: Array, k: Array, gram: Array) -> None:
+        wrong = ~(gram > GRAM_ROUNDING)
+        angle = np.degrees(np.arccos(np.clip(first_where(k[..., None], wrong)[0], -1.0, 1.0)))
+        alpha_2, alpha_3 = np.degrees(self.alphas[1:3])
+        raise UnreachablePoseError(
+            f"motor angles {angles_text(first_where(theta, wrong))}: the loop does not close; the "
+            f"angle between joint_2 and joint_4 is {angle:.3f} deg, it must lie between "
+            f"{abs(alpha_2 - alpha_3):.3f} and {180 - abs(180 - alpha_2 - alpha_3):.3f}"
+        )
 
     def normal(self, configuration: Configuration) -> Array:
         """Return the platform's normal in F, (..., 3)."""
@@ -218,14 +285,16 @@ class Mechanism:
             If D vanishes at one of the poses.
         """
         determinant = configuration.singularity
-        if np.any(np.abs(determinant) < HOME_TOLERANCE):
+        singular = np.abs(determinant) < HOME_TOLERANCE
+        if singular.any():
             raise SingularPoseError(
-                f"|D| = {np.min(np.abs(determinant)):.2e} below {HOME_TOLERANCE:.0e}: "
+                f"motor angles {angles_text(first_where(configuration.theta, singular))}: "
+                f"|D| below {HOME_TOLERANCE:.0e}, "
                 "the axes of joint_2, joint_3 and joint_4 are coplanar"
             )
-        w = cross(configuration.d, configuration.c)
-        first = self.a1 - configuration.b * (dot(w, self.a1) / determinant)[..., None]
-        second = configuration.b * (dot(w, self.a2) / determinant)[..., None]
+        to_b = configuration.dual[..., 0, :]
+        first = self.a1 - configuration.b * (to_b @ self.a1)[..., None]
+        second = configuration.b * (to_b @ self.a2)[..., None]
         return np.stack([first, second], axis=-1)
 
     def tilt(self, theta: Array) -> Array:
@@ -238,30 +307,38 @@ class Mechanism:
         Parameters
         ----------
         normal : (..., 3) float
-            Desired platform normals in F (any length).
+            Desired platform normals in F (any length but zero).
 
         Returns
         -------
         (..., 4, 2) float
-            Motor angles in (-pi, pi]; rows that do not exist or belong to the other assembly
+            Motor angles in [-pi, pi]; rows that do not exist or belong to the other assembly
             mode are NaN.
+
+        Raises
+        ------
+        InputError
+            If a normal is not finite or has no length.
         """
-        n = unit(np.asarray(normal, dtype=float))
+        normal = np.asarray(normal, dtype=float)
+        wrong = ~(np.isfinite(normal).all(axis=-1) & (normal != 0.0).any(axis=-1))
+        if wrong.any():
+            bad = first_where(normal, wrong).tolist()
+            raise InputError(f"platform normal {bad} is not a direction")
+        # By the largest component first, so that squares neither overflow nor vanish.
+        n = unit(normal / np.max(np.abs(normal), axis=-1, keepdims=True))
+        cos_3 = self._cosines[1]
+        platform_home = triad(self.b0, self.n0).T @ self.c0
         solutions = []
-        home = triad(self.b0, self.n0)
         for branch_1 in (1.0, -1.0):
-            b = _cone_intersection(self.a1, n, self.a1 @ self.b0, self.b0 @ self.n0, branch_1)
-            c = triad(b, n) @ home.T @ self.c0
+            b = cone_intersection(
+                self.a1, n, float(self.a1 @ self.b0), float(self.b0 @ self.n0), branch_1
+            )
+            c = triad(b, n) @ platform_home
             for branch_2 in (1.0, -1.0):
-                d = _cone_intersection(
-                    np.broadcast_to(self.a2, c.shape),
-                    c,
-                    self.d0 @ self.a2,
-                    self.c0 @ self.d0,
-                    branch_2,
-                )
+                d = cone_intersection(self.a2, c, float(self.d0 @ self.a2), cos_3, branch_2)
                 theta = np.stack(
-                    [_angle_about(self.a1, self.b0, b), _angle_about(self.a2, self.d0, d)], axis=-1
+                    [angle_about(self.a1, self.b0, b), angle_about(self.a2, self.d0, d)], axis=-1
                 )
                 other_mode = np.sign(dot(c, cross(b, d))) != self.assembly_mode
                 theta[other_mode] = np.nan
@@ -285,35 +362,31 @@ class Mechanism:
 
         Raises
         ------
+        InputError
+            If a normal is not a direction or an angle is not finite.
         UnreachablePoseError
             If a normal has no solution.
         """
-        solutions = self.inverse(normal)
-        step = np.angle(np.exp(1j * (solutions - np.asarray(theta)[..., None, :])))
-        distance = np.where(
-            np.isnan(step[..., 0]), np.inf, np.sum(np.nan_to_num(step) ** 2, axis=-1)
-        )
-        if np.any(np.min(distance, axis=-1) == np.inf):
-            bad = np.reshape(normal, (-1, 3))[
-                np.argmax(np.ravel(np.min(distance, axis=-1)) == np.inf)
-            ]
-            raise UnreachablePoseError(
-                f"platform normal {np.round(bad, 6).tolist()} is out of reach"
-            )
+        normal, theta = np.asarray(normal, dtype=float), np.asarray(theta, dtype=float)
+        if not np.isfinite(theta).all():
+            bad = first_where(theta, ~np.isfinite(theta).all(axis=-1))
+            raise InputError(f"motor angles {angles_text(bad)}: not finite")
+        step = np.angle(np.exp(1j * (self.inverse(normal) - theta[..., None, :])))
+        distance = np.where(np.isnan(step[..., 0]), np.inf, np.sum(step * step, axis=-1))
+        unreachable = np.min(distance, axis=-1) == np.inf
+        if unreachable.any():
+            bad = np.round(first_where(normal, unreachable), 6).tolist()
+            raise UnreachablePoseError(f"platform normal {bad} is out of reach")
         best = np.argmin(distance, axis=-1)[..., None, None]
-        return np.asarray(theta) + np.take_along_axis(step, best, axis=-2)[..., 0, :]
+        return theta + np.take_along_axis(step, best, axis=-2)[..., 0, :]
 
 
-def _cone_intersection(u: Array, v: Array, cos_u: float, cos_v: float, branch: float) -> Array:
-    """Unit vectors at given cosines to unit u and v, (..., 3); NaN where the cones do not meet."""
-    k = dot(u, v)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = (cos_u - k * cos_v) / (1.0 - k * k)
-        q = (cos_v - k * cos_u) / (1.0 - k * k)
-        height = branch * np.sqrt((1.0 - p * cos_u - q * cos_v) / (1.0 - k * k))
-        return p[..., None] * u + q[..., None] * v + height[..., None] * cross(u, v)
+def angles_text(theta: Array) -> str:
+    """Return motor angles (2,) [rad] as error messages say them."""
+    first, second = np.degrees(theta)
+    return f"({first:.3f}, {second:.3f}) deg"
 
 
-def _angle_about(axis: Array, start: Array, end: Array) -> Array:
-    """Signed angle about `axis` (3,) from `start` (3,) to `end` (..., 3) [rad]."""
-    return np.arctan2(end @ (skew(axis) @ start), end @ start - (end @ axis) * (start @ axis))
+def first_where(values: Array, wrong: ArrayLike) -> Array:
+    """Return the first row of `values` (..., n) whose pose `wrong` (...) marks, (n,)."""
+    return np.reshape(values, (-1, values.shape[-1]))[np.argmax(np.ravel(wrong))]

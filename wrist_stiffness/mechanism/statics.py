@@ -20,20 +20,17 @@ from wrist_stiffness.mechanism.components import (
     ElasticComponents,
 )
 from wrist_stiffness.mechanism.influence import Influence, influence
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
 from wrist_stiffness.mechanism.vectors import block_diagonal
 
 N_ELASTIC = len(ELASTIC)
 
+_CARRIER_NUMBER = np.array([BODIES.index(CARRIER[name]) for name in ELASTIC])
+
 
 def component_rotations(configuration: Configuration) -> Array:
     """Rotation from home of the body that carries each elastic component, (..., 8, 3, 3)."""
-    shape = configuration.b.shape[:-1]
-    out = np.empty((*shape, N_ELASTIC, 3, 3))
-    for i, name in enumerate(ELASTIC):
-        carrier = CARRIER[name]
-        out[..., i, :, :] = np.eye(3) if carrier == "frame" else configuration.rotations[carrier]
-    return out
+    return configuration.bodies.take(_CARRIER_NUMBER, axis=-3)
 
 
 def turned_flexibilities(configuration: Configuration, components: ElasticComponents) -> Array:
@@ -106,26 +103,34 @@ def weight_response(
     WeightResponse
         Wrenches through the components, their screws and the platform's twist.
     """
-    projectors = influence(configuration)
+    return _weight_response(
+        configuration,
+        components,
+        gravity,
+        influence(configuration),
+        turned_flexibilities(configuration, components),
+    )
+
+
+def _weight_response(
+    configuration: Configuration,
+    components: ElasticComponents,
+    gravity: Array,
+    projectors: Influence,
+    flexibility: Array,
+) -> WeightResponse:
     r = component_rotations(configuration)
-    field = np.swapaxes(r, -1, -2) @ gravity
-    motor_frames, platform_frames = projectors.of_frames()
-    wrench = _carried(
-        projectors.of_components(),
+    field = _to_body(r, gravity)
+    motor_side, platform_side = (
+        _turned(r, (weights @ field)[..., 0])
+        for weights in (components.weight_motor_side, components.weight_platform_side)
+    )
+    carried = _turned(
+        np.swapaxes(projectors.of_components(), -1, -2),
         platform_weight(configuration, components, gravity)[..., None, :],
     )
-    for weights, frames in (
-        (components.weight_motor_side, motor_frames),
-        (components.weight_platform_side, platform_frames),
-    ):
-        local = np.einsum("kij,...kj->...ki", weights, field)
-        turned = np.einsum("...kij,...khj->...khi", r, local.reshape(*local.shape[:-1], 2, 3))
-        # Row m of `frames` moves frame m; its transpose carries the frame's wrench to component k.
-        through = np.einsum("...mkji,...mhj->...khi", frames, turned)
-        wrench = wrench + through.reshape(*through.shape[:-2], 6)
-    screw = np.einsum(
-        "...kij,...kj->...ki", turned_flexibilities(configuration, components), wrench
-    )
+    wrench = carried + projectors.through_components(motor_side, platform_side)
+    screw = (flexibility @ wrench[..., None])[..., 0]
     return WeightResponse(wrench, screw, platform_twist(projectors, screw))
 
 
@@ -134,27 +139,27 @@ def platform_weight(
 ) -> Array:
     """Weight of the platform as a wrench at O in F, (..., 6)."""
     r = configuration.platform
-    local = np.einsum("ij,...j->...i", components.platform_weight, np.swapaxes(r, -1, -2) @ gravity)
-    halves = np.einsum("...ij,...hj->...hi", r, local.reshape(*local.shape[:-1], 2, 3))
-    return halves.reshape(*halves.shape[:-2], 6)
+    return _turned(r, (components.platform_weight @ _to_body(r, gravity))[..., 0])
 
 
 def platform_twist(projectors: Influence, screws: Array) -> Array:
     """Sum G_k delta_k over the elastic components, (..., 6) for `screws` (..., 8, 6) [m, rad]."""
-    halves = screws.reshape(*screws.shape[:-1], 2, 3)
-    twist = np.einsum("...kij,...khj->...hi", projectors.of_components(), halves)
-    return twist.reshape(*twist.shape[:-2], 6)
+    return _turned(projectors.of_components(), screws).sum(axis=-2)
 
 
 def slides(projectors: Influence, screws: Array) -> Array:
-    """Slides of joint_2, joint_3, joint_4 for screws (..., 8, 6) at the components, (..., 3) [m]."""
+    """Slides of joint_2 to joint_4 for `screws` (..., 8, 6) at the components, (..., 3) [m]."""
     return np.einsum("...kij,...kj->...i", projectors.slides(), screws[..., :3])
 
 
-def _carried(g: Array, wrench: Array) -> Array:
-    """Wrench G_k' W through each component, (..., 8, 6)."""
-    wrench = np.broadcast_to(wrench, (*wrench.shape[:-2], N_ELASTIC, 6))
-    halves = np.einsum("...kji,...khj->...khi", g, wrench.reshape(*wrench.shape[:-1], 2, 3))
+def _to_body(rotation: Array, vector: Array) -> Array:
+    """Return a vector (3,) of F in turned bodies, as columns (..., 3, 1)."""
+    return np.swapaxes(rotation, -1, -2) @ vector[:, None]
+
+
+def _turned(matrix: Array, six: Array) -> Array:
+    """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
+    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
     return halves.reshape(*halves.shape[:-2], 6)
 
 
@@ -217,52 +222,40 @@ def contact_operators(
     g = projectors.of_components()
     r = component_rotations(configuration)
     flexibility = turned_flexibilities(configuration, components)
-    weight = weight_response(configuration, components, gravity)
-    joints = contact_joints(components)
-    parts = [components.contact[joint] for joint in joints]
-    sizes = [len(part.gap) for part in parts]
-    m = sum(sizes)
-    lead = configuration.b.shape[:-1]
+    weight = _weight_response(configuration, components, gravity, projectors, flexibility)
+    sectors = components.sectors
+    own, lead, m = sectors.component, configuration.b.shape[:-1], len(sectors.gap)
+
+    # A unit slide force of each passive joint: by virtual work it pulls at the components with the
+    # rows that map their translations to the slides.
+    rows = projectors.slides()
+    bent = flexibility[..., :3] @ np.swapaxes(rows, -1, -2)
+    slide_flexibility = (rows @ bent[..., :3, :]).sum(axis=-3)
+    slide_twist = (block_diagonal(g) @ bent).sum(axis=-3)
+
+    # What a unit force of each sector does through its own bushing.
+    screw = _turned(r.take(own, axis=-3), sectors.screw)
+    screw_slide = rows.take(own, axis=-3) @ screw[..., :3, None]
+    coupling = sectors.slide @ np.swapaxes(screw_slide[..., 0], -1, -2)
+    screw_twist = _turned(g.take(own, axis=-3), screw)
 
     screw_gap = np.zeros((*lead, m, N_ELASTIC, 6))
-    local = np.zeros((*lead, N_ELASTIC, 6, m))
-    approach = np.zeros((*lead, m, m))
-    gap = np.zeros((*lead, m))
-    start = 0
-    for joint, part, size in zip(joints, parts, sizes, strict=True):
-        rows = slice(start, start + size)
-        k, slide = ELASTIC.index(joint), PASSIVE_JOINTS.index(joint)
-        screw_gap[..., rows, :, :3] = (
-            part.sign[:, None, None] * projectors.slides()[..., None, :, slide, :]
-        )
-        local[..., k, :, rows] = block_diagonal(r[..., k, :, :]) @ part.screw
-        approach[..., rows, rows] = part.approach
-        field = np.swapaxes(r[..., k, :, :], -1, -2) @ gravity
-        gap[..., rows] = part.gap + np.einsum("ij,...j->...i", part.weight_approach, field)
-        start += size
-
-    # Wrench of the contact forces through each component, by virtual work on the slides.
-    through = np.moveaxis(screw_gap, -3, -1)
-    screw = flexibility @ through + local
-    force_twist = np.einsum(
-        "...kij,...khjm->...him", g, screw.reshape(*screw.shape[:-2], 2, 3, m)
-    ).reshape(*lead, 6, m)
-    coupling = np.einsum("...mki,...kin->...mn", screw_gap, local)
-    approach = (
-        approach
-        + np.einsum("...kim,...kij,...kjn->...mn", through, flexibility, through, optimize=True)
-        + coupling
-        + np.swapaxes(coupling, -1, -2)
-    )
+    # (m, slide) times (component, slide, xyz), component by component.
+    screw_gap[..., :3] = np.swapaxes(sectors.slide @ rows, -3, -2)
+    field = _to_body(r, gravity).take(own, axis=-3)
     gap = (
-        gap
-        + np.einsum("...mki,...ki->...m", screw_gap, weight.screw)
-        + np.einsum("...kim,...ki->...m", local, weight.wrench)
+        sectors.gap
+        + (sectors.weight_approach[:, None, :] @ field)[..., 0, 0]
+        + slides(projectors, weight.screw) @ sectors.slide.T
+        + (screw * weight.wrench.take(own, axis=-2)).sum(axis=-1)
     )
     return ContactOperators(
         compliance=component_shares(configuration, components).sum(axis=-3),
-        force_twist=force_twist,
-        approach=approach,
+        force_twist=slide_twist @ sectors.slide.T + np.swapaxes(screw_twist, -1, -2),
+        approach=sectors.approach
+        + sectors.slide @ slide_flexibility @ sectors.slide.T
+        + coupling
+        + np.swapaxes(coupling, -1, -2),
         gap=gap,
         weight_twist=weight.twist,
         screw_gap=screw_gap,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Limits
-from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism
+from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism, angles_text
 from wrist_stiffness.mechanism.vectors import triad
 
 BORDER_POINTS = 721
@@ -61,18 +61,17 @@ class Workspace:
     def operative(self, theta: Array) -> NDArray[np.bool_]:
         """Tell which poses lie in the operative workspace, (...) for `theta` (..., 2) [rad]."""
         theta = np.asarray(theta, dtype=float)
-        inside = self.domain(theta)
+        inside = np.asarray(self.domain(theta))
         inside[inside] = self.mechanism.tilt(theta[inside]) <= self.limits.operative_tilt
         return inside
 
     def domain(self, theta: Array) -> NDArray[np.bool_]:
-        """Tell which poses lie in the map domain, (...) for `theta` (..., 2) [rad]."""
+        """Tell which poses lie in the map domain, (...) for `theta` (..., 2) [rad]; not so NaN."""
         theta = np.asarray(theta, dtype=float)
         lower, upper = self.rectangle
         inside = np.asarray(np.all((theta >= lower) & (theta <= upper), axis=-1))
-        inside &= self.mechanism.reachable(theta)
-        determinant = self.mechanism.forward(theta[inside]).singularity
-        inside[inside] = np.abs(determinant) >= self.limits.singularity
+        radicand = self.mechanism.closure_radicand(theta[inside])
+        inside[inside] = radicand >= self.limits.singularity**2
         return inside
 
     def grid(self, per_axis: int) -> Array:
@@ -108,25 +107,26 @@ class Workspace:
 
         Raises
         ------
+        InputError
+            If an angle is not finite.
         UnreachablePoseError
             If the pose is outside the domain's rectangle or the loop does not close.
         SingularPoseError
             If |D| is below its limit.
         """
         theta = np.asarray(theta, dtype=float)
+        configuration = self.mechanism.forward(theta)
         lower, upper = self.rectangle
-        if not np.all((theta >= lower) & (theta <= upper)):
-            angles, low, high = np.degrees(theta), np.degrees(lower), np.degrees(upper)
+        if not ((theta >= lower) & (theta <= upper)).all():
+            low, high = np.degrees(lower), np.degrees(upper)
             raise UnreachablePoseError(
-                f"motor angles ({angles[0]:.3f}, {angles[1]:.3f}) deg outside the table's domain "
+                f"motor angles {angles_text(theta)} outside the table's domain "
                 f"({low[0]:.2f} to {high[0]:.2f}, {low[1]:.2f} to {high[1]:.2f})"
             )
-        configuration = self.mechanism.forward(theta)
         determinant = abs(float(configuration.singularity))
         if determinant < self.limits.singularity:
-            angles = np.degrees(theta)
             raise SingularPoseError(
-                f"motor angles ({angles[0]:.3f}, {angles[1]:.3f}) deg: |D| = {determinant:.3f} "
+                f"motor angles {angles_text(theta)}: |D| = {determinant:.3f} "
                 f"below the limit {self.limits.singularity:g}"
             )
         return configuration
