@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+
+from wrist_stiffness.errors import InputError, UnreachablePoseError
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+
+RATE = 50.0
+COUNT_ROUNDING = 1e-12  # rad
+
+
+@pytest.fixture
+def ran(wrist):
+    """Return a function that runs a cell: cell, times, angles sent, samples."""
+
+    def run(seconds=20.0, seed=1, table=None, **settings):
+        cell = VirtualCell(table or wrist(), CellSettings(rate_hz=RATE, **settings), rng(seed))
+        time_s = np.arange(round(seconds * RATE)) / RATE
+        sent = cell.desired(time_s)
+        return cell, time_s, sent, cell.run(time_s, sent)
+
+    return run
+
+
+def rng(seed):
+    return np.random.default_rng(seed)
+
+
+def test_samples_one_by_one_are_those_of_a_block(ran, wrist):
+    _, time_s, sent, block = ran(4.0)
+    cell = VirtualCell(wrist(), CellSettings(rate_hz=RATE), rng(1))
+    for i, t in enumerate(time_s):
+        one = cell.step(t, sent[i])
+        # The noise is drawn in the same order; matrix products of a stack may round differently.
+        assert np.array_equal(one.encoder, block.encoder[i])
+        np.testing.assert_allclose(one.wrench, block.wrench[i], rtol=0, atol=1e-15)
+        np.testing.assert_allclose(one.measured_shift, block.measured_shift[i], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            one.measured_rotation, block.measured_rotation[i], rtol=0, atol=1e-14
+        )
+
+
+def test_a_seed_repeats_to_the_bit_and_another_differs(ran):
+    same, again, other = (ran(3.0, seed=seed)[3] for seed in (1, 1, 2))
+    assert np.array_equal(same.measured_shift, again.measured_shift)
+    assert np.array_equal(same.wrench, again.wrench)
+    assert not np.array_equal(same.measured_shift, other.measured_shift)
+
+
+def test_encoder_shows_whole_counts_near_what_was_sent(ran):
+    cell, _, sent, block = ran()
+    step = cell.table.geometry.limits.encoder_step
+    counts = block.encoder / step
+    assert np.max(np.abs(counts - np.round(counts))) < 1e-9
+    assert np.max(np.abs(block.encoder - sent)) <= step + COUNT_ROUNDING
+
+
+def test_without_flanges_the_true_pose_is_the_rigid_one_moved_by_compliance_and_weight(ran, wrist):
+    table = wrist(flanged=False)
+    cell, time_s, _, block = ran(table=table, instrument="ideal")
+    # The shaft is hidden within a count of the encoder; an independent forward solution of the
+    # linear statics is taken at the shaft angles that explain the measured normal.
+    load = cell.program.load(time_s)
+    configuration = table.mechanism.forward(block.encoder)
+    operators = contact_operators(configuration, table.components, table.geometry.gravity)
+    twist = (operators.compliance @ load[..., None])[..., 0] + operators.weight_twist
+    _, shift = exp_twist(twist)
+    # Half a count turns the compliance by far less than this share of the shift.
+    scale = np.max(np.linalg.norm(shift, axis=1))
+    assert np.max(np.abs(block.pose_shift - shift)) < 2e-3 * scale
+
+
+def test_error_against_the_rigid_pose_is_that_of_a_flexible_wrist(ran):
+    cell, time_s, _, block = ran()
+    nominal = cell.table.mechanism.forward(block.encoder).platform
+    error = log_motion(block.pose_rotation @ np.swapaxes(nominal, -1, -2), block.pose_shift)
+    loaded = np.linalg.norm(cell.program.load(time_s)[:, :3], axis=1) > 0.3
+    shift = np.linalg.norm(error[loaded, :3], axis=1).mean()
+    assert 2e-6 < shift < 100e-6
+    assert shift > np.linalg.norm(error[~loaded, :3], axis=1).mean()
+
+
+def test_measured_load_is_at_most_one_newton_and_changes_with_the_dwell(ran):
+    cell, time_s, _, block = ran(60.0)
+    force = np.linalg.norm(cell.program.load(time_s)[:, :3], axis=1)
+    assert 0.5 < force.max() <= 1.0
+    assert np.any(force == 0.0)
+    noise = block.wrench - cell.program.load(time_s)
+    assert 1e-3 < noise[:, :3].std() < 4e-3
+
+
+def test_load_and_angles_change_smoothly(ran):
+    cell, *_ = ran(1.0)
+    fine = np.arange(0.0, 60.0, 1e-3)
+    rates = np.diff(cell.program.load(fine)[:, :3], axis=0) / 1e-3
+    assert np.max(np.abs(np.diff(rates, axis=0))) / 1e-3 < 60.0  # N/s^2, minimum jerk in 0.6 s
+    speed = np.diff(cell.desired(fine), axis=0) / 1e-3
+    assert np.max(np.abs(speed)) < np.radians(90.0)
+    assert np.max(np.abs(np.diff(speed, axis=0))) / 1e-3 < np.radians(1500.0)
+
+
+def test_poses_are_approached_from_all_sides(ran):
+    cell, *_ = ran(1.0, program_seconds=200.0)
+    angles = cell.program.angles.values
+    moves = np.diff(angles, axis=0)
+    signs = {tuple(np.sign(move)) for move in moves if np.any(move != 0.0)}
+    assert {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)} <= signs
+
+
+def test_program_stays_in_the_operative_workspace_and_repeats(ran):
+    cell, *_ = ran(1.0)
+    time_s = np.arange(0.0, cell.program.duration_s, 0.05)
+    assert np.all(cell.table.workspace.operative(cell.desired(time_s)))
+    later = cell.desired(time_s + cell.program.duration_s)
+    np.testing.assert_allclose(later, cell.desired(time_s), atol=1e-9)
+
+
+def test_pose_noise_has_the_stated_size(ran):
+    _, _, _, block = ran(60.0, instrument="tracker")
+    noise = block.measured_shift - block.pose_shift
+    white = np.diff(noise, axis=0).std() / np.sqrt(2.0)
+    assert white == pytest.approx(5e-6, rel=0.05)
+    turned = log_motion(
+        block.measured_rotation @ np.swapaxes(block.pose_rotation, -1, -2),
+        np.zeros((len(noise), 3)),
+    )
+    white = np.diff(turned[:, 3:], axis=0).std() / np.sqrt(2.0)
+    assert white == pytest.approx(np.radians(10e-3), rel=0.05)
+
+
+def test_motors_follow_what_is_sent_not_the_program(wrist):
+    cell = VirtualCell(wrist(), CellSettings(instrument="ideal"), rng(1))
+    corrected = cell.desired(0.0) + np.radians([0.2, -0.1])
+    sample = cell.step(0.0, corrected)
+    step = cell.table.geometry.limits.encoder_step
+    assert np.max(np.abs(sample.encoder - corrected)) <= step
+
+
+def test_bad_settings_and_angles_are_refused(wrist):
+    with pytest.raises(InputError, match="rate_hz = 0"):
+        CellSettings(rate_hz=0.0)
+    with pytest.raises(InputError, match="theodolite"):
+        CellSettings(instrument="theodolite")
+    cell = VirtualCell(wrist(), CellSettings(), rng(1))
+    with pytest.raises(UnreachablePoseError):
+        cell.step(0.0, np.radians([90.0, 90.0]))

@@ -1,0 +1,191 @@
+"""The virtual cell: motors, wrist, load, load sensor and pose sensor, sample by sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError, UnreachablePoseError
+from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.kinematics import angles_text, first_where
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.simulation.drive import Drive
+from wrist_stiffness.simulation.experiment import rich
+from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, instrument
+from wrist_stiffness.simulation.program import Program
+
+
+@dataclass(frozen=True)
+class CellSettings:
+    """What the cell does and with which sensors; the seed of its noise is not part of it.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Samples per second.
+    program_seconds : float
+        About how long the program takes before it repeats [s].
+    program_seed : int
+        Chooses poses and loads of the program.
+    instrument : str
+        Pose sensor: `interferometer`, `tracker`, `cmm` or `ideal`.
+    load_sensor : LoadSensor
+        Noise of the load estimate.
+
+    Raises
+    ------
+    InputError
+        If the rate or the duration is not positive, or the instrument is not known.
+    """
+
+    rate_hz: float = 100.0
+    program_seconds: float = 120.0
+    program_seed: int = 0
+    instrument: str = "interferometer"
+    load_sensor: LoadSensor = LoadSensor()
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("rate_hz", "program_seconds"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"cell: {name} = {value} is not a positive number")
+        instrument(self.instrument)
+
+
+@dataclass(frozen=True)
+class CellSample:
+    """What happened and what the sensors said, for one sample or n of them.
+
+    Parameters
+    ----------
+    encoder : (..., 2) float
+        Motor angles as measured [rad].
+    wrench : (..., 6) float
+        Load on the platform at O in F as measured [N, N m].
+    pose_rotation : (..., 3, 3) float
+        True rotation U -> F of the platform.
+    pose_shift : (..., 3) float
+        True position of the platform's point O in F [m].
+    measured_rotation : (..., 3, 3) float
+        Rotation as measured.
+    measured_shift : (..., 3) float
+        Position as measured [m].
+    """
+
+    encoder: Array
+    wrench: Array
+    pose_rotation: Array
+    pose_shift: Array
+    measured_rotation: Array
+    measured_shift: Array
+
+    def __getitem__(self, place: int) -> CellSample:
+        """Return one sample of a block."""
+        return CellSample(*(getattr(self, field.name)[place] for field in fields(self)))
+
+
+class VirtualCell:
+    """A wrist at work.
+
+    Parameters
+    ----------
+    table : Table
+        Its elastic base: what the true wrist is made of.
+    settings : CellSettings
+        Program and sensors.
+    rng : numpy.random.Generator
+        All noise comes from it; the same state gives the same samples to the bit.
+    """
+
+    def __init__(self, table: Table, settings: CellSettings, rng: np.random.Generator) -> None:
+        self.table = table
+        self.settings = settings
+        self.program: Program = rich(
+            table.workspace,
+            np.random.default_rng(settings.program_seed),
+            settings.program_seconds,
+        )
+        drive_rng, load_rng, pose_rng = rng.spawn(3)
+        sensor, pose_sensor = settings.load_sensor, instrument(settings.instrument)
+        self._drive = Drive(table.geometry.limits.encoder_step, drive_rng)
+        self._load_noise = NoiseSource(sensor.force, sensor.moment, load_rng)
+        self._pose_noise = NoiseSource(pose_sensor.shift, pose_sensor.rotation, pose_rng)
+
+    def desired(self, time_s: float | Array) -> Array:
+        """Return the nominal motor command (..., 2) [rad] at times since the start (...) [s]."""
+        return self.program.angles(self.program.phase(np.asarray(time_s)))
+
+    def step(self, time_s: float, sent: Array) -> CellSample:
+        """Advance to a time.
+
+        Parameters
+        ----------
+        time_s : float
+            Time since the start, later than that of the step before [s].
+        sent : (2,) float
+            Motor angles that the motors are to follow [rad].
+
+        Returns
+        -------
+        CellSample
+            Arrays without a leading axis.
+
+        Raises
+        ------
+        UnreachablePoseError
+            If an angle is beyond the end stops, or the loop does not close.
+        """
+        return self.run(np.array([time_s]), np.asarray(sent, dtype=float)[None])[0]
+
+    def run(self, time_s: Array, sent: Array) -> CellSample:
+        """Advance through a block of samples; as `step` one by one, and faster.
+
+        Parameters
+        ----------
+        time_s : (n,) float
+            Increasing times since the start [s].
+        sent : (n, 2) float
+            Motor angles that the motors are to follow [rad].
+
+        Returns
+        -------
+        CellSample
+            Arrays with a leading axis of n.
+
+        Raises
+        ------
+        UnreachablePoseError
+            If an angle is beyond the end stops, or the loop does not close.
+        """
+        self._stop_at_ends(sent)
+        shaft = self._drive.shaft(sent)
+        load = self.program.load(self.program.phase(time_s))
+        configuration = self.table.mechanism.forward(shaft)
+        twist = respond(self.table.operators_at(configuration, "closed_form"), load).twist
+        bent, shift = exp_twist(twist)
+        rotation = bent @ configuration.platform
+        noise = self._pose_noise(time_s)
+        # A tracker's errors in position and orientation are separate, not one rigid motion.
+        wobble, _ = exp_twist(noise)
+        return CellSample(
+            encoder=self._drive.read(shaft),
+            wrench=load + self._load_noise(time_s),
+            pose_rotation=rotation,
+            pose_shift=shift,
+            measured_rotation=wobble @ rotation,
+            measured_shift=shift + noise[:, :3],
+        )
+
+    def _stop_at_ends(self, sent: Array) -> None:
+        limits = self.table.geometry.limits
+        inside = np.all((sent >= limits.joint_lower) & (sent <= limits.joint_upper), axis=-1)
+        if not inside.all():
+            low, high = np.degrees(limits.joint_lower), np.degrees(limits.joint_upper)
+            raise UnreachablePoseError(
+                f"motor angles {angles_text(first_where(sent, ~inside))}: beyond the end stops "
+                f"({low[0]:g} to {high[0]:g}, {low[1]:g} to {high[1]:g})"
+            )

@@ -1,0 +1,96 @@
+"""The experiments that a user might run, as programs of the virtual cell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import unit
+from wrist_stiffness.mechanism.workspace import Workspace
+from wrist_stiffness.simulation.program import Program, Schedule
+
+TILT_SHARE = 0.85
+"""Poses stay this far inside the operative workspace, so that straight moves do as well."""
+
+SPEED = float(np.radians(30.0))
+"""Mean speed of the faster motor in a move [rad/s]."""
+
+FORCE, LEVER = 1.0, 0.02
+"""Largest force of a load [N] and its lever arm about O [m]."""
+
+LOADING_S, DWELL_S = 0.6, 1.4
+
+
+def random_pose(workspace: Workspace, rng: np.random.Generator) -> Array:
+    """Return motor angles (2,) [rad] whose tilt is evenly spread over the workspace's area."""
+    lower, upper = workspace.rectangle
+    limit = TILT_SHARE * workspace.limits.operative_tilt
+    while True:
+        theta = rng.uniform(lower, upper)
+        if workspace.domain(theta) and workspace.mechanism.tilt(theta) <= limit:
+            return theta
+
+
+def random_load(rng: np.random.Generator) -> Array:
+    """Return a wrench (6,) at O in F of at most 1 N, from a random point of the platform."""
+    force = FORCE * rng.uniform() ** (1.0 / 3.0) * unit(rng.normal(size=3))
+    return np.concatenate([force, np.cross(LEVER * rng.uniform(-1.0, 1.0, 3), force)])
+
+
+def move_seconds(start: Array, end: Array) -> float:
+    """Duration of a move between motor angles (2,) [rad] at the usual speed [s]."""
+    return 0.3 + float(np.max(np.abs(end - start))) / SPEED
+
+
+def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
+    """Random poses, loads and approach directions; loads put on at rest and carried through moves.
+
+    Every fifth dwell returns to a reference pose without load, every fourth re-approaches and
+    re-loads the dwell before (a replicate), every eleventh is a hold of 15 s; the room drifts.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Of the wrist.
+    rng : numpy.random.Generator
+        Chooses poses and loads.
+    seconds : float
+        About how long the program takes [s].
+
+    Returns
+    -------
+    Program
+        Closed: it ends where it begins.
+    """
+    reference = random_pose(workspace, rng)
+    schedule = Schedule(reference)
+    schedule.rest(DWELL_S)
+    theta, load = reference, np.zeros(6)
+    count = 0
+    while schedule.time_s < seconds:
+        count += 1
+        replicate = count % 4 == 0
+        if not replicate:
+            to_reference = count % 5 == 0
+            theta = reference if to_reference else random_pose(workspace, rng)
+            load = np.zeros(6) if to_reference else random_load(rng)
+        _approach(schedule, workspace, theta, load, rng)
+        schedule.rest(15.0 if count % 11 == 0 else DWELL_S)
+        schedule.ambient(float(rng.uniform(-3.0, 3.0)))
+    return schedule.program(LOADING_S)
+
+
+def _approach(
+    schedule: Schedule, workspace: Workspace, theta: Array, load: Array, rng: np.random.Generator
+) -> None:
+    """Go to a pose from a random side, with the load carried along or put on after arrival."""
+    carried = rng.uniform() < 0.5
+    schedule.put_on(load if carried else np.zeros(6), LOADING_S)
+    before = theta + np.radians(4.0) * rng.choice([-1.0, 1.0], 2) * rng.uniform(0.5, 1.0, 2)
+    if not workspace.domain(before):
+        before = theta
+    for target in (before, theta):
+        if not np.array_equal(target, schedule.theta):
+            schedule.move(target, move_seconds(schedule.theta, target))
+    if not carried:
+        schedule.put_on(load, LOADING_S)

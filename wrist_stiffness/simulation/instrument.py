@@ -1,0 +1,124 @@
+"""Sensors of the cell: noise with a colour, on the platform's pose and on the load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+
+
+@dataclass(frozen=True)
+class Noise:
+    """White noise and a slow wander on three components (a stationary Gauss-Markov process).
+
+    Parameters
+    ----------
+    white, wander : float
+        Standard deviations of one component, in the unit of the signal.
+    wander_time_s : float
+        Correlation time of the wander [s].
+    """
+
+    white: float
+    wander: float
+    wander_time_s: float = 60.0
+
+
+@dataclass(frozen=True)
+class PoseInstrument:
+    """What measures the platform's pose.
+
+    Parameters
+    ----------
+    name : str
+        What people call it.
+    shift, rotation : Noise
+        On each component [m], [rad].
+    """
+
+    name: str
+    shift: Noise
+    rotation: Noise
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviation of one sample, wander included, (6,) [m, rad]."""
+        each = [float(np.hypot(n.white, n.wander)) for n in (self.shift, self.rotation)]
+        return np.repeat(each, 3)
+
+
+@dataclass(frozen=True)
+class LoadSensor:
+    """What measures the load.
+
+    Parameters
+    ----------
+    force, moment : Noise
+        On each component [N], [N m].
+    """
+
+    force: Noise = field(default_factory=lambda: Noise(2e-3, 1e-3))
+    moment: Noise = field(default_factory=lambda: Noise(5e-5, 2e-5))
+
+
+MDEG = float(np.radians(1e-3))
+
+INSTRUMENTS = {
+    instrument.name: instrument
+    for instrument in (
+        PoseInstrument("interferometer", Noise(0.7e-6, 0.3e-6), Noise(1.0 * MDEG, 0.3 * MDEG)),
+        PoseInstrument("tracker", Noise(5e-6, 3e-6), Noise(10.0 * MDEG, 3.0 * MDEG)),
+        PoseInstrument("cmm", Noise(1.5e-6, 0.8e-6, 600.0), Noise(3.0 * MDEG, 1.5 * MDEG, 600.0)),
+        PoseInstrument("ideal", Noise(0.0, 0.0), Noise(0.0, 0.0)),
+    )
+}
+
+
+def instrument(name: str) -> PoseInstrument:
+    """Return an instrument by its name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in INSTRUMENTS:
+        raise InputError(f"instrument {name!r} is not one of {', '.join(INSTRUMENTS)}")
+    return INSTRUMENTS[name]
+
+
+class NoiseSource:
+    """Noise of a six-component sensor, sample after sample.
+
+    Parameters
+    ----------
+    first, second : Noise
+        Of the first and of the last three components.
+    rng : numpy.random.Generator
+        Belongs to this source alone.
+    """
+
+    def __init__(self, first: Noise, second: Noise, rng: np.random.Generator) -> None:
+        self._white = np.repeat([first.white, second.white], 3)
+        self._wander = np.repeat([first.wander, second.wander], 3)
+        self._wander_time_s = np.repeat([first.wander_time_s, second.wander_time_s], 3)
+        self._rng = rng
+        self._state = rng.standard_normal(6)
+        self._time_s: float | None = None
+
+    def __call__(self, time_s: Array) -> Array:
+        """Return the noise (n, 6) at the next n times (n,) [s]."""
+        drawn = self._rng.standard_normal((len(time_s), 2, 6))
+        start = time_s[0] if self._time_s is None else self._time_s
+        steps = np.maximum(np.diff(time_s, prepend=start), 0.0)
+        kept = np.exp(-steps[:, None] / self._wander_time_s)
+        push = np.sqrt(1.0 - kept * kept) * drawn[:, 1]
+        slow = np.empty((len(time_s), 6))
+        for i in range(len(time_s)):
+            self._state = kept[i] * self._state + push[i]
+            slow[i] = self._state
+        self._time_s = float(time_s[-1])
+        return self._white * drawn[:, 0] + self._wander * slow

@@ -1,0 +1,133 @@
+"""What the cell does: motor angles and platform load as smooth functions of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+
+
+@dataclass(frozen=True)
+class Track:
+    """Values at knots, joined by minimum-jerk transitions (Flash and Hogan 1985).
+
+    Two equal values in a row are a rest.
+
+    Parameters
+    ----------
+    time_s : (m,) float
+        Increasing, beginning with 0 [s].
+    values : (m, d) float
+        Value at each knot.
+
+    Raises
+    ------
+    InputError
+        If the knots do not increase from zero.
+    """
+
+    time_s: Array
+    values: Array
+
+    def __post_init__(self) -> None:
+        """Check the knots."""
+        if self.time_s[0] != 0.0 or not np.all(np.diff(self.time_s) > 0.0):
+            raise InputError("program: the times of the knots do not increase from zero")
+
+    def __call__(self, time_s: Array) -> Array:
+        """Return the values (..., d) at times (...) [s]; beyond the ends they are held."""
+        time_s = np.clip(time_s, 0.0, self.time_s[-1])
+        before = np.clip(
+            np.searchsorted(self.time_s, time_s, side="right") - 1, 0, len(self.time_s) - 2
+        )
+        span = self.time_s[before + 1] - self.time_s[before]
+        u = (time_s - self.time_s[before]) / span
+        blend = (u * u * u * (10.0 + u * (6.0 * u - 15.0)))[..., None]
+        return self.values[before] + blend * (self.values[before + 1] - self.values[before])
+
+
+@dataclass(frozen=True)
+class Program:
+    """Motor angles, load and ambient temperature of one experiment; repeats when it is over.
+
+    Parameters
+    ----------
+    angles : Track
+        Nominal motor angles, d = 2 [rad].
+    load : Track
+        Wrench on the platform at O in F, d = 6 [N, N m].
+    ambient : Track
+        Temperature of the room above the reference temperature, d = 1 [K].
+    duration_s : float
+        After this time the program begins again [s].
+    """
+
+    angles: Track
+    load: Track
+    ambient: Track
+    duration_s: float
+
+    def phase(self, time_s: Array) -> Array:
+        """Return the time since the current repetition began (...) [s]."""
+        return np.mod(time_s, self.duration_s)
+
+
+class Schedule:
+    """Builds a program move by move.
+
+    Parameters
+    ----------
+    theta : (2,) float
+        Motor angles at the start [rad].
+    """
+
+    def __init__(self, theta: Array) -> None:
+        self.time_s = 0.0
+        self._angles = [(0.0, theta)]
+        self._loads = [(0.0, np.zeros(6))]
+        self._ambient = [(0.0, np.zeros(1))]
+
+    @property
+    def theta(self) -> Array:
+        """Motor angles now, (2,) [rad]."""
+        return self._angles[-1][1]
+
+    @property
+    def load(self) -> Array:
+        """Load now, (6,) [N, N m]."""
+        return self._loads[-1][1]
+
+    def move(self, theta: Array, seconds: float) -> None:
+        """Move the motors to `theta` (2,) [rad] with the load that is on."""
+        self._go_on(seconds, theta=theta)
+
+    def put_on(self, load: Array, seconds: float) -> None:
+        """Change the load to `load` (6,) [N, N m] at rest."""
+        self._go_on(seconds, load=load)
+
+    def rest(self, seconds: float) -> None:
+        """Let everything rest."""
+        self._go_on(seconds)
+
+    def ambient(self, kelvin: float) -> None:
+        """Let the room drift to this temperature until now, from where it was said last [K]."""
+        self._ambient.append((self.time_s, np.array([kelvin])))
+
+    def program(self, return_s: float) -> Program:
+        """Return the program, closed by an unloading and a move back to its start."""
+        self.put_on(np.zeros(6), return_s)
+        self.move(self._angles[0][1], return_s)
+        self.ambient(float(self._ambient[0][1][0]))
+        angles, load, ambient = (
+            Track(np.array([time for time, _ in knots]), np.array([value for _, value in knots]))
+            for knots in (self._angles, self._loads, self._ambient)
+        )
+        return Program(angles, load, ambient, self.time_s)
+
+    def _go_on(self, seconds: float, theta: Array | None = None, load: Array | None = None) -> None:
+        self.time_s += seconds
+        self._angles.append((self.time_s, self.theta if theta is None else theta))
+        self._loads.append((self.time_s, self.load if load is None else load))
