@@ -1,0 +1,173 @@
+"""From a geometry to the elastic components that the mechanism assembles pose by pose."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.fem.parts import Part, Solid, assemble_body, cross_matrix, wrist_parts
+from wrist_stiffness.fem.solids import FLANGES, SECTORS, MeshSettings
+from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement, condense
+from wrist_stiffness.mechanism.components import (
+    PASSIVE_JOINTS,
+    Array,
+    ElasticComponents,
+    FlangeContact,
+)
+from wrist_stiffness.mechanism.geometry import BushingDimensions, Geometry, PlatformDimensions
+
+SHIPPED_SIZES = MeshSettings(link=2.0e-3, bore=0.8e-3, bushing=0.5e-3)
+"""Element sizes of the shipped tables; `convergence.py` states their error."""
+
+PACKAGES = ("netgen-mesher", "scikit-fem", "scipy", "numpy", "pymetis")
+"""Packages whose versions may change the numbers."""
+
+Progress = Callable[[int, int, str], None]
+"""Called with the number of parts done, the number of all parts, and what comes next."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How elastic components were made.
+
+    Parameters
+    ----------
+    interface : str
+        `rigid` or `distributing`.
+    sizes : MeshSettings
+        Element sizes [m].
+    nodes, elements : dict of str to int
+        By component; equal parts share one mesh.
+    seconds : float
+        Wall time of the whole condensation [s].
+    packages : dict of str to str
+        Versions.
+    """
+
+    interface: str
+    sizes: MeshSettings
+    nodes: dict[str, int]
+    elements: dict[str, int]
+    seconds: float
+    packages: dict[str, str]
+
+
+def elastic_components(
+    geometry: Geometry,
+    sizes: MeshSettings = SHIPPED_SIZES,
+    interface: Interface = "rigid",
+    progress: Progress | None = None,
+) -> tuple[ElasticComponents, Provenance]:
+    """Condense every elastic part of a wrist.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The wrist.
+    sizes : MeshSettings
+        Element sizes.
+    interface : {"rigid", "distributing"}
+        How walls follow their frames.
+    progress : callable, optional
+        See `Progress`.
+
+    Returns
+    -------
+    ElasticComponents
+        At O in F with the wrist at home.
+    Provenance
+        How they were made.
+
+    Raises
+    ------
+    GeometryError
+        If a part cannot be built.
+    InputError
+        If the interface model is unknown.
+    """
+    if interface not in INTERFACES:
+        raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
+    start = time.perf_counter()
+    parts = wrist_parts(geometry)
+    condensed: dict[Solid, Superelement] = {}
+    counts: dict[Solid, tuple[int, int]] = {}
+    for done, part in enumerate(parts):
+        if progress is not None:
+            progress(done, len(parts), part.name)
+        if part.solid not in condensed:
+            body = assemble_body(part.solid, sizes)
+            condensed[part.solid] = condense(body, interface)
+            counts[part.solid] = (len(body.mesh.nodes), len(body.mesh.elements))
+    if progress is not None:
+        progress(len(parts), len(parts), "done")
+    provenance = Provenance(
+        interface=interface,
+        sizes=sizes,
+        nodes={part.name: counts[part.solid][0] for part in parts},
+        elements={part.name: counts[part.solid][1] for part in parts},
+        seconds=time.perf_counter() - start,
+        packages={package: version(package) for package in PACKAGES},
+    )
+    return place_components(geometry, parts, condensed), provenance
+
+
+def place_components(
+    geometry: Geometry, parts: list[Part], condensed: dict[Solid, Superelement]
+) -> ElasticComponents:
+    """Turn and move condensed solids to their places in the wrist at home.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The wrist.
+    parts : list of Part
+        Its elastic parts, in the order of `ELASTIC`.
+    condensed : dict of Solid to Superelement
+        The condensed solid of each part.
+
+    Returns
+    -------
+    ElasticComponents
+        At O in F with the wrist at home.
+    """
+    flexibility, motor_side, platform_side = [], [], []
+    contact: dict[str, FlangeContact] = {}
+    for part in parts:
+        element, home = condensed[part.solid], part.home
+        flexibility.append(home.screw @ element.flexibility @ home.screw.T)
+        motor_side.append(home.wrench @ element.weight_motor_side @ home.rotation.T)
+        platform_side.append(home.wrench @ element.weight_platform_side @ home.rotation.T)
+        if part.name in PASSIVE_JOINTS and part.solid.flanges:
+            contact[part.name] = _flange_contact(part, element, geometry.bushings[part.name])
+    return ElasticComponents(
+        flexibility=np.array(flexibility),
+        weight_motor_side=np.array(motor_side),
+        weight_platform_side=np.array(platform_side),
+        platform_weight=_platform_weight(geometry.platform),
+        contact=contact,
+    )
+
+
+def _flange_contact(
+    part: Part, element: Superelement, bushing: BushingDimensions
+) -> FlangeContact:
+    wrench, screw = element.sector_wrench, element.sector_screw
+    along = wrench.T @ screw
+    gap_of = dict(zip(FLANGES, (bushing.inner_gap, bushing.outer_gap), strict=True))
+    return FlangeContact(
+        sign=np.sign(wrench[2]) * np.sign(bushing.radius),
+        screw=part.home.screw @ (element.flexibility @ wrench + screw),
+        approach=wrench.T @ element.flexibility @ wrench + along + along.T + element.sector_approach,
+        weight_approach=element.sector_weight @ part.home.rotation.T,
+        gap=np.repeat([gap_of[flange] for flange in part.solid.flanges], SECTORS).astype(float),
+    )
+
+
+def _platform_weight(platform: PlatformDimensions) -> Array:
+    centre = cross_matrix(platform.centre_of_gravity)
+    return platform.mass * np.vstack([np.eye(3), centre])

@@ -1,0 +1,142 @@
+"""Linear elasticity on ten-node tetrahedra: stiffness and consistent loads of one solid.
+
+Unknowns are numbered node by node, x, y, z: unknown 3 n + a is direction a of node n.  The bases,
+their gradients and the quadrature are scikit-fem's; the vector stiffness is put together from the
+scalar gradients in one product per element, which is twenty times faster than a vector form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from skfem import Basis, ElementTetP2, FacetBasis
+
+from wrist_stiffness.fem.mesh import SolidMesh
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Material
+
+FOUR_POINTS = 2
+"""Order of the quadrature of a ten-node tetrahedron's stiffness: four points, as in other codes."""
+
+LOAD_ORDER = 5
+"""Order of the quadrature of loads: exact for shape function times volume of a curved element."""
+
+
+def lame(material: Material) -> tuple[float, float]:
+    """First and second Lame constants [Pa]."""
+    e, nu = material.young, material.poisson
+    return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))
+
+
+def stiffness_matrix(mesh: SolidMesh, material: Material) -> sparse.csr_matrix:
+    """Stiffness of a solid.
+
+    Parameters
+    ----------
+    mesh : SolidMesh
+        Its mesh.
+    material : Material
+        Its isotropic material.
+
+    Returns
+    -------
+    sparse.csr_matrix
+        (3 n, 3 n) symmetric positive semi-definite [N/m].
+    """
+    first, shear = lame(material)
+    gradient, volume = _gradients(mesh, FOUR_POINTS)
+    count = gradient.shape[0]
+    # products[e, a, i, b, j] = integral of d_a N_i d_b N_j over element e
+    weighted = (gradient * volume[:, None, None, :]).reshape(count, 30, -1)
+    products = weighted @ gradient.reshape(count, 30, -1).transpose(0, 2, 1)
+    products = products.reshape(count, 3, 10, 3, 10)
+    laplacian = np.einsum("eaiaj->eij", products)
+    block = first * products + shear * products.transpose(0, 3, 2, 1, 4)
+    for a in range(3):
+        block[:, a, :, a, :] += shear * laplacian
+    unknowns = (3 * mesh.elements[:, None, :] + np.arange(3)[None, :, None]).reshape(count, 30)
+    rows = np.repeat(unknowns, 30, axis=1).ravel()
+    columns = np.tile(unknowns, (1, 30)).ravel()
+    size = 3 * len(mesh.nodes)
+    matrix = sparse.csr_matrix((block.ravel(), (rows, columns)), shape=(size, size))
+    return (matrix + matrix.T) * 0.5
+
+
+def _gradients(mesh: SolidMesh, order: int) -> tuple[Array, Array]:
+    """Gradients (e, 3, 10, q) [1/m] and volumes (e, q) [m^3] at the quadrature points."""
+    basis = Basis(mesh.tets, ElementTetP2(), intorder=order)
+    gradient = np.array([field[0].grad for field in basis.basis])
+    return np.ascontiguousarray(gradient.transpose(2, 1, 0, 3)), basis.dx
+
+
+def thermal_load(mesh: SolidMesh, material: Material) -> Array:
+    """Nodal forces of a free thermal expansion by one kelvin (3 n,) [N/K]."""
+    first, shear = lame(material)
+    gradient, volume = _gradients(mesh, FOUR_POINTS)
+    stress = (3.0 * first + 2.0 * shear) * material.expansion
+    forces = stress * np.einsum("eaiq,eq->eia", gradient, volume)
+    load = np.zeros((len(mesh.nodes), 3))
+    np.add.at(load, mesh.elements, forces)
+    return load.ravel()
+
+
+def volume_integrals(mesh: SolidMesh) -> Array:
+    """Integral of each node's shape function over the solid (n,) [m^3]."""
+    basis = Basis(mesh.tets, ElementTetP2(), intorder=LOAD_ORDER)
+    values = np.array([np.einsum("eq,eq->e", field[0].value, basis.dx) for field in basis.basis])
+    integrals = np.zeros(len(mesh.nodes))
+    np.add.at(integrals, mesh.elements, values.T)
+    return integrals
+
+
+def surface_integrals(mesh: SolidMesh, surface: str) -> Array:
+    """Integrals of each node's shape function N times 1, x, y, z over a named surface.
+
+    Parameters
+    ----------
+    mesh : SolidMesh
+        The mesh.
+    surface : str
+        Name of one of its surfaces.
+
+    Returns
+    -------
+    Array
+        (n, 4) integrals of N [m^2] and of N x, N y, N z [m^3].
+    """
+    basis = FacetBasis(
+        mesh.tets, ElementTetP2(), facets=mesh.surfaces[surface], intorder=LOAD_ORDER
+    )
+    factors = np.stack([np.ones_like(basis.dx), *np.asarray(basis.global_coordinates())])
+    integrals = np.zeros((len(mesh.nodes), 4))
+    dofs = np.asarray(basis.element_dofs)
+    for shape, nodes in zip(basis.basis, dofs, strict=True):
+        values = np.broadcast_to(shape[0].value, basis.dx.shape)
+        np.add.at(integrals, nodes, np.einsum("kfq,fq,fq->fk", factors, values, basis.dx))
+    return integrals
+
+
+def body_force(mesh: SolidMesh, density: float) -> Array:
+    """Nodal forces of a unit acceleration field along x, y and z (3 n, 3) [N/(m/s^2)]."""
+    return np.kron(density * volume_integrals(mesh)[:, None], np.eye(3))
+
+
+def rigid_motion(points: Array) -> Array:
+    """Displacements of points by the six unit screws at the origin.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Places [m].
+
+    Returns
+    -------
+    Array
+        (3 n, 6): translations along and rotations about x, y, z; its transpose gives the resultant
+        force and moment at the origin of nodal forces.
+    """
+    x, y, z = points.T
+    zero = np.zeros_like(x)
+    spin = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
+    shift = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    return np.concatenate([shift, spin], axis=2).reshape(-1, 6)

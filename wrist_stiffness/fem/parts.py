@@ -1,0 +1,231 @@
+"""The eight elastic parts of a wrist: what is meshed, and where it sits.
+
+A part is a solid in its own axes (see `solids.py`) and a placement in F at home.  Equal solids are
+the same `Solid`, so that a mesh or a condensation is made once and turned.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from wrist_stiffness.fem.elasticity import body_force, stiffness_matrix, surface_integrals
+from wrist_stiffness.fem.mesh import SolidMesh, mesh_solid
+from wrist_stiffness.fem.solids import (
+    FLANGES,
+    SECTORS,
+    MeshSettings,
+    bushing_shape,
+    link_shape,
+)
+from wrist_stiffness.mechanism.components import ELASTIC, LINKS, PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.geometry import (
+    BushingDimensions,
+    Geometry,
+    LinkDimensions,
+    Material,
+)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a part's own axes are in F.
+
+    Parameters
+    ----------
+    rotation : (3, 3) float
+        Part axes to F.
+    origin : (3,) float
+        Origin of the part's axes in F [m].
+    """
+
+    rotation: Array
+    origin: Array
+
+    @property
+    def screw(self) -> Array:
+        """Screws at the part's origin in its axes to screws at O in F (6, 6)."""
+        return np.block(
+            [
+                [self.rotation, cross_matrix(self.origin) @ self.rotation],
+                [np.zeros((3, 3)), self.rotation],
+            ]
+        )
+
+    @property
+    def wrench(self) -> Array:
+        """Wrenches at the part's origin in its axes to wrenches at O in F (6, 6)."""
+        return np.block(
+            [
+                [self.rotation, np.zeros((3, 3))],
+                [cross_matrix(self.origin) @ self.rotation, self.rotation],
+            ]
+        )
+
+    def turned(self, rotation: Array) -> Placement:
+        """Turn with a body about O by a rotation (3, 3) in F."""
+        return Placement(rotation @ self.rotation, rotation @ self.origin)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """One shape to be meshed, and which of its walls are held.
+
+    Parameters
+    ----------
+    dimensions : LinkDimensions or BushingDimensions
+        Without what does not shape it (a bushing's place, the size of its gaps).
+    angle : float
+        Between a link's bores [rad]; zero for a bushing.
+    motor_wall, platform_wall : str
+        Surfaces that follow the frames on the motor side and on the platform side.
+    flanges : tuple of str
+        Flanges that take part in contact.
+    """
+
+    dimensions: LinkDimensions | BushingDimensions
+    angle: float
+    motor_wall: str
+    platform_wall: str
+    flanges: tuple[str, ...]
+
+    @property
+    def material(self) -> Material:
+        """What it is made of."""
+        return self.dimensions.material
+
+    @property
+    def sectors(self) -> list[str]:
+        """Names of the surfaces that are contact modes, in order."""
+        return [f"{flange}_{k}" for flange in self.flanges for k in range(SECTORS)]
+
+
+@dataclass(frozen=True)
+class Part:
+    """An elastic component as a solid at a place at home."""
+
+    name: str
+    solid: Solid
+    home: Placement
+
+
+@dataclass(frozen=True)
+class ElasticBody:
+    """The finite-element matrices of one solid in its own axes.
+
+    Parameters
+    ----------
+    solid : Solid
+        What it is.
+    mesh : SolidMesh
+        Its mesh.
+    stiffness : sparse.csr_matrix
+        (3 n, 3 n) [N/m].
+    weight : (3 n, 3) float
+        Nodal forces of unit accelerations [N/(m/s^2)].
+    pressure : (3 n, m) float
+        Nodal forces of 1 N spread evenly over each contact sector, pressing the flange away from
+        the hub [-].
+    """
+
+    solid: Solid
+    mesh: SolidMesh
+    stiffness: sparse.csr_matrix
+    weight: Array
+    pressure: Array
+
+
+def wrist_parts(geometry: Geometry) -> list[Part]:
+    """List the elastic parts of a wrist in the order of `ELASTIC`.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The wrist.
+
+    Returns
+    -------
+    list of Part
+        Equal solids compare equal.
+    """
+    return [
+        _link_part(geometry, name) if name in LINKS else _bushing_part(geometry, name)
+        for name in ELASTIC
+    ]
+
+
+def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
+    """Mesh a solid and assemble its matrices.
+
+    Parameters
+    ----------
+    solid : Solid
+        What to mesh.
+    sizes : MeshSettings
+        Element sizes.
+
+    Returns
+    -------
+    ElasticBody
+        In the solid's own axes.
+    """
+    if isinstance(solid.dimensions, LinkDimensions):
+        shape = link_shape(solid.dimensions, solid.angle, sizes)
+    else:
+        shape = bushing_shape(solid.dimensions, sizes)
+    mesh = mesh_solid(shape)
+    pressure = np.zeros((len(mesh.nodes), 3, len(solid.sectors)))
+    for k, sector in enumerate(solid.sectors):
+        share = surface_integrals(mesh, sector)[:, 0]
+        away_from_hub = -1.0 if sector.startswith(FLANGES[0]) else 1.0
+        pressure[:, 2, k] = away_from_hub * share / share.sum()
+    return ElasticBody(
+        solid=solid,
+        mesh=mesh,
+        stiffness=stiffness_matrix(mesh, solid.material),
+        weight=body_force(mesh, solid.material.density),
+        pressure=pressure.reshape(3 * len(mesh.nodes), len(solid.sectors)),
+    )
+
+
+def cross_matrix(vector: Array) -> Array:
+    """Matrix of the cross product with a vector (3, 3)."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _link_part(geometry: Geometry, name: str) -> Part:
+    motor_side, platform_side = geometry.link_ends(name)
+    normal = np.cross(motor_side, platform_side)
+    sine = float(np.linalg.norm(normal))
+    # Rounded so that links that differ only in the last digits of their axes share one mesh.
+    angle = round(math.atan2(sine, float(motor_side @ platform_side)), 12)
+    normal = normal / sine
+    axes = np.column_stack([motor_side, np.cross(normal, motor_side), normal])
+    solid = Solid(geometry.links[name], angle, "motor_bore", "platform_bore", ())
+    return Part(name, solid, Placement(axes, np.zeros(3)))
+
+
+def _bushing_part(geometry: Geometry, name: str) -> Part:
+    bushing = geometry.bushings[name]
+    outwards = geometry.joint_side(name)
+    least = np.eye(3)[np.argmin(np.abs(outwards))]
+    across = least - outwards * (least @ outwards)
+    across /= np.linalg.norm(across)
+    axes = np.column_stack([across, np.cross(outwards, across), outwards])
+    gaps = {"inner": bushing.inner_gap, "outer": bushing.outer_gap}
+    shape = replace(
+        bushing,
+        radius=0.0,
+        inner_gap=None if bushing.inner_gap is None else 0.0,
+        outer_gap=None if bushing.outer_gap is None else 0.0,
+    )
+    if name in PASSIVE_JOINTS:
+        flanges = tuple(end for end in FLANGES if gaps[end] is not None)
+        solid = Solid(shape, 0.0, "pin_wall", "hub_wall", flanges)
+    else:
+        solid = Solid(shape, 0.0, "hub_wall", "pin_wall", ())
+    return Part(name, solid, Placement(axes, abs(bushing.radius) * outwards))

@@ -1,0 +1,181 @@
+"""Parametric solids of the links and bushings, with named faces.
+
+A link lies in its own axes: O at the origin, the motor-side bore on +x, the arc in the xy-plane
+towards +y.  A bushing lies in its own axes: centre of the sleeve at the origin, bore along z,
+"inner" end at -z.  Shapes are built in millimetres because the CAD kernel's tolerance is 1e-7
+units; `mesh.py` turns them back into metres.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from netgen.occ import (
+    Axes,
+    Axis,
+    Cylinder,
+    Dir,
+    Glue,
+    OCCGeometry,
+    Pnt,
+    TopoDS_Shape,
+    Vec,
+    WorkPlane,
+    X,
+    Y,
+    Z,
+)
+
+from wrist_stiffness.errors import GeometryError
+from wrist_stiffness.mechanism.geometry import BushingDimensions, LinkDimensions
+
+SECTORS = 8
+"""Contact sectors of each flange, equal in angle, counted from the bushing's x towards its y."""
+
+FLANGES = ("inner", "outer")
+"""Ends of a bushing that can carry a flange, in the order of the contact modes."""
+
+MILLIMETRES = 1e3
+"""CAD units per metre."""
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Largest element sizes [m].
+
+    Parameters
+    ----------
+    link : float
+        In the bar of a link.
+    bore : float
+        At the bore walls of a link, where the rotational terms of its flexibility converge slowest.
+    bushing : float
+        In a bushing.
+    """
+
+    link: float
+    bore: float
+    bushing: float
+
+
+def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGeometry:
+    """Solid of a link, with the faces `motor_bore` and `platform_bore`.
+
+    Parameters
+    ----------
+    link : LinkDimensions
+        The link's dimensions [m].
+    angle : float
+        Angle at O between the axes of its bores [rad], in (0, pi).
+    sizes : MeshSettings
+        Element sizes [m], stored in the shape.
+
+    Returns
+    -------
+    OCCGeometry
+        The shape, in millimetres.
+
+    Raises
+    ------
+    GeometryError
+        If the bar closes on itself or a bore is wider than the bar.
+    """
+    radius, radial, axial = (
+        MILLIMETRES * v for v in (link.arc_radius, link.section_radial, link.section_axial)
+    )
+    past_bore = link.overhang / link.arc_radius
+    if not 0.0 < angle < math.pi or angle + 2.0 * past_bore >= 2.0 * math.pi:
+        raise GeometryError(
+            f"link of {math.degrees(angle):.3f} deg with an overhang of "
+            f"{math.degrees(past_bore):.3f} deg: need an angle in (0, 180) deg and an open bar"
+        )
+    widest = max(link.motor_bore, link.platform_bore)
+    if widest >= min(link.section_axial, 2.0 * link.overhang):
+        raise GeometryError(
+            f"bore of {widest * 1e3:.3f} mm leaves no wall in a bar "
+            f"{link.section_axial * 1e3:.3f} mm wide with {link.overhang * 1e3:.3f} mm overhang"
+        )
+    corner = Pnt(radius - radial / 2.0, 0.0, -axial / 2.0)
+    section = WorkPlane(Axes(corner, n=-Y, h=X)).Rectangle(radial, axial).Face()
+    axis = Axis((0, 0, 0), Z)
+    bar = section.Revolve(axis, math.degrees(angle + 2.0 * past_bore))
+    bar = bar.Rotate(axis, -math.degrees(past_bore))
+    bores = (("motor_bore", link.motor_bore, 0.0), ("platform_bore", link.platform_bore, angle))
+    for name, diameter, place in bores:
+        outwards = Dir(math.cos(place), math.sin(place), 0.0)
+        start = radius - radial
+        foot = Pnt(start * math.cos(place), start * math.sin(place), 0.0)
+        drill = Cylinder(foot, outwards, r=MILLIMETRES * diameter / 2.0, h=2.0 * radial)
+        drill.faces.name = name
+        drill.faces.maxh = MILLIMETRES * sizes.bore
+        bar = bar - drill
+    bar.solids.maxh = MILLIMETRES * sizes.link
+    return OCCGeometry(bar)
+
+
+def bushing_shape(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometry:
+    """Solid of a flanged bushing in eight equal wedges that share their cut faces.
+
+    Faces: `pin_wall` (the whole bore, under the flanges too), `hub_wall` (the sleeve's outside
+    between the flanges) and, where there is a flange, its face towards the hub as `inner_0` ...
+    `inner_7` or `outer_0` ... `outer_7`.
+
+    Parameters
+    ----------
+    bushing : BushingDimensions
+        The bushing's dimensions [m]; its `radius` and the size of its gaps do not enter.
+    sizes : MeshSettings
+        Element sizes [m], stored in the shape.
+
+    Returns
+    -------
+    OCCGeometry
+        The shape, in millimetres.
+
+    Raises
+    ------
+    GeometryError
+        If a flange is not wider than the sleeve.
+    """
+    r_pin = MILLIMETRES * bushing.pin_diameter / 2.0
+    r_hub = r_pin + MILLIMETRES * bushing.wall
+    r_flange = MILLIMETRES * bushing.flange_diameter / 2.0
+    half = MILLIMETRES * bushing.length / 2.0
+    thickness = MILLIMETRES * bushing.flange_thickness
+    has_inner, has_outer = bushing.inner_gap is not None, bushing.outer_gap is not None
+    if (has_inner or has_outer) and r_flange <= r_hub:
+        raise GeometryError(
+            f"flange of {bushing.flange_diameter * 1e3:.3f} mm is not wider than its sleeve "
+            f"of {2e3 * r_hub / MILLIMETRES:.3f} mm"
+        )
+    # Corners (r, z) of the section, each with the name of the edge that starts there.
+    inner = [(r_flange, -half - thickness, None), (r_flange, -half, "inner")] if has_inner else []
+    outer = [(r_flange, half, None), (r_flange, half + thickness, None)] if has_outer else []
+    outline = [
+        (r_pin, -half - thickness * has_inner, None),
+        *inner,
+        (r_hub, -half, "hub_wall"),
+        (r_hub, half, "outer" if has_outer else None),
+        *outer,
+        (r_pin, half + thickness * has_outer, "pin_wall"),
+    ]
+    shape = Glue([_wedge(outline, sector) for sector in range(SECTORS)])
+    shape.solids.maxh = MILLIMETRES * sizes.bushing
+    return OCCGeometry(shape)
+
+
+def _wedge(outline: list[tuple[float, float, str | None]], sector: int) -> TopoDS_Shape:
+    """One sector of a bushing; the edges' names pass to the faces that they sweep."""
+    start = 2.0 * math.pi * sector / SECTORS
+    radially = Vec(math.cos(start), math.sin(start), 0.0)
+    section_normal = Vec(math.sin(start), -math.cos(start), 0.0)
+    drawing = WorkPlane(Axes((0, 0, 0), n=section_normal, h=radially))
+    drawing.MoveTo(*outline[0][:2])
+    for r, z, _ in outline[1:]:
+        drawing.LineTo(r, z)
+    section = drawing.Close().Face()
+    for edge, (_, _, name) in zip(section.edges, outline, strict=True):
+        if name is not None:
+            edge.name = f"{name}_{sector}" if name in FLANGES else name
+    return section.Revolve(Axis((0, 0, 0), Z), 360.0 / SECTORS)

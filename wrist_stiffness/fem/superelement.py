@@ -1,0 +1,185 @@
+"""Static condensation of one solid onto the frames at its two walls.
+
+A frame is a rigid body that holds a wall.  `rigid`: every node of the wall follows it.
+`distributing`: it is the wall's mean rigid motion (least squares over the surface), the wall may
+deform, and a wrench on the frame is spread over the surface accordingly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from wrist_stiffness.fem.elasticity import rigid_motion, surface_integrals
+from wrist_stiffness.fem.factor import factorise
+from wrist_stiffness.fem.parts import ElasticBody
+from wrist_stiffness.mechanism.components import Array
+
+Interface = Literal["rigid", "distributing"]
+INTERFACES: tuple[Interface, ...] = ("rigid", "distributing")
+
+
+@dataclass(frozen=True)
+class Superelement:
+    """A solid as its two frames see it, at its own origin in its own axes.
+
+    With w a wrench on the platform-side frame, f amounts of the inner loads (sector forces) and g
+    an acceleration, the motor-side frame held:
+
+        frame screw = flexibility @ (w + weight_platform_side @ g) + sector_screw @ f
+        work screw of sectors = sector_screw.T @ (w + weight_platform_side @ g)
+                                + sector_approach @ f + sector_weight @ g
+
+    Parameters
+    ----------
+    flexibility : (6, 6) float
+        Screw of the platform-side frame for unit wrenches [m/N, rad/N, rad/(N m)].
+    weight_motor_side, weight_platform_side : (6, 3) float
+        Consistent wrenches on the frames for unit accelerations [N/(m/s^2), N m/(m/s^2)].
+    sector_wrench : (6, m) float
+        Wrench on the hub of 1 N between each sector and the hub [N, N m].
+    sector_screw : (6, m) float
+        Screw of the platform-side frame for 1 N on each sector of the flange [m/N, rad/N].
+    sector_approach : (m, m) float
+        Mean displacement of each sector away from the hub for 1 N on each sector [m/N].
+    sector_weight : (m, 3) float
+        The same for unit accelerations with both frames held [m/(m/s^2)].
+    """
+
+    flexibility: Array
+    weight_motor_side: Array
+    weight_platform_side: Array
+    sector_wrench: Array
+    sector_screw: Array
+    sector_approach: Array
+    sector_weight: Array
+
+
+def condense(body: ElasticBody, interface: Interface) -> Superelement:
+    """Condense a solid onto its two frames.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        The solid's matrices.
+    interface : {"rigid", "distributing"}
+        How the walls follow the frames.
+
+    Returns
+    -------
+    Superelement
+        At the solid's own origin.
+    """
+    loads = np.hstack([body.weight, body.pressure])
+    solve = _condense_rigid if interface == "rigid" else _condense_distributing
+    flexibility, on_motor, on_platform, inner = solve(body, loads)
+    sector_screw = flexibility @ on_platform[:, 3:]
+    return Superelement(
+        flexibility=flexibility,
+        weight_motor_side=on_motor[:, :3],
+        weight_platform_side=on_platform[:, :3],
+        sector_wrench=-rigid_motion(body.mesh.nodes).T @ body.pressure,
+        sector_screw=sector_screw,
+        sector_approach=_symmetric(inner[3:, 3:] + on_platform[:, 3:].T @ sector_screw),
+        sector_weight=inner[3:, :3],
+    )
+
+
+def frame_stiffness(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array]:
+    """Guyan condensation onto the motor-side and the platform-side rigid frame.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        The solid's matrices.
+    loads : (3 n, k) float
+        Nodal forces.
+
+    Returns
+    -------
+    stiffness : (12, 12) float
+        Of the two frames, motor side first.
+    on_frames : (12, k) float
+        Wrenches on the frames that do the loads' work.
+    inner : (k, k) float
+        Work of each load along each load's displacements with both frames held.
+    """
+    nodes = body.mesh.nodes
+    motion = np.zeros((3 * len(nodes), 12))
+    held = np.zeros(3 * len(nodes), dtype=bool)
+    for side, wall in enumerate((body.solid.motor_wall, body.solid.platform_wall)):
+        on_wall = body.mesh.surface_nodes(wall)
+        unknowns = (3 * on_wall[:, None] + np.arange(3)).ravel()
+        motion[unknowns, 6 * side : 6 * side + 6] = rigid_motion(nodes[on_wall])
+        held[unknowns] = True
+    free = np.flatnonzero(~held)
+    pull = body.stiffness @ motion
+    inner_stiffness = factorise(body.stiffness[free][:, free], free)
+    solution = inner_stiffness.solve(np.hstack([pull, loads])[free])
+    by_frames, by_loads = solution[:, :12], solution[:, 12:]
+    stiffness = _symmetric(motion.T @ pull - pull[free].T @ by_frames)
+    on_frames = motion.T @ loads - pull[free].T @ by_loads
+    return stiffness, on_frames, _symmetric(loads[free].T @ by_loads)
+
+
+def _condense_rigid(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:
+    stiffness, on_frames, inner = frame_stiffness(body, loads)
+    flexibility = _symmetric(np.linalg.inv(stiffness[6:, 6:]))
+    return flexibility, on_frames[:6], on_frames[6:], inner
+
+
+def _condense_distributing(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:
+    """Held by its averaged motor-side frame, a solid is supported statically determinately."""
+    nodes = body.mesh.nodes
+    rigid = rigid_motion(nodes)
+    motor = _wall_average(body, body.solid.motor_wall)
+    platform = _wall_average(body, body.solid.platform_wall)
+    all_loads = np.hstack([platform, loads])
+    balanced = all_loads - motor @ (rigid.T @ all_loads)
+    # Balanced loads need no support: any six unknowns that stop the rigid motion will do.
+    fixed = _determinate_support(nodes)
+    free = np.setdiff1d(np.arange(3 * len(nodes)), fixed)
+    displacement = np.zeros_like(all_loads)
+    displacement[free] = factorise(body.stiffness[free][:, free], free).solve(balanced[free])
+    displacement -= rigid @ (motor.T @ displacement)
+    work = _symmetric(balanced.T @ displacement)
+    flexibility = work[:6, :6]
+    on_platform = np.linalg.solve(flexibility, work[:6, 6:])
+    inner = work[6:, 6:] - on_platform.T @ flexibility @ on_platform
+    return flexibility, rigid.T @ loads - on_platform, on_platform, inner
+
+
+def _wall_average(body: ElasticBody, wall: str) -> Array:
+    """Nodal forces of the frame's unit wrenches (3 n, 6); its transpose gives the mean screw."""
+    integrals = surface_integrals(body.mesh, wall)
+    # A screw's displacement field is linear in the place, so these four integrals span it.
+    moments = np.zeros((len(integrals), 3, 6))
+    moments[:, [0, 1, 2], [0, 1, 2]] = integrals[:, :1]
+    x, y, z = integrals[:, 1:].T
+    moments[:, 1, 3], moments[:, 2, 3] = -z, y
+    moments[:, 0, 4], moments[:, 2, 4] = z, -x
+    moments[:, 0, 5], moments[:, 1, 5] = -y, x
+    spread = moments.reshape(-1, 6)
+    gram = rigid_motion(body.mesh.nodes).T @ spread
+    return spread @ np.linalg.inv(gram)
+
+
+def _determinate_support(nodes: Array) -> Array:
+    """Six unknowns at three far nodes whose removal stops every rigid motion."""
+    first = int(np.argmin(nodes.sum(axis=1)))
+    second = int(np.argmax(np.linalg.norm(nodes - nodes[first], axis=1)))
+    along = nodes[second] - nodes[first]
+    third = int(np.argmax(np.linalg.norm(np.cross(nodes - nodes[first], along), axis=1)))
+    candidates = np.array([3 * n + a for n in (first, second, third) for a in range(3)])
+    motion = rigid_motion(nodes[[first, second, third]])
+    chosen: list[int] = []
+    for row in range(9):
+        if np.linalg.matrix_rank(motion[[*chosen, row]], tol=1e-9) > len(chosen):
+            chosen.append(row)
+    return candidates[chosen]
+
+
+def _symmetric(matrix: Array) -> Array:
+    return (matrix + matrix.T) / 2.0

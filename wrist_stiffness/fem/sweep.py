@@ -1,0 +1,239 @@
+"""The offline sweep: from a geometry to its lookup table with stated errors.
+
+The parts are condensed once by solid FEM; a pose then costs microseconds, so the grid is refined
+until poses that the splines never saw agree with the closed form to the tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness import __version__
+from wrist_stiffness.errors import TableError
+from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
+from wrist_stiffness.fem.solids import MeshSettings
+from wrist_stiffness.fem.superelement import Interface
+from wrist_stiffness.lookup.biharmonic import Kernel
+from wrist_stiffness.lookup.operators import pack
+from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
+from wrist_stiffness.mechanism.statics import compliance, contact_operators
+from wrist_stiffness.mechanism.workspace import Workspace
+
+GRIDS = (5, 9, 13, 17, 21, 25, 31, 37)
+"""Points along each motor angle that are tried until the tolerance is met."""
+
+DOMAIN_FACTOR = 4.0
+"""The whole map may err by this times the tolerance of the operative workspace."""
+
+UNSEEN_POSES = 400
+UNSEEN_SEED = 20150226
+
+COARSENING = 1.5
+"""Element size of the second mesh, from which the first one's error is estimated."""
+
+MESH_ORDER = 1.5
+"""Order assumed for that estimate: less than the smooth solution's, for the edges' singularities."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class BuildSettings:
+    """How a table is built.
+
+    Parameters
+    ----------
+    sizes : MeshSettings
+        Element sizes [m].
+    interface : str
+        Interface model of the condensation.
+    evaluation : str
+        What the nodes shall use.
+    kernel : str
+        Kernel of the splines.
+    tolerance : float
+        Largest relative error of the interpolated s and phi in the operative workspace.
+    per_axis : int or None
+        Fixed number of grid points along each angle; None refines until the tolerance is met.
+    """
+
+    sizes: MeshSettings = SHIPPED_SIZES
+    interface: Interface = "rigid"
+    evaluation: Evaluation = "closed_form"
+    kernel: Kernel = "thin_plate"
+    tolerance: float = 0.005
+    per_axis: int | None = None
+
+
+def build_table(
+    values: Mapping[str, Any], settings: BuildSettings, progress: Progress = lambda done, of: None
+) -> Table:
+    """Run the sweep.
+
+    Parameters
+    ----------
+    values : mapping
+        As a geometry file reads.
+    settings : BuildSettings
+        Mesh, interface, grid.
+    progress : callable
+        Called with steps done and in all.
+
+    Returns
+    -------
+    Table
+        With its stated errors in the header; not yet written.
+
+    Raises
+    ------
+    GeometryError
+        If the geometry is wrong.
+    TableError
+        If no grid meets the tolerance.
+    """
+    geometry = geometry_from_values(values)
+    parts_done = 0
+
+    def part_done(done: int, of: int, name: str) -> None:
+        progress(parts_done + done, 2 * of + 1)
+
+    components, provenance = elastic_components(
+        geometry, settings.sizes, settings.interface, part_done
+    )
+    parts_done = len(provenance.nodes)
+    coarse_sizes = MeshSettings(**{k: COARSENING * v for k, v in asdict(settings.sizes).items()})
+    coarse, _ = elastic_components(geometry, coarse_sizes, settings.interface, part_done)
+    mesh_error = _mesh_error(geometry, components, coarse)
+
+    header = TableHeader(
+        geometry=dict(values),
+        interface=settings.interface,
+        evaluation=settings.evaluation,
+        kernel=settings.kernel,
+        per_axis=0,
+        mesh={
+            "sizes_mm": {key: round(1e3 * v, 9) for key, v in asdict(settings.sizes).items()},
+            "nodes": provenance.nodes,
+            "elements": provenance.elements,
+        },
+        versions={"wrist_stiffness": __version__, **provenance.packages},
+        errors={},
+    )
+    for per_axis in (settings.per_axis,) if settings.per_axis else GRIDS:
+        table = _on_grid(replace(header, per_axis=per_axis), components, geometry)
+        errors = interpolation_errors(table)
+        if settings.per_axis or _meets(errors, settings.tolerance):
+            break
+    else:
+        raise TableError(
+            f"no grid up to {GRIDS[-1]} x {GRIDS[-1]} meets the tolerance {settings.tolerance:g}: "
+            f"s and phi still err by {_worst(errors, 'operative'):.3g} in the operative workspace"
+        )
+    stated = mesh_error + (_worst(errors, "operative") if settings.evaluation == "spline" else 0.0)
+    progress(2 * parts_done + 1, 2 * parts_done + 1)
+    return replace(
+        table,
+        header=replace(
+            table.header,
+            errors={"stated_relative": stated, "mesh_relative": mesh_error, **errors},
+        ),
+    )
+
+
+def _on_grid(header: TableHeader, components: ElasticComponents, geometry: Geometry) -> Table:
+    mechanism = mechanism_of(geometry)
+    nodes = Workspace(mechanism, geometry.limits).grid(header.per_axis)
+    configuration = mechanism.forward(nodes)
+    return Table(
+        header=header,
+        components=components,
+        nodes=nodes,
+        operators=pack(contact_operators(configuration, components, geometry.gravity)),
+        map_values=rated_map(
+            configuration, contact_operators(configuration, components, np.zeros(3)), geometry
+        ),
+    )
+
+
+def unseen_poses(workspace: Workspace, count: int = UNSEEN_POSES) -> Array:
+    """Return random poses in the map domain that no grid contains, (count, 2) [rad]."""
+    rng = np.random.default_rng(UNSEEN_SEED)
+    lower, upper = workspace.rectangle
+    poses = rng.uniform(lower, upper, (4 * count, 2))
+    return poses[workspace.domain(poses)][:count]
+
+
+def interpolation_errors(table: Table) -> dict[str, Any]:
+    """Compare the table's splines with the closed form at poses they never saw.
+
+    Parameters
+    ----------
+    table : Table
+        With its grid.
+
+    Returns
+    -------
+    dict
+        Largest error relative to the local value, by region and quantity: `predicted` through the
+        spline of the operators with contact solved, `map` through the spline of s and phi itself
+        (the paper's way), and the leave-one-out error of the map.
+    """
+    workspace = table.workspace
+    poses = unseen_poses(workspace)
+    configuration = table.mechanism.forward(poses)
+    # Columns 3 and 4 of the map are |s| and phi.
+    exact = rated_map(
+        configuration, table.operators_at(configuration, "closed_form"), table.geometry
+    )[:, 3:]
+    predicted = rated_map(
+        configuration, table.operators_at(configuration, "spline"), table.geometry
+    )[:, 3:]
+    load_only = rated_map(
+        configuration,
+        contact_operators(configuration, table.components, np.zeros(3)),
+        table.geometry,
+    )[:, 3:]
+    mapped = table.map_spline(poses)[:, 3:]
+    operative = workspace.operative(poses)
+    leave_one_out = np.abs(table.map_spline.leave_one_out()[:, 3:]) / table.map_values[:, 3:]
+    inside = workspace.operative(table.nodes)
+    return {
+        "unseen_poses": len(poses),
+        "predicted": _by_region(np.abs(predicted - exact) / exact, operative),
+        "map": _by_region(np.abs(mapped - load_only) / load_only, operative),
+        "leave_one_out": _by_region(leave_one_out, inside),
+    }
+
+
+def _by_region(relative: Array, operative: np.ndarray) -> dict[str, dict[str, float]]:
+    return {
+        region: {name: float(np.max(rows[:, i])) for i, name in enumerate(("s", "phi"))}
+        for region, rows in (("operative", relative[operative]), ("domain", relative))
+    }
+
+
+def _worst(errors: Mapping[str, Any], region: str) -> float:
+    return max(errors["predicted"][region].values())
+
+
+def _meets(errors: Mapping[str, Any], tolerance: float) -> bool:
+    return (
+        _worst(errors, "operative") <= tolerance
+        and _worst(errors, "domain") <= DOMAIN_FACTOR * tolerance
+    )
+
+
+def _mesh_error(geometry: Geometry, fine: ElasticComponents, coarse: ElasticComponents) -> float:
+    """Estimate the relative error of C by the mesh, in the energy of unit loads at home."""
+    home = mechanism_of(geometry).forward(np.zeros(2))
+    values = [np.diagonal(compliance(home, parts)) for parts in (fine, coarse)]
+    step = float(np.max(np.abs(values[0] - values[1]) / values[0]))
+    return step / (COARSENING**MESH_ORDER - 1.0)
