@@ -1,15 +1,14 @@
-"""Convert in: motor angles by name, wrenches from any sensor frame to O, loads matched by stamp."""
+"""Convert in: motor angles by name, wrenches from any sensor frame to O."""
 
 from __future__ import annotations
 
-import bisect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from wrist_stiffness.errors import FrameError, InputError, StaleLoadError
+from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.error_model import Load
@@ -17,8 +16,6 @@ from wrist_stiffness.model.error_model import Load
 BASE_FRAME = "wrist_base"
 PLATFORM_FRAME = "wrist_platform"
 CORRECTED_FRAME = "wrist_corrected"
-
-NANOSECONDS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -150,91 +147,3 @@ class Frames:
         turned_force = sign * (frame.rotation @ wrench[:3])
         turned_moment = sign * (frame.rotation @ wrench[3:]) + cross(frame.position, turned_force)
         return Load(np.concatenate([turned_force, turned_moment]), frame.parent == PLATFORM_FRAME)
-
-
-class LoadHistory:
-    """Loads by stamp: to a joint state belongs the newest load that is not younger.
-
-    Stamps alone decide, never arrival, so live nodes and replay agree wherever the load had
-    arrived.  Loads are held up to an age limit and never extrapolated.
-
-    Parameters
-    ----------
-    age_limit_s : float
-        Oldest load that is still used [s].
-    """
-
-    CAPACITY = 4096
-
-    def __init__(self, age_limit_s: float) -> None:
-        self._age_limit_ns = round(age_limit_s * NANOSECONDS)
-        self._stamps: list[int] = []
-        self._loads: list[Load] = []
-
-    def add(self, stamp_ns: int, load: Load) -> None:
-        """Keep a load; one with the same stamp is replaced, one out of order finds its place."""
-        place = bisect.bisect_left(self._stamps, stamp_ns)
-        if place < len(self._stamps) and self._stamps[place] == stamp_ns:
-            self._loads[place] = load
-            return
-        self._stamps.insert(place, stamp_ns)
-        self._loads.insert(place, load)
-        if len(self._stamps) > self.CAPACITY:
-            del self._stamps[0], self._loads[0]
-
-    def at(self, stamp_ns: int) -> tuple[int, Load]:
-        """Return stamp and load that belong to a joint state.
-
-        Parameters
-        ----------
-        stamp_ns : int
-            Stamp of the joint state [ns].
-
-        Returns
-        -------
-        int, Load
-            Stamp [ns] and load.
-
-        Raises
-        ------
-        StaleLoadError
-            If there is none, or it is older than the age limit.
-        """
-        place = bisect.bisect_right(self._stamps, stamp_ns) - 1
-        if place < 0:
-            raise StaleLoadError("no load estimate with a stamp before the joint state")
-        age = stamp_ns - self._stamps[place]
-        if age > self._age_limit_ns:
-            raise StaleLoadError(
-                f"newest load estimate is {age / NANOSECONDS:.3f} s older than the joint state "
-                f"(limit {self._age_limit_ns / NANOSECONDS:g} s)"
-            )
-        return self._stamps[place], self._loads[place]
-
-    def mean_since(self, window_s: float) -> Load:
-        """Return the mean of the newest loads over a window, for the tare.
-
-        Parameters
-        ----------
-        window_s : float
-            Up to the newest stamp [s].
-
-        Returns
-        -------
-        Load
-            In the frame in which they came.
-
-        Raises
-        ------
-        StaleLoadError
-            If there is no load.
-        InputError
-            If loads in F and in U are mixed.
-        """
-        if not self._stamps:
-            raise StaleLoadError("tare: no load estimate has arrived")
-        start = bisect.bisect_left(self._stamps, self._stamps[-1] - round(window_s * NANOSECONDS))
-        loads = self._loads[start:]
-        if len({load.on_platform for load in loads}) > 1:
-            raise InputError("tare: loads in wrist_base and in wrist_platform are mixed")
-        return Load(np.mean([load.wrench for load in loads], axis=0), loads[0].on_platform)

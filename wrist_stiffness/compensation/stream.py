@@ -6,77 +6,41 @@ A shell converts a message into numbers, calls one of these methods and converts
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from wrist_stiffness.compensation.correction import Correction, correct
-from wrist_stiffness.compensation.intake import (
-    CORRECTED_FRAME,
-    Frames,
-    LoadHistory,
-    MotorNames,
-)
-from wrist_stiffness.compensation.objective import Objective, ObjectiveName
+from wrist_stiffness.compensation.intake import CORRECTED_FRAME
+from wrist_stiffness.compensation.load_history import LoadIntake
+from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
-TARE_WINDOW_S = 1.0
 
+class _Stream:
+    def __init__(self, model: ErrorModel | None, settings: StreamSettings) -> None:
+        self.model = model
+        self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)
+        self._settings = settings
 
-@dataclass(frozen=True)
-class StreamSettings:
-    """What nodes and replay can be told, the same for both.
+    @property
+    def settings(self) -> StreamSettings:
+        """Names, frames, limits; may be replaced between samples."""
+        return self._settings
 
-    Parameters
-    ----------
-    motors : MotorNames
-        Joint names of the motors.
-    frames : Frames
-        Frames in which loads arrive.
-    load_age_limit_s : float
-        Oldest load that is still used [s].
-    objective : str
-        What the correction makes right.
-    correction_limit : float
-        Largest correction of a motor angle [rad].
-    """
+    @settings.setter
+    def settings(self, settings: StreamSettings) -> None:
+        self._settings = settings
+        self.loads.frames = settings.frames
+        self.loads.history.age_limit_s = settings.load_age_limit_s
 
-    motors: MotorNames = field(default_factory=MotorNames)
-    frames: Frames = field(default_factory=Frames)
-    load_age_limit_s: float = 0.5
-    objective: ObjectiveName = "pointing"
-    correction_limit: float = float(np.radians(0.5))
-
-
-class LoadIntake:
-    """Loads as they arrive, moved to O, less the tare."""
-
-    def __init__(self, settings: StreamSettings) -> None:
-        self._frames = settings.frames
-        self._history = LoadHistory(settings.load_age_limit_s)
-        self._tare: Load | None = None
-
-    def add(
-        self, stamp_ns: int, frame_id: str, force: Sequence[float], moment: Sequence[float]
-    ) -> None:
-        """Take in a wrench message (see `Frames.load` for its errors)."""
-        self._history.add(stamp_ns, self._frames.load(frame_id, force, moment))
-
-    def tare(self) -> Load:
-        """Make the mean of the last second the new zero and return it."""
-        self._tare = self._history.mean_since(TARE_WINDOW_S)
-        return self._tare
-
-    def at(self, stamp_ns: int) -> tuple[int, Load]:
-        """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`)."""
-        load_stamp_ns, load = self._history.at(stamp_ns)
-        if self._tare is None:
-            return load_stamp_ns, load
-        if self._tare.on_platform != load.on_platform:
-            raise InputError("load: the tare was taken in another frame than this load")
-        return load_stamp_ns, Load(load.wrench - self._tare.wrench, load.on_platform)
+    def _loaded_model(self) -> ErrorModel:
+        if self.model is None:
+            raise InputError("no model is loaded")
+        return self.model
 
 
 @dataclass(frozen=True)
@@ -96,21 +60,16 @@ class PredictedSample:
     prediction: Prediction
 
 
-class PredictionStream:
+class PredictionStream(_Stream):
     """Pose error for every joint state.
 
     Parameters
     ----------
-    model : ErrorModel
-        May be replaced between samples.
+    model : ErrorModel or None
+        May be replaced between samples; without one nothing is predicted.
     settings : StreamSettings
         Names, frames, limits.
     """
-
-    def __init__(self, model: ErrorModel, settings: StreamSettings) -> None:
-        self.model = model
-        self.loads = LoadIntake(settings)
-        self._settings = settings
 
     def on_joint_state(
         self, stamp_ns: int, names: Sequence[str], positions: Sequence[float]
@@ -134,9 +93,9 @@ class PredictionStream:
         WristError
             If the sample, the pose or the load cannot be used: nothing is to be published.
         """
-        theta = self._settings.motors.angles(names, positions)
+        theta = self.settings.motors.angles(names, positions)
         load_stamp_ns, load = self.loads.at(stamp_ns)
-        return PredictedSample(stamp_ns, load_stamp_ns, self.model.predict(theta, load))
+        return PredictedSample(stamp_ns, load_stamp_ns, self._loaded_model().predict(theta, load))
 
 
 @dataclass(frozen=True)
@@ -145,6 +104,8 @@ class CorrectedCommand:
 
     Parameters
     ----------
+    frame_id : str
+        For the header: `wrist_corrected` where correction is on.
     positions : (n,) float
         All joints of the command, the motors corrected [rad].
     theta : (2,) float
@@ -157,6 +118,7 @@ class CorrectedCommand:
         Why it passes unchanged although correction is on.
     """
 
+    frame_id: str
     positions: Array
     theta: Array
     delta: Array
@@ -164,24 +126,41 @@ class CorrectedCommand:
     fault: WristError | None
 
 
-class CorrectionStream:
+@dataclass(frozen=True)
+class CorrectedTrajectory:
+    """What to send for a whole trajectory.
+
+    Parameters
+    ----------
+    frame_id : str
+        For the header: `wrist_corrected` where correction is on.
+    positions : (m, n) float
+        Of all points and joints [rad].
+    fault : WristError or None
+        Why it passes unchanged although correction is on.
+    """
+
+    frame_id: str
+    positions: Array
+    fault: WristError | None
+
+
+class CorrectionStream(_Stream):
     """Corrected motor angles for every command; never worse than no correction.
 
     Parameters
     ----------
-    model : ErrorModel
-        May be replaced between samples.
+    model : ErrorModel or None
+        May be replaced between samples; without one commands pass unchanged.
     settings : StreamSettings
         Names, frames, objective, limits.
     enabled : bool
         Whether commands are corrected; else they pass unchanged.
     """
 
-    def __init__(self, model: ErrorModel, settings: StreamSettings, enabled: bool) -> None:
-        self.model = model
-        self.loads = LoadIntake(settings)
+    def __init__(self, model: ErrorModel | None, settings: StreamSettings, enabled: bool) -> None:
+        super().__init__(model, settings)
         self.enabled = enabled
-        self._settings = settings
 
     def on_command(
         self, stamp_ns: int, frame_id: str, names: Sequence[str], positions: Sequence[float]
@@ -207,34 +186,82 @@ class CorrectionStream:
         InputError
             If a motor is missing or an angle is not finite: such a command is not to be forwarded.
         """
-        theta = self._settings.motors.angles(names, positions)
+        theta = self._motor_angles(names, positions)
         sent = np.array(positions, dtype=float)
-        if not np.all(np.isfinite(sent)):
-            raise InputError(f"command: position {sent.tolist()} is not finite")
-        unchanged = CorrectedCommand(sent, theta, np.zeros(2), None, None)
         if not self.enabled:
-            return unchanged
+            return CorrectedCommand(frame_id, sent, theta, np.zeros(2), None, None)
         try:
-            correction = self._correction(stamp_ns, frame_id, theta)
+            correction = self._correction(self._load(stamp_ns, frame_id), theta)
         except WristError as error:
-            return CorrectedCommand(sent, theta, np.zeros(2), None, error)
-        corrected = sent.copy()
-        corrected[list(self._settings.motors.places(names))] = theta + correction.delta
+            return CorrectedCommand(CORRECTED_FRAME, sent, theta, np.zeros(2), None, error)
+        corrected = theta + correction.delta
+        sent[list(self.settings.motors.places(names))] = corrected
         return CorrectedCommand(
-            corrected, theta + correction.delta, correction.delta, correction, None
+            CORRECTED_FRAME, sent, corrected, correction.delta, correction, None
         )
 
-    def _correction(self, stamp_ns: int, frame_id: str, theta: Array) -> Correction:
+    def on_trajectory(
+        self,
+        stamp_ns: int,
+        frame_id: str,
+        names: Sequence[str],
+        points: Sequence[Sequence[float]],
+    ) -> CorrectedTrajectory:
+        """Correct every point of a trajectory under the load at its start.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Its start [ns].
+        frame_id : str
+            Its header's frame.
+        names : sequence of str
+            Joint names.
+        points : sequence of sequences
+            Positions of every point [rad].
+
+        Returns
+        -------
+        CorrectedTrajectory
+            Unchanged as a whole, with the fault, if one point cannot be corrected.
+
+        Raises
+        ------
+        InputError
+            If a motor is missing or an angle is not finite: it is not to be forwarded.
+        """
+        angles = [self._motor_angles(names, positions) for positions in points]
+        sent = np.array(points, dtype=float).reshape(len(points), len(names))
+        if not self.enabled:
+            return CorrectedTrajectory(frame_id, sent, None)
+        try:
+            load = self._load(stamp_ns, frame_id)
+            deltas = [self._correction(load, theta).delta for theta in angles]
+        except WristError as error:
+            return CorrectedTrajectory(CORRECTED_FRAME, sent, error)
+        sent[:, list(self.settings.motors.places(names))] += np.reshape(deltas, (-1, 2))
+        return CorrectedTrajectory(CORRECTED_FRAME, sent, None)
+
+    def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
+        theta = self.settings.motors.angles(names, positions)
+        if not np.all(np.isfinite(positions)):
+            raise InputError(f"command: position {list(positions)} is not finite")
+        return theta
+
+    def _load(self, stamp_ns: int, frame_id: str) -> Load:
         if frame_id == CORRECTED_FRAME:
             raise InputError("command is marked 'wrist_corrected': passed on unchanged, not twice")
-        _, load = self.loads.at(stamp_ns)
-        platform = self.model.table.geometry.platform
-        objective = Objective(self._settings.objective, platform.normal, platform.tool_point)
-        correction = correct(self.model, theta, load, objective)
+        return self.loads.at(stamp_ns)[1]
+
+    def _correction(self, load: Load, theta: Array) -> Correction:
+        model = self._loaded_model()
+        platform = model.table.geometry.platform
+        objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
+        correction = correct(model, theta, load, objective)
         largest = float(np.max(np.abs(correction.delta)))
-        if largest > self._settings.correction_limit:
+        if largest > self.settings.correction_limit:
             raise InputError(
                 f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
-                f"{np.degrees(self._settings.correction_limit):g} deg"
+                f"{np.degrees(self.settings.correction_limit):g} deg"
             )
         return correction

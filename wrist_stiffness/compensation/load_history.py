@@ -1,0 +1,189 @@
+"""Which load belongs to a joint state: by stamps, held up to an age limit, less the tare."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Sequence
+
+import numpy as np
+
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.errors import InputError, StaleLoadError
+from wrist_stiffness.model.error_model import Load
+
+NANOSECONDS = 1_000_000_000
+
+TARE_WINDOW_S = 1.0
+
+
+class LoadHistory:
+    """Loads by stamp: to a joint state belongs the newest load that is not younger.
+
+    Stamps alone decide, never arrival, so live nodes and replay agree wherever the load had
+    arrived.  Loads are held up to an age limit and never extrapolated.
+
+    Parameters
+    ----------
+    age_limit_s : float
+        Oldest load that is still used [s]; may be changed.
+
+    Attributes
+    ----------
+    late : int
+        Loads that arrived after a joint state had been served that they belonged to: where live
+        and replayed predictions may differ.
+    """
+
+    CAPACITY = 4096
+
+    def __init__(self, age_limit_s: float) -> None:
+        self.age_limit_s = age_limit_s
+        self.late = 0
+        self._served_ns = (0, 0)
+        self._stamps: list[int] = []
+        self._loads: list[Load] = []
+
+    def __len__(self) -> int:
+        """Return how many loads are kept."""
+        return len(self._stamps)
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Newest stamp [ns], None where no load has arrived."""
+        return self._stamps[-1] if self._stamps else None
+
+    def add(self, stamp_ns: int, load: Load) -> None:
+        """Keep a load; one with the same stamp is replaced, one out of order finds its place.
+
+        A stamp that is older than the newest one by more than the age limit says that the clock
+        jumped back: the history begins anew.
+        """
+        if self._stamps and stamp_ns < self._stamps[-1] - self._age_limit_ns:
+            self._stamps, self._loads, self._served_ns = [], [], (0, 0)
+        load_served_ns, served_ns = self._served_ns
+        if load_served_ns < stamp_ns <= served_ns:
+            self.late += 1
+        place = bisect.bisect_left(self._stamps, stamp_ns)
+        if place < len(self._stamps) and self._stamps[place] == stamp_ns:
+            self._loads[place] = load
+            return
+        self._stamps.insert(place, stamp_ns)
+        self._loads.insert(place, load)
+        if len(self._stamps) > self.CAPACITY:
+            del self._stamps[0], self._loads[0]
+
+    def at(self, stamp_ns: int) -> tuple[int, Load]:
+        """Return stamp and load that belong to a joint state.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the joint state [ns].
+
+        Returns
+        -------
+        int, Load
+            Stamp [ns] and load.
+
+        Raises
+        ------
+        StaleLoadError
+            If there is none, or it is older than the age limit.
+        """
+        place = bisect.bisect_right(self._stamps, stamp_ns) - 1
+        if place < 0:
+            raise StaleLoadError("no load estimate with a stamp before the joint state")
+        age = stamp_ns - self._stamps[place]
+        if age > self._age_limit_ns:
+            raise StaleLoadError(
+                f"newest load estimate is {age / NANOSECONDS:.3f} s older than the joint state "
+                f"(limit {self.age_limit_s:g} s)"
+            )
+        self._served_ns = (self._stamps[place], max(stamp_ns, self._served_ns[1]))
+        return self._stamps[place], self._loads[place]
+
+    def mean_since(self, window_s: float) -> Load:
+        """Return the mean of the newest loads over a window, for the tare.
+
+        Parameters
+        ----------
+        window_s : float
+            Up to the newest stamp [s].
+
+        Returns
+        -------
+        Load
+            In the frame in which they came.
+
+        Raises
+        ------
+        StaleLoadError
+            If there is no load.
+        InputError
+            If loads in F and in U are mixed.
+        """
+        if not self._stamps:
+            raise StaleLoadError("tare: no load estimate has arrived")
+        start = bisect.bisect_left(self._stamps, self._stamps[-1] - round(window_s * NANOSECONDS))
+        loads = self._loads[start:]
+        if len({load.on_platform for load in loads}) > 1:
+            raise InputError("tare: loads in wrist_base and in wrist_platform are mixed")
+        return Load(np.mean([load.wrench for load in loads], axis=0), loads[0].on_platform)
+
+    @property
+    def _age_limit_ns(self) -> int:
+        return round(self.age_limit_s * NANOSECONDS)
+
+
+class LoadIntake:
+    """Loads as they arrive, moved to O, less the tare.
+
+    Parameters
+    ----------
+    frames : Frames
+        Frames in which loads arrive; may be changed.
+    age_limit_s : float
+        Oldest load that is still used [s].
+
+    Attributes
+    ----------
+    history : LoadHistory
+        Untared loads by stamp.
+    """
+
+    def __init__(self, frames: Frames, age_limit_s: float) -> None:
+        self.frames = frames
+        self.history = LoadHistory(age_limit_s)
+        self._tare: Load | None = None
+
+    def add(
+        self, stamp_ns: int, frame_id: str, force: Sequence[float], moment: Sequence[float]
+    ) -> None:
+        """Take in a wrench message (see `Frames.load` for its errors)."""
+        self.history.add(stamp_ns, self.frames.load(frame_id, force, moment))
+
+    def tare(self) -> Load:
+        """Make the mean of the last second the new zero and return it.
+
+        Raises
+        ------
+        InputError
+            If no load has arrived or loads in F and in U are mixed.
+        """
+        self._tare = self.history.mean_since(TARE_WINDOW_S)
+        return self._tare
+
+    def at(self, stamp_ns: int) -> tuple[int, Load]:
+        """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`).
+
+        Raises
+        ------
+        InputError
+            If there is none that is young enough, or the tare was taken in another frame.
+        """
+        load_stamp_ns, load = self.history.at(stamp_ns)
+        if self._tare is None:
+            return load_stamp_ns, load
+        if self._tare.on_platform != load.on_platform:
+            raise InputError("load: the tare was taken in another frame than this load")
+        return load_stamp_ns, Load(load.wrench - self._tare.wrench, load.on_platform)

@@ -1,0 +1,47 @@
+"""Convert out: a twist as position and quaternion, the same numbers in nodes and in replay."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.mechanism.vectors import cross
+
+
+def pose_of_twist(twist: Array) -> tuple[Array, Array]:
+    """Return the rigid motion of a twist as messages carry it.
+
+    Parameters
+    ----------
+    twist : (6,) float
+        (translation; rotation) at O in F [m, rad].
+
+    Returns
+    -------
+    position : (3,) float
+        Where the point at O goes [m].
+    quaternion : (4,) float
+        Rotation, x y z w with w >= 0.
+    """
+    quaternion = Rotation.from_rotvec(twist[3:]).as_quat(canonical=True)
+    return exp_twist(twist)[1], quaternion
+
+
+def twist_at(twist: Array, point: Array) -> Array:
+    """Return the twist of the same motion seen at another point.
+
+    Parameters
+    ----------
+    twist : (6,) float
+        At O in F, first order [m, rad].
+    point : (3,) float
+        In F [m].
+
+    Returns
+    -------
+    (6,) float
+        At the point.
+    """
+    return np.concatenate([twist[:3] + cross(twist[3:], point), twist[3:]])

@@ -1,0 +1,135 @@
+"""Node `angle_corrector`: motor commands corrected for the predicted error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool
+from trajectory_msgs.msg import JointTrajectory
+
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import CorrectionStream
+from wrist_stiffness.errors import WristError
+from wrist_stiffness.ros.conversions import error_message, nanoseconds
+from wrist_stiffness.ros.qos import RELIABLE_QOS
+from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.settings import CORRECTION
+from wrist_stiffness.ros.wrist_node import WristNode
+
+
+class AngleCorrector(WristNode):
+    """Forwards commands, corrected where that is safe, unchanged where it is not.
+
+    A command that is not finite or lacks a motor is not forwarded.
+    """
+
+    stream: CorrectionStream
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("angle_corrector", CORRECTION, **options)
+        self.create_service(SetBool, "~/enable", self._on_enable)
+        self.autostart()
+
+    def make_stream(self, settings: StreamSettings) -> CorrectionStream:
+        """Return the correction stream."""
+        return CorrectionStream(None, settings, self.get_parameter("enabled_on_start").value)
+
+    def facts(self) -> dict[str, str]:
+        """Return whether commands are corrected."""
+        return {"enabled": str(self.stream.enabled).lower()}
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the outputs and load the model."""
+        self._command = self.create_lifecycle_publisher(
+            JointState, "/motor_commands_corrected", RELIABLE_QOS
+        )
+        self._positions = self.create_lifecycle_publisher(
+            Float64MultiArray, "/motor_positions_corrected", RELIABLE_QOS
+        )
+        self._trajectory = self.create_lifecycle_publisher(
+            JointTrajectory, "/motor_trajectory_corrected", RELIABLE_QOS
+        )
+        self._residual = self.create_lifecycle_publisher(
+            PoseWithCovarianceStamped, "/pose_error_residual", RELIABLE_QOS
+        )
+        return super().on_configure(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Remove the outputs."""
+        for publisher in (self._command, self._positions, self._trajectory, self._residual):
+            self.destroy_lifecycle_publisher(publisher)
+        return super().on_cleanup(state)
+
+    def make_inputs(self) -> list[Subscription]:
+        """Listen to commands."""
+        return [
+            self.create_subscription(JointState, "/motor_commands", self._on_command, RELIABLE_QOS),
+            self.create_subscription(
+                JointTrajectory, "/motor_trajectory", self._on_trajectory, RELIABLE_QOS
+            ),
+        ]
+
+    def _on_command(self, message: JointState) -> None:
+        stamp_ns = nanoseconds(message.header.stamp)
+        try:
+            command = self.stream.on_command(
+                stamp_ns, message.header.frame_id, message.name, message.position
+            )
+        except WristError as error:
+            self.warn(error)
+            return
+        message.header.frame_id = command.frame_id
+        message.position = command.positions
+        self._command.publish(message)
+        self._positions.publish(Float64MultiArray(data=command.theta))
+        if command.fault is not None:
+            self.warn(command.fault)
+            return
+        if command.correction is not None:
+            after = command.correction
+            self._residual.publish(
+                error_message(stamp_ns, after.after, after.prediction.covariance)
+            )
+        self.health.good()
+
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        # A zero stamp says "at once".
+        stamp_ns = nanoseconds(message.header.stamp) or self.get_clock().now().nanoseconds
+        try:
+            trajectory = self.stream.on_trajectory(
+                stamp_ns,
+                message.header.frame_id,
+                message.joint_names,
+                [point.positions for point in message.points],
+            )
+        except WristError as error:
+            self.warn(error)
+            return
+        message.header.frame_id = trajectory.frame_id
+        for point, positions in zip(message.points, trajectory.positions, strict=True):
+            point.positions = positions
+        self._trajectory.publish(message)
+        if trajectory.fault is not None:
+            self.warn(trajectory.fault)
+        else:
+            self.health.good()
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self.stream.enabled = request.data
+        response.success = True
+        response.message = f"correction is {'on' if request.data else 'off'}"
+        return response
+
+
+def main() -> int:
+    """Run the node."""
+    return run(AngleCorrector)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

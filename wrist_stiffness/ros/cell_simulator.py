@@ -1,0 +1,160 @@
+"""Node `cell_simulator`: the virtual wrist with its motors, load and pose sensor."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+from wrist_stiffness.compensation.intake import BASE_FRAME, MotorNames
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.errors import WristError
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.ros.conversions import (
+    joint_message,
+    pose_message_stamped,
+    wrench_message,
+)
+from wrist_stiffness.ros.parameters import ParameterEntry, declare
+from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
+from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.settings import model_path
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+
+PARAMETERS = (
+    ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),
+    ParameterEntry("rate_hz", 100.0, "samples per second", lower=1.0, upper=2000.0),
+    ParameterEntry("program_s", 60.0, "length of the motion [s]", lower=1.0, upper=86400.0),
+    ParameterEntry("programs", 0, "how often the motion is done, then the node ends; 0: for ever"),
+    ParameterEntry("seed", 0, "of the program and of the sensors' noise"),
+    ParameterEntry("listeners", 0, "subscriptions of /joint_states to wait for before moving"),
+    ParameterEntry(
+        "enable_at_repeat", False, "switch the angle corrector on when the motion repeats"
+    ),
+)
+
+SENT_QUEUE = QoSProfile(depth=1)
+"""Motors follow the newest command only."""
+
+
+class CellSimulator(Node):
+    """Thin shell over `VirtualCell`; its motors follow `/motor_commands_corrected`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("cell_simulator", **options)
+        declare(self, PARAMETERS)
+        seed = self.get_parameter("seed").value
+        settings = CellSettings(
+            rate_hz=self.get_parameter("rate_hz").value,
+            program_seconds=self.get_parameter("program_s").value,
+            program_seed=seed,
+        )
+        model = load_model(model_path(self.get_parameter("model_file").value))
+        self.cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
+        motors = MotorNames()
+        self._names = (motors.motor_1, motors.motor_2)
+        self._programs = self.get_parameter("programs").value
+        self._enable_at_repeat = self.get_parameter("enable_at_repeat").value
+        self._sent = self.cell.desired(0.0)
+        self._start_ns: int | None = None
+        self._step = 0
+        self._program = -1
+        self._enabling: Future | None = None
+
+        self._joints = self.create_publisher(JointState, "/joint_states", RELIABLE_QOS)
+        self._load = self.create_publisher(WrenchStamped, "/load_estimate", RELIABLE_QOS)
+        self._command = self.create_publisher(JointState, "/motor_commands", RELIABLE_QOS)
+        self._measured = self.create_publisher(PoseStamped, "/platform_pose_measured", RELIABLE_QOS)
+        self._true = self.create_publisher(PoseStamped, "~/platform_pose_true", RELIABLE_QOS)
+        self._notes = self.create_publisher(
+            String,
+            "/recording_notes",
+            NOTES_QOS,
+        )
+        self._enable = self.create_client(SetBool, "/angle_corrector/enable")
+        self.create_subscription(
+            JointState, "/motor_commands_corrected", self._on_command, SENT_QUEUE
+        )
+        self.create_timer(1.0 / settings.rate_hz, self._on_timer)
+
+    def _on_command(self, message: JointState) -> None:
+        try:
+            self._sent = MotorNames().angles(message.name, message.position)
+        except WristError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=5.0)
+
+    def _on_timer(self) -> None:
+        if not self._may_move():
+            return
+        time_s = self._step / self.cell.settings.rate_hz
+        program = int(time_s // self.cell.program.duration_s)
+        if program != self._program and not self._begin(program, time_s):
+            return
+        self._publish(time_s)
+        self._step += 1
+
+    def _may_move(self) -> bool:
+        if self._start_ns is None:
+            listeners = self.count_subscribers("/joint_states")
+            if listeners < self.get_parameter("listeners").value:
+                return False
+            if self._enable_at_repeat and not self._enable.service_is_ready():
+                return False
+            self._start_ns = self.get_clock().now().nanoseconds
+        return True
+
+    def _begin(self, program: int, time_s: float) -> bool:
+        """Begin a repetition of the motion; False while the corrector has not answered yet."""
+        if self._programs and program >= self._programs:
+            for publisher in self.publishers:
+                publisher.wait_for_all_acked(Duration(seconds=1.0))
+            raise SystemExit(0)
+        corrects = self._enable_at_repeat and program > 0
+        if corrects:
+            if self._enabling is None:
+                self._enabling = self._enable.call_async(SetBool.Request(data=True))
+            if not self._enabling.done():
+                return False
+        self._program = program
+        notes = {
+            "source": "virtual cell",
+            "program": program,
+            "start_ns": self._stamp_ns(time_s),
+            "correction": "on" if corrects else "off",
+            "load_source": "ft",
+        }
+        self._notes.publish(String(data=json.dumps(notes)))
+        return True
+
+    def _stamp_ns(self, time_s: float) -> int:
+        return (self._start_ns or 0) + round(time_s * NANOSECONDS)
+
+    def _publish(self, time_s: float) -> None:
+        stamp_ns = self._stamp_ns(time_s)
+        sample = self.cell.step(time_s, self._sent)
+        # The load first: it belongs to the joint state of the same stamp.
+        self._load.publish(wrench_message(stamp_ns, BASE_FRAME, sample.wrench))
+        self._joints.publish(joint_message(stamp_ns, "", self._names, sample.encoder))
+        self._measured.publish(
+            pose_message_stamped(stamp_ns, sample.measured_rotation, sample.measured_shift)
+        )
+        self._true.publish(pose_message_stamped(stamp_ns, sample.pose_rotation, sample.pose_shift))
+        self._command.publish(joint_message(stamp_ns, "", self._names, self.cell.desired(time_s)))
+
+
+def main() -> int:
+    """Run the node."""
+    return run(CellSimulator)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

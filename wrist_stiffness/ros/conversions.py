@@ -1,0 +1,86 @@
+"""Between messages and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Vector3,
+    WrenchStamped,
+)
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState
+
+from wrist_stiffness.compensation.intake import BASE_FRAME
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.mechanism.components import Array
+
+
+def nanoseconds(stamp: Time) -> int:
+    """Return a stamp as nanoseconds."""
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+def time_message(stamp_ns: int) -> Time:
+    """Return nanoseconds as a stamp."""
+    seconds, rest = divmod(stamp_ns, NANOSECONDS)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def three(vector: Vector3) -> tuple[float, float, float]:
+    """Return the components of a vector message."""
+    return vector.x, vector.y, vector.z
+
+
+def pose_message(position: Array, quaternion: Array) -> Pose:
+    """Return a pose from a position (3,) [m] and a quaternion (4,) x y z w."""
+    x, y, z = position.tolist()
+    a, b, c, w = quaternion.tolist()
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=w))
+
+
+def error_message(stamp_ns: int, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
+    """Return a pose error in `wrist_base` from a twist (6,) and its covariance (6, 6)."""
+    message = PoseWithCovarianceStamped()
+    message.header.stamp = time_message(stamp_ns)
+    message.header.frame_id = BASE_FRAME
+    message.pose.pose = pose_message(*pose_of_twist(twist))
+    message.pose.covariance = covariance.ravel()
+    return message
+
+
+def pose_message_stamped(stamp_ns: int, rotation: Array, position: Array) -> PoseStamped:
+    """Return a platform pose in `wrist_base` from a rotation (3, 3) and the place of O (3,) [m]."""
+    message = PoseStamped()
+    message.header.stamp = time_message(stamp_ns)
+    message.header.frame_id = BASE_FRAME
+    message.pose = pose_message(position, Rotation.from_matrix(rotation).as_quat(canonical=True))
+    return message
+
+
+def wrench_message(stamp_ns: int, frame_id: str, wrench: Array) -> WrenchStamped:
+    """Return a wrench message from force and moment (6,) [N, N m]."""
+    message = WrenchStamped()
+    message.header.stamp = time_message(stamp_ns)
+    message.header.frame_id = frame_id
+    fx, fy, fz, mx, my, mz = wrench.tolist()
+    message.wrench.force = Vector3(x=fx, y=fy, z=fz)
+    message.wrench.torque = Vector3(x=mx, y=my, z=mz)
+    return message
+
+
+def joint_message(
+    stamp_ns: int, frame_id: str, names: Sequence[str], positions: Array
+) -> JointState:
+    """Return a joint state from names and positions (n,) [rad]."""
+    message = JointState(name=list(names), position=positions.tolist())
+    message.header.stamp = time_message(stamp_ns)
+    message.header.frame_id = frame_id
+    return message

@@ -1,0 +1,77 @@
+"""What a node says about itself once a second in `/diagnostics`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from wrist_stiffness.errors import WristError
+
+
+class Health:
+    """Counts of good samples and of faults by reason.
+
+    Parameters
+    ----------
+    name : str
+        Of the node.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._good = self._good_before = 0
+        self._faults: Counter[str] = Counter()
+        self._faults_before = 0
+        self._last = ""
+
+    def good(self) -> None:
+        """Count a sample that went well."""
+        self._good += 1
+
+    def fault(self, error: WristError) -> None:
+        """Count a fault by the kind of error."""
+        self._faults[type(error).__name__] += 1
+        self._last = str(error)
+
+    def report(self, facts: Mapping[str, str], missing: str = "") -> DiagnosticStatus:
+        """Return the state since the last report.
+
+        Parameters
+        ----------
+        facts : mapping of str to str
+            What else to say.
+        missing : str
+            What the node cannot work without, where that is missing: an error.
+
+        Returns
+        -------
+        DiagnosticStatus
+            ERROR where something is missing, WARN where samples were refused, STALE where none
+            came, else OK.
+        """
+        good = self._good - self._good_before
+        faults = self._faults.total() - self._faults_before
+        self._good_before, self._faults_before = self._good, self._faults.total()
+        if missing:
+            level, message = DiagnosticStatus.ERROR, missing
+        elif faults:
+            level, message = DiagnosticStatus.WARN, f"{faults} refused: {self._last}"
+        elif not good:
+            level, message = DiagnosticStatus.STALE, "no input"
+        else:
+            level, message = DiagnosticStatus.OK, f"{good} samples"
+        values = {
+            "samples": str(self._good),
+            **{f"refused {reason}": str(count) for reason, count in sorted(self._faults.items())},
+            "last fault": self._last,
+            **facts,
+        }
+        return DiagnosticStatus(
+            level=level,
+            name=self._name,
+            message=message,
+            hardware_id="wrist",
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )

@@ -1,0 +1,103 @@
+"""Node `pose_error_predictor`: the platform's pose error for every joint state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.errors import WristError
+from wrist_stiffness.ros.conversions import error_message, nanoseconds
+from wrist_stiffness.ros.load_wait import LoadWait
+from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.settings import PREDICTION
+from wrist_stiffness.ros.wrist_node import WristNode
+
+MICROMETRES = 1e6
+MILLIDEGREES = 1e3 * float(np.degrees(1.0))
+
+CHECKS_PER_WAIT = 4
+"""How often, within the longest wait, overdue joint states are looked for."""
+
+
+class PoseErrorPredictor(WristNode):
+    """Publishes `/pose_error_predicted`; nothing for a sample that cannot be predicted."""
+
+    stream: PredictionStream
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("pose_error_predictor", PREDICTION, **options)
+        wait_s = self.get_parameter("load_wait_s").value
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._wait = LoadWait(wait_s, lambda: steady.now().nanoseconds)
+        if wait_s > 0.0:
+            self.create_timer(wait_s / CHECKS_PER_WAIT, self.after_load, clock=steady)
+        self.autostart()
+
+    def make_stream(self, settings: StreamSettings) -> PredictionStream:
+        """Return the prediction stream."""
+        return PredictionStream(None, settings)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the outputs and load the model."""
+        self._error = self.create_lifecycle_publisher(
+            PoseWithCovarianceStamped, "/pose_error_predicted", RELIABLE_QOS
+        )
+        self._s_um = self.create_lifecycle_publisher(Float64, "/pose_error/s_um", RELIABLE_QOS)
+        self._phi_mdeg = self.create_lifecycle_publisher(
+            Float64, "/pose_error/phi_mdeg", RELIABLE_QOS
+        )
+        return super().on_configure(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Remove the outputs."""
+        for publisher in (self._error, self._s_um, self._phi_mdeg):
+            self.destroy_lifecycle_publisher(publisher)
+        return super().on_cleanup(state)
+
+    def make_inputs(self) -> list[Subscription]:
+        """Listen to the motors."""
+        return [
+            self.create_subscription(JointState, "/joint_states", self._on_joint_state, SENSOR_QOS)
+        ]
+
+    def _on_joint_state(self, message: JointState) -> None:
+        self._wait.put(message)
+        self.after_load()
+
+    def after_load(self) -> None:
+        """Predict for the joint states that need not wait any longer."""
+        for message in self._wait.ready(self.stream.loads.history.newest_ns):
+            self._predict(message)
+
+    def _predict(self, message: JointState) -> None:
+        stamp_ns = nanoseconds(message.header.stamp)
+        try:
+            prediction = self.stream.on_joint_state(
+                stamp_ns, message.name, message.position
+            ).prediction
+        except WristError as error:
+            self.warn(error)
+            return
+        self._error.publish(error_message(stamp_ns, prediction.twist, prediction.covariance))
+        self._s_um.publish(Float64(data=prediction.shift_norm * MICROMETRES))
+        self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
+        self.health.good()
+
+
+def main() -> int:
+    """Run the node."""
+    return run(PoseErrorPredictor)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,15 @@
+"""Qualities of service of the wrist's topics."""
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Sensors in: hears reliable and best-effort drivers; 0.2 s of a 1 kHz stream may wait."""
+
+RELIABLE_QOS = QoSProfile(depth=200)
+"""Commands in, and everything out."""
+
+RECORDING_QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""The recorder hears everybody."""
+
+NOTES_QOS = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Notes reach a recorder that comes later."""

@@ -1,0 +1,105 @@
+"""Node `recorder`: writes the wrist's topics, as they come from the wire, into a recording."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+from rclpy.node import Node
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.recording import RecordingWriter, topics
+from wrist_stiffness.recording.channel import Channel, channel_of
+from wrist_stiffness.recording.messages import (
+    DiagnosticArray,
+    Float64,
+    Float64MultiArray,
+    JointState,
+    JointTrajectory,
+    Message,
+    PoseArray,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    String,
+    Temperature,
+    WrenchStamped,
+)
+from wrist_stiffness.ros.parameters import ParameterEntry, declare
+from wrist_stiffness.ros.qos import NOTES_QOS, RECORDING_QOS
+from wrist_stiffness.ros.run import run
+
+PARAMETERS = (
+    ParameterEntry(
+        "output", "", "new folder, or new file ending in .mcap", fixed=True
+    ),
+)
+
+TOPICS: dict[str, type[Message]] = {
+    topics.JOINT_STATES: JointState,
+    topics.LOAD_ESTIMATE: WrenchStamped,
+    topics.TEMPERATURES: Temperature,
+    topics.PLATFORM_POSE: PoseStamped,
+    topics.PLATFORM_MARKERS: PoseArray,
+    topics.FRAME_POSE: PoseStamped,
+    topics.MOTOR_COMMANDS: JointState,
+    topics.MOTOR_TRAJECTORY: JointTrajectory,
+    topics.RECORDING_NOTES: String,
+    "/cell_simulator/platform_pose_true": PoseStamped,
+    "/pose_error_predicted": PoseWithCovarianceStamped,
+    "/pose_error/s_um": Float64,
+    "/pose_error/phi_mdeg": Float64,
+    "/motor_commands_corrected": JointState,
+    "/motor_positions_corrected": Float64MultiArray,
+    "/motor_trajectory_corrected": JointTrajectory,
+    "/pose_error_residual": PoseWithCovarianceStamped,
+    "/diagnostics": DiagnosticArray,
+}
+
+
+class Recorder(Node):
+    """Records until it is told to stop; the recording then takes its name.
+
+    Raises
+    ------
+    InputError
+        If no output is named.
+    RecordingError
+        If the output exists or cannot be written.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("recorder", **options)
+        declare(self, PARAMETERS)
+        output = self.get_parameter("output").value
+        if not output:
+            raise InputError("recorder: the parameter output names no recording")
+        self._recording = ExitStack()
+        self._writer = self._recording.enter_context(RecordingWriter(output))
+        for topic, message_type in TOPICS.items():
+            package, kind, name = message_type.ros_type.split("/")
+            self.create_subscription(
+                getattr(import_module(f"{package}.{kind}"), name),
+                topic,
+                partial(self._on_message, channel_of(topic, message_type)),
+                NOTES_QOS if topic == topics.RECORDING_NOTES else RECORDING_QOS,
+                raw=True,
+            )
+
+    def _on_message(self, channel: Channel, payload: bytes) -> None:
+        self._writer.write_raw(channel, payload, self.get_clock().now().nanoseconds)
+
+    def destroy_node(self) -> None:
+        """Give the recording its name."""
+        super().destroy_node()
+        self._recording.close()
+
+
+def main() -> int:
+    """Run the node."""
+    return run(Recorder)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,47 @@
+"""Run a node as a process, with a clean end on SIGINT and SIGTERM."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+from wrist_stiffness.errors import WristError
+
+EXIT_BAD_INPUT = 2
+
+
+def run(make_node: Callable[[], Node]) -> int:
+    """Make a node and spin it until it is told to stop.
+
+    One thread: the multi-threaded executor loses messages under load.
+
+    Parameters
+    ----------
+    make_node : callable
+        Makes the node once ROS is initialised.
+
+    Returns
+    -------
+    int
+        0, or 2 if the node cannot start as asked; one line on stderr says why.
+    """
+    rclpy.init()
+    executor = SingleThreadedExecutor()
+    try:
+        executor.add_node(make_node())
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (WristError, ParameterException) as error:
+        print(f"wrist-stiffness node: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    finally:
+        for node in executor.get_nodes():
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0

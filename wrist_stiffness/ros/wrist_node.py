@@ -1,0 +1,230 @@
+"""What the wrist's nodes share: parameters, model, lifecycle and diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.model.error_model import ErrorModel, Load
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.ros.conversions import nanoseconds, three
+from wrist_stiffness.ros.health import Health
+from wrist_stiffness.ros.parameters import ParameterEntry, declare, values_of
+from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.settings import COMMON, model_path, stream_settings
+
+REPORT_EVERY_S = 1.0
+
+
+class WristNode(LifecycleNode):
+    """A managed node around one stream of the core.
+
+    Without a model it is active all the same and gives the safe output, so that a wrong file never
+    cuts the commands off; `~/reload_model` heals it.
+
+    Parameters
+    ----------
+    name : str
+        Node name.
+    entries : sequence of ParameterEntry
+        Parameters beside the common ones.
+    options
+        Of rclpy's node.
+
+    Raises
+    ------
+    InputError
+        If a parameter cannot be used.
+    rclpy.exceptions.ParameterException
+        If a parameter has another type or is out of range.
+    """
+
+    stream: PredictionStream | CorrectionStream
+
+    def __init__(self, name: str, entries: Sequence[ParameterEntry], **options: Any) -> None:
+        super().__init__(name, **options)
+        self._entries = (*COMMON, *entries)
+        declare(self, self._entries)
+        self.health = Health(name)
+        self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
+        self._model_fault = "no model is loaded"
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(self._use_parameters)
+        self.create_service(Trigger, "~/reload_model", self._on_reload)
+        self.create_service(Trigger, "~/tare", self._on_tare)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", RELIABLE_QOS)
+        # Not the node's clock: a simulated one may stand still.
+        self.create_timer(
+            REPORT_EVERY_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def make_stream(self, settings: StreamSettings) -> PredictionStream | CorrectionStream:
+        """Return the node's stream, without a model."""
+        raise NotImplementedError
+
+    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
+        """Check parameters and return the settings that they stand for (may raise InputError)."""
+        return stream_settings(values)
+
+    def facts(self) -> dict[str, str]:
+        """Return what the node adds to its diagnostics."""
+        return {}
+
+    def autostart(self) -> None:
+        """Configure and activate, unless the parameter `autostart` says no."""
+        if self.get_parameter("autostart").value:
+            self.trigger_configure()
+            self.trigger_activate()
+
+    # Lifecycle
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Load the model."""
+        try:
+            self._use_model(warmed(load_model(self._model_path())))
+        except WristError as error:
+            self._model_fault = str(error)
+            self.warn(error)
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to listen; the load first, so that it is taken before a joint state that waits."""
+        self._inputs = [
+            self.create_subscription(WrenchStamped, "/load_estimate", self._on_load, SENSOR_QOS),
+            *self.make_inputs(),
+        ]
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening."""
+        for subscription in self._inputs:
+            self.destroy_subscription(subscription)
+        return super().on_deactivate(state)
+
+    def make_inputs(self) -> list[Any]:
+        """Return the node's subscriptions beside the load's."""
+        raise NotImplementedError
+
+    # Inputs that all nodes have
+
+    def _on_load(self, message: WrenchStamped) -> None:
+        try:
+            self.stream.loads.add(
+                nanoseconds(message.header.stamp),
+                message.header.frame_id,
+                three(message.wrench.force),
+                three(message.wrench.torque),
+            )
+        except WristError as error:
+            self.warn(error)
+        else:
+            self.after_load()
+
+    def after_load(self) -> None:
+        """Do what waited for a load."""
+
+    def warn(self, error: WristError) -> None:
+        """Count a fault and log it, at most every five seconds."""
+        self.health.fault(error)
+        self.get_logger().warning(str(error), throttle_duration_sec=5.0)
+
+    # Services
+
+    async def _on_reload(
+        self, request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        try:
+            loading: Future = Future(executor=self.executor)
+            Thread(target=_load, args=(self._model_path(), loading), daemon=True).start()
+            # Samples go on being answered with the old model until the new one is complete.
+            self._use_model(await loading)
+        except WristError as error:
+            self.warn(error)
+            response.success, response.message = False, str(error)
+        else:
+            response.success, response.message = True, self.facts_of_model()["model"]
+        return response
+
+    def _on_tare(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            load = self.stream.loads.tare()
+        except WristError as error:
+            self.warn(error)
+            response.success, response.message = False, str(error)
+        else:
+            response.success = True
+            response.message = f"new zero of the load [N, N m]: {load.wrench.tolist()}"
+        return response
+
+    # Parameters and model
+
+    def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        values = {**values_of(self, self._entries), **{p.name: p.value for p in changes}}
+        try:
+            self.apply_values(values)
+        except WristError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _use_parameters(self, changes: list[Parameter]) -> None:
+        self.stream.settings = self.apply_values(values_of(self, self._entries))
+
+    def _model_path(self) -> Path:
+        return model_path(self.get_parameter("model_file").value)
+
+    def _use_model(self, model: ErrorModel) -> None:
+        running = self.stream.model
+        if running is not None and running.table.geometry.sha256 != model.table.geometry.sha256:
+            raise InputError(
+                f"model {model.name}: geometry {model.table.geometry.name} is not that of the "
+                f"running model {running.name}; restart the node for another wrist"
+            )
+        self.stream.model = model
+        self._model_fault = ""
+
+    # Diagnostics
+
+    def facts_of_model(self) -> dict[str, str]:
+        """Return which model is in use."""
+        model = self.stream.model
+        if model is None:
+            return {"model": "none"}
+        return {"model": f"{model.name}, table {model.table.checksum[:12]}, {model.evaluation}"}
+
+    def _report(self) -> None:
+        facts = {
+            **self.facts_of_model(),
+            "loads that came late": str(self.stream.loads.history.late),
+            **self.facts(),
+        }
+        message = DiagnosticArray(status=[self.health.report(facts, self._model_fault)])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def warmed(model: ErrorModel) -> ErrorModel:
+    """Return a model after a first prediction, which fills what it computes once."""
+    model.predict(np.zeros(2), Load(np.zeros(6)))
+    return model
+
+
+def _load(path: Path, loading: Future) -> None:
+    try:
+        loading.set_result(warmed(load_model(path)))
+    except Exception as error:
+        loading.set_exception(error)
