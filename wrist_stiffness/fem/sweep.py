@@ -40,7 +40,7 @@ COARSENING = 1.5
 """Element size of the second mesh, from which the first one's error is estimated."""
 
 MESH_ORDER = 1.5
-"""Order assumed for that estimate: less than the smooth solution's, for the edges' singularities."""
+"""Order assumed for that estimate: below a smooth solution's, for the edges' singularities."""
 
 Progress = Callable[[int, int], None]
 

@@ -121,7 +121,7 @@ def unpack(columns: Array, layout: SectorLayout, configuration: Configuration) -
 
 
 def sector_slides(layout: SectorLayout, configuration: Configuration) -> Array:
-    """Opening of each sector's gap for a screw at each component, by the slides: (..., m, 8, 6)."""
+    """Return each gap's opening by the slides that a component's screw makes, (..., m, 8, 6)."""
     slides = influence(configuration).slides()
     out = np.zeros((*slides.shape[:-3], len(layout.sign), len(ELASTIC), 6))
     for i, (joint, sign) in enumerate(zip(layout.slide, layout.sign, strict=True)):

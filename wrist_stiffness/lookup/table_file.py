@@ -107,7 +107,8 @@ def load_table(path: str | Path) -> Table:
         If the file is missing, no table, of another version, damaged or contradictory.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # Opened here, because numpy leaves a damaged file open.
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {key: archive[key] for key in archive.files}
     except FileNotFoundError as error:
         raise TableError(f"{path}: no such file") from error
@@ -132,16 +133,15 @@ def load_table(path: str | Path) -> Table:
         raise TableError(f"{path}: not a table of this program")
     if header.get("schema") != SCHEMA:
         raise TableError(
-            f"{path}: table of version {header.get('schema')!r}, this program reads version {SCHEMA}; "
+            f"{path}: table of version {header.get('schema')!r}, this program reads {SCHEMA}; "
             "build it again with 'wrist-stiffness table build'"
         )
     try:
         values = {field.name: header[field.name] for field in fields(TableHeader)}
         checksum = _checksum(values, arrays)
         if checksum != header["checksum"]:
-            raise TableError(
-                f"{path}: damaged: checksum {checksum[:12]} is not {header['checksum'][:12]} of its header"
-            )
+            stated = header["checksum"][:12]
+            raise TableError(f"{path}: damaged: checksum {checksum[:12]}, its header says {stated}")
         table = _from_arrays(TableHeader(**values), arrays, checksum)
         if table.geometry.sha256 != header["geometry_sha256"]:
             raise TableError(f"{path}: geometry checksum does not fit the geometry in the header")

@@ -136,7 +136,7 @@ class ErrorModel:
         return Prediction(response.twist, covariance, configuration, response.active)
 
     def _covariance(self, configuration: Configuration, twist: Array) -> Array:
-        """Variance of the table's stated error, and of an encoder count spread evenly over a step."""
+        """Variance of the table's stated error and of an encoder count spread over its step."""
         jacobian = np.zeros((6, 2))
         jacobian[3:] = self.table.mechanism.jacobian(configuration)
         step = self.table.geometry.limits.encoder_step

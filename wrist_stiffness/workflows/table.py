@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -131,8 +129,8 @@ def check(
     TableError, GeometryError
         If a file cannot be read at all.
     """
-    from wrist_stiffness.fem.sweep import BuildSettings, build_table, interpolation_errors
     from wrist_stiffness.fem.solids import MeshSettings
+    from wrist_stiffness.fem.sweep import BuildSettings, build_table, interpolation_errors
 
     table = load_table(path)
     findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]
@@ -194,10 +192,14 @@ def _definiteness(table: Table) -> Finding:
 
     configuration = table.mechanism.forward(unseen_poses(table.workspace))
     lowest = min(
-        float(np.min(np.linalg.eigvalsh(_scaled(table.operators_at(configuration, way).compliance))))
+        float(
+            np.min(np.linalg.eigvalsh(_scaled(table.operators_at(configuration, way).compliance)))
+        )
         for way in ("closed_form", "spline")
     )
-    return Finding("compliance", f"smallest scaled eigenvalue {lowest:.1e}, must be > 0", lowest > 0)
+    return Finding(
+        "compliance", f"smallest scaled eigenvalue {lowest:.1e}, must be > 0", lowest > 0
+    )
 
 
 def _scaled(matrix: Array) -> Array:
@@ -303,34 +305,25 @@ def facts(table: Table) -> Iterable[tuple[str, str]]:
     lower, upper = (np.degrees(edge) for edge in table.workspace.rectangle)
     errors = header.errors
     yield "geometry", f"{table.geometry.name} ({table.geometry.status})"
-    yield "angles", f"motor 1 {lower[0]:.1f} to {upper[0]:.1f}, motor 2 {lower[1]:.1f} to {upper[1]:.1f} deg"
+    yield (
+        "angles",
+        f"motor 1 {lower[0]:.1f} to {upper[0]:.1f}, motor 2 {lower[1]:.1f} to {upper[1]:.1f} deg",
+    )
     yield "loads", f"up to {limits.force:g} N and {limits.moment:g} N m at O"
-    yield "parts", f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces"
+    yield (
+        "parts",
+        f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces",
+    )
     yield "contact", f"{len(table.layout.sign)} flange sectors"
     yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
     yield "evaluation", header.evaluation
-    yield "mesh error", f"{100 * errors['mesh_relative']:.2f} % of C (estimated from a coarser mesh)"
+    yield (
+        "mesh error",
+        f"{100 * errors['mesh_relative']:.2f} % of C (estimated from a coarser mesh)",
+    )
     for region in ("operative", "domain"):
         worst = errors["predicted"][region]
         yield (
             f"spline error, {region}",
             f"s {100 * worst['s']:.3f} %, phi {100 * worst['phi']:.3f} % at unseen poses",
         )
-
-
-def write_json(path: str | Path, content: Any) -> None:
-    """Write a result as JSON, complete or not at all."""
-    import json
-
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
-
-
-def without_errors(table: Table) -> Table:
-    """Return a table without stated errors, to compare content alone."""
-    return replace(table, header=replace(table.header, errors={}))

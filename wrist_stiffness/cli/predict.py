@@ -1,0 +1,81 @@
+"""`wrist-stiffness predict`: the pose error at one pose."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wrist_stiffness.cli.main import OneLineParser
+
+DESCRIPTION = """\
+Predict how far the platform is off at given motor angles under a given load, own weight included:
+s is the shift of the platform's point at O, phi the angle by which it is turned."""
+
+EPILOG = """\
+example:
+  wrist-stiffness predict --angles 20 -10 --load 0 0 -1"""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `predict`."""
+    parser = commands.add_parser(
+        "predict",
+        help="the pose error at one pose",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
+    parser.add_argument(
+        "--angles", nargs=2, type=float, required=True, metavar="DEG", help="motor angles [deg]"
+    )
+    parser.add_argument(
+        "--load",
+        nargs="+",
+        type=float,
+        default=[0.0] * 6,
+        metavar="N",
+        help="force [N], or force [N] and moment [N m], on the platform at O (default: none)",
+    )
+    parser.add_argument(
+        "--on-platform", action="store_true", help="the load's axes turn with the platform"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+    parser.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    import numpy as np
+
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.predict import predict
+
+    if len(arguments.load) not in (3, 6):
+        raise InputError(f"--load takes 3 or 6 numbers, not {len(arguments.load)}")
+    load = [*arguments.load, *[0.0] * (6 - len(arguments.load))]
+    model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
+    values = predict(
+        model, np.radians(arguments.angles).tolist(), load, arguments.on_platform
+    ).as_values()
+    x, y, z = values["shift_um"]
+    print(f"s    {values['s_um']:8.3f} um    ({x:.3f}, {y:.3f}, {z:.3f})")
+    x, y, z = values["rotation_mdeg"]
+    print(f"phi  {values['phi_mdeg']:8.3f} mdeg  ({x:.3f}, {y:.3f}, {z:.3f})")
+    other = values["other_evaluation"]
+    way = "spline" if values["evaluation"] == "closed_form" else "closed form"
+    print(f"by the table's {way}: s {other['s_um']:.3f} um, phi {other['phi_mdeg']:.3f} mdeg")
+    inside = "inside" if values["in_operative_workspace"] else "outside"
+    print(
+        f"tilt {values['tilt_deg']:.2f} deg, {inside} the operative workspace, "
+        f"{values['sectors_in_contact']} flange sectors in contact"
+    )
+    if any(load):
+        print("share of the load's strain energy with free slides:")
+        for name, share in sorted(values["energy_share"].items(), key=lambda item: -item[1]):
+            print(f"  {name}  {100 * share:5.1f} %")
+    if arguments.json:
+        write_json(arguments.json, values)
+    return 0

@@ -1,0 +1,102 @@
+"""`wrist-stiffness replay`: the nodes' own code over a recording, without a ROS graph."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wrist_stiffness.cli.main import OneLineParser
+
+DESCRIPTION = """\
+Run the very code of the nodes over a recording and write it again with predicted pose errors and
+corrected commands added. No ROS graph is needed; the result is the same to the bit every time."""
+
+EPILOG = """\
+example, a recording with other names:
+  wrist-stiffness replay bag -o bag_predicted \\
+      --topic /load_estimate:=/ft_sensor/wrench --joint wrist_a --joint wrist_b"""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `replay`."""
+    parser = commands.add_parser(
+        "replay",
+        help="predicted errors and corrected commands for a recording",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("recording", help="rosbag2 folder with MCAP storage, or a .mcap file")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder or .mcap file")
+    parser.add_argument("--model", help="model file (default: the shipped wrist's)")
+    parser.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="STANDARD:=ACTUAL",
+        help="a topic's name in this recording; may be repeated",
+    )
+    parser.add_argument(
+        "--joint",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="name of motor 1, then of motor 2 (default: motor_1_joint, motor_2_joint)",
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing OUT")
+    parser.add_argument("--json", metavar="FILE", help="write the summary here as well")
+    parser.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    import numpy as np
+
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.compensation.intake import MotorNames
+    from wrist_stiffness.compensation.settings import StreamSettings
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.recording.topics import parse_topic_remaps
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.replay import replay
+
+    if len(arguments.joint) not in (0, 2):
+        raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")
+    settings = StreamSettings(motors=MotorNames(*arguments.joint))
+    summary = replay(
+        arguments.recording,
+        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+        arguments.output,
+        settings,
+        parse_topic_remaps(arguments.topic),
+        arguments.overwrite,
+        Progress("replay"),
+    )
+    print(
+        f"{summary.predictions} predictions for {summary.joint_states} joint states, "
+        f"{summary.corrections} of {summary.commands} commands corrected"
+    )
+    if summary.predictions:
+        for name, values in (("s [um]", summary.shift_norm_um), ("phi [mdeg]", summary.phi_mdeg)):
+            print(f"  predicted {name:10} mean {np.mean(values):8.3f}   max {np.max(values):8.3f}")
+    if summary.damage:
+        print(f"input is damaged: {summary.damage}")
+    if summary.replaced:
+        print(f"{summary.replaced} outputs of an earlier run in the input left out")
+    for reason, count in summary.refused.most_common():
+        print(f"  {count} x {reason}")
+    print(f"written: {arguments.output}")
+    if arguments.json:
+        write_json(
+            arguments.json,
+            {
+                "joint_states": summary.joint_states,
+                "predictions": summary.predictions,
+                "commands": summary.commands,
+                "corrections": summary.corrections,
+                "refused": dict(summary.refused),
+                "damage": summary.damage,
+            },
+        )
+    return 0

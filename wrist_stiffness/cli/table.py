@@ -1,0 +1,143 @@
+"""`wrist-stiffness table build | check | show`: the offline sweep and its table."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wrist_stiffness.cli.main import OneLineParser
+
+BUILD = """\
+Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
+joint space. The grid is refined until poses that it never saw agree to the tolerance."""
+
+CHECK = """\
+Verify a table: complete and undamaged, compliance positive definite, splines as good as stated.
+With --rebuild the whole sweep runs again from the geometry in the table and all numbers are
+compared. The exit code is 1 if a check fails."""
+
+SHOW = """\
+Say what a table holds and draw its maps: displacement and orientation error of the platform under
+the rated load over both motor angles, with the border of the operative workspace."""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parsers of the three table commands."""
+    parser = commands.add_parser("table", help="build, check or show a lookup table")
+    actions = parser.add_subparsers(metavar="ACTION", required=True)
+
+    build = actions.add_parser("build", help="run the finite-element sweep", description=BUILD)
+    build.add_argument("geometry", nargs="?", help="geometry file (default: the shipped wrist's)")
+    build.add_argument("-o", "--output", required=True, metavar="TABLE", help="ends in .npz")
+    build.add_argument(
+        "--tolerance",
+        type=float,
+        default=0.005,
+        metavar="FRACTION",
+        help="largest relative error of the interpolated s and phi (default 0.005)",
+    )
+    build.add_argument(
+        "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
+    )
+    build.add_argument("--interface", choices=("rigid", "distributing"), default="rigid")
+    build.add_argument("--evaluation", choices=("closed_form", "spline"), default="closed_form")
+    _add_json(build)
+    build.set_defaults(run=_build)
+
+    check = actions.add_parser("check", help="verify a table", description=CHECK)
+    check.add_argument("table", nargs="?", help="table file (default: the shipped one)")
+    check.add_argument("--geometry", metavar="FILE", help="must be the geometry of the table")
+    check.add_argument("--rebuild", action="store_true", help="compute it again and compare")
+    _add_json(check)
+    check.set_defaults(run=_check)
+
+    show = actions.add_parser("show", help="draw its maps", description=SHOW)
+    show.add_argument("table", nargs="?", help="table file (default: the shipped one)")
+    show.add_argument(
+        "-o", "--output", default=".", metavar="FOLDER", help="for the PNG files (default: here)"
+    )
+    _add_json(show)
+    show.set_defaults(run=_show)
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+
+
+def _build(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows import table
+    from wrist_stiffness.workflows.json_file import write_json
+
+    geometry = arguments.geometry or shipped_file("config/palmieri2015.yaml")
+    built = table.build(
+        geometry,
+        arguments.output,
+        evaluation=arguments.evaluation,
+        interface=arguments.interface,
+        tolerance=arguments.tolerance,
+        per_axis=arguments.grid,
+        progress=Progress("sweep"),
+    )
+    _print_facts(built)
+    print(f"written: {arguments.output} (checksum {built.checksum[:12]})")
+    if arguments.json:
+        write_json(arguments.json, asdict(built.header) | {"checksum": built.checksum})
+    return 0
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows import table
+    from wrist_stiffness.workflows.json_file import write_json
+
+    path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
+    findings = table.check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
+    for finding in findings:
+        print(f"{'good' if finding.passed else 'BAD ':4} {finding.name}: {finding.text}")
+    passed = all(finding.passed for finding in findings)
+    print(f"{path}: {'good' if passed else 'NOT good'}")
+    if arguments.json:
+        write_json(
+            arguments.json,
+            {"passed": passed, "findings": [asdict(finding) for finding in findings]},
+        )
+    return 0 if passed else 1
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows import table
+    from wrist_stiffness.workflows.json_file import write_json
+
+    path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
+    shown, pictures = table.show(path, arguments.output)
+    _print_facts(shown)
+    summary = table.summarise(shown)
+    print("1 N downward, own weight left out, operative workspace:")
+    for name, row in summary.operative.items():
+        print(
+            f"  {name:12} mean {row['mean']:7.2f}   min {row['min']:7.2f}   max {row['max']:7.2f}"
+        )
+    print(
+        f"whole map: s up to {summary.domain_max['s_um']:.3g} um, "
+        f"phi up to {summary.domain_max['phi_1e-2deg']:.3g} 1e-2 deg"
+    )
+    for picture in pictures:
+        print(f"written: {picture}")
+    if arguments.json:
+        write_json(arguments.json, asdict(summary))
+    return 0
+
+
+def _print_facts(shown: object) -> None:
+    from wrist_stiffness.lookup.table import Table
+    from wrist_stiffness.workflows import table
+
+    assert isinstance(shown, Table)
+    for name, text in table.facts(shown):
+        print(f"{name + ':':26} {text}")

@@ -1,0 +1,123 @@
+"""Predict one pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.lookup.table import Evaluation
+from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.model.error_model import Load, Prediction
+from wrist_stiffness.model.model_file import load_model
+
+
+@dataclass(frozen=True)
+class PosePrediction:
+    """Prediction at one pose, by both evaluations of the table.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        As the nodes would give it.
+    evaluation : str
+        How the nodes evaluate the table.
+    other : Prediction
+        By the other evaluation.
+    energy_shares : dict of str to float
+        Part of the load's strain energy in each component with free slides; they add up to 1.
+    tilt : float
+        Of the platform's normal from home [rad].
+    singularity : float
+        D at the pose.
+    operative : bool
+        Whether the pose lies in the operative workspace.
+    """
+
+    prediction: Prediction
+    evaluation: Evaluation
+    other: Prediction
+    energy_shares: dict[str, float]
+    tilt: float
+    singularity: float
+    operative: bool
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what people and programs read, with units in the names."""
+        return {
+            **_values(self.prediction),
+            "evaluation": self.evaluation,
+            "other_evaluation": _values(self.other),
+            "energy_share": self.energy_shares,
+            "tilt_deg": float(np.degrees(self.tilt)),
+            "singularity_D": self.singularity,
+            "in_operative_workspace": self.operative,
+            "sectors_in_contact": int(np.count_nonzero(self.prediction.active)),
+        }
+
+
+def predict(
+    model: str | Path, angles: Sequence[float], load: Sequence[float], on_platform: bool
+) -> PosePrediction:
+    """Predict the pose error at one pose under one load.
+
+    Parameters
+    ----------
+    model : path
+        Model file.
+    angles : sequence of 2 float
+        Motor angles [rad].
+    load : sequence of 6 float
+        Wrench on the platform at O [N, N m].
+    on_platform : bool
+        Whether the wrench is given in `wrist_platform` instead of `wrist_base`.
+
+    Returns
+    -------
+    PosePrediction
+        The error and where it comes from.
+
+    Raises
+    ------
+    WristError
+        If the model cannot be read, or pose or load are out of range.
+    """
+    error_model = load_model(model)
+    theta, wrench = np.array(angles, dtype=float), Load(np.array(load, dtype=float), on_platform)
+    prediction = error_model.predict(theta, wrench)
+    other: Evaluation = "spline" if error_model.evaluation == "closed_form" else "closed_form"
+    table = error_model.table
+    configuration = prediction.configuration
+    return PosePrediction(
+        prediction=prediction,
+        evaluation=error_model.evaluation,
+        other=error_model.with_evaluation(other).predict(theta, wrench),
+        energy_shares=_shares(table.shares(configuration), wrench.in_base(configuration)),
+        tilt=float(table.mechanism.tilt(theta)),
+        singularity=float(configuration.singularity),
+        operative=bool(table.workspace.operative(theta)),
+    )
+
+
+def _shares(shares: Array, wrench: Array) -> dict[str, float]:
+    energy = np.einsum("i,kij,j->k", wrench, shares, wrench)
+    total = energy.sum()
+    return {
+        name: float(part / total) if total else 0.0
+        for name, part in zip(ELASTIC, energy, strict=True)
+    }
+
+
+def _values(prediction: Prediction) -> dict[str, Any]:
+    shift = prediction.motion[1]
+    return {
+        "s_um": 1e6 * prediction.shift_norm,
+        "phi_mdeg": 1e3 * float(np.degrees(prediction.phi)),
+        "shift_um": (1e6 * shift).tolist(),
+        "rotation_mdeg": (1e3 * np.degrees(prediction.twist[3:])).tolist(),
+        "sigma_um": (1e6 * np.sqrt(np.diagonal(prediction.covariance)[:3])).tolist(),
+        "sigma_mdeg": (1e3 * np.degrees(np.sqrt(np.diagonal(prediction.covariance)[3:]))).tolist(),
+    }

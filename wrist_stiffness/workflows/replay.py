@@ -1,0 +1,275 @@
+"""Replay a recording through the nodes' own core path, without a ROS graph."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.compensation.intake import BASE_FRAME, CORRECTED_FRAME
+from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.errors import RecordingError, WristError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording.cdr import decode
+from wrist_stiffness.recording.messages import (
+    Float64MultiArray,
+    Header,
+    JointState,
+    Message,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    WrenchStamped,
+)
+from wrist_stiffness.recording.reader import Recording, open_recording
+from wrist_stiffness.recording.topics import JOINT_STATES, LOAD_ESTIMATE, MOTOR_COMMANDS
+from wrist_stiffness.recording.writer import RecordingWriter
+
+POSE_ERROR_PREDICTED = "/pose_error_predicted"
+POSE_ERROR_RESIDUAL = "/pose_error_residual"
+MOTOR_COMMANDS_CORRECTED = "/motor_commands_corrected"
+MOTOR_POSITIONS_CORRECTED = "/motor_positions_corrected"
+OUTPUTS = (
+    POSE_ERROR_PREDICTED,
+    POSE_ERROR_RESIDUAL,
+    MOTOR_COMMANDS_CORRECTED,
+    MOTOR_POSITIONS_CORRECTED,
+)
+
+LOOKAHEAD_NS = 1_000_000_000
+"""Loads are read this far ahead: by stamp they may belong to a joint state logged before them."""
+
+PROGRESS_EVERY = 500
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass
+class ReplaySummary:
+    """What a replay did.
+
+    Parameters
+    ----------
+    joint_states, predictions : int
+        Joint states read, predictions written.
+    commands, corrections : int
+        Commands read, commands that were changed.
+    refused : Counter
+        Samples without a result, by reason.
+    replaced : int
+        Outputs of an earlier run in the input, left out.
+    shift_norm_um, phi_mdeg : list of float
+        Predicted |s| [um] and phi [mdeg] at each prediction.
+    damage : str
+        What is wrong with the input; empty if nothing.
+    """
+
+    joint_states: int = 0
+    predictions: int = 0
+    commands: int = 0
+    corrections: int = 0
+    refused: Counter[str] = field(default_factory=Counter)
+    replaced: int = 0
+    shift_norm_um: list[float] = field(default_factory=list)
+    phi_mdeg: list[float] = field(default_factory=list)
+    damage: str = ""
+
+
+def replay(
+    recording: str | Path,
+    model: str | Path,
+    output: str | Path,
+    settings: StreamSettings | None = None,
+    topics: Mapping[str, str] | None = None,
+    overwrite: bool = False,
+    progress: Progress = lambda done, of: None,
+) -> ReplaySummary:
+    """Write a recording again with predicted errors and corrected commands added.
+
+    Parameters
+    ----------
+    recording : path
+        Folder or `.mcap` file.
+    model : path
+        Model file.
+    output : path
+        Folder or `.mcap` file to write: the input, plus the outputs that the nodes would have sent.
+    settings : StreamSettings, optional
+        As the nodes'; the defaults if None.
+    topics : mapping, optional
+        Actual by standard topic name.
+    overwrite : bool
+        Replace an existing recording.
+    progress : callable
+        Called with messages done and in all.
+
+    Returns
+    -------
+    ReplaySummary
+        Counts and reasons.
+
+    Raises
+    ------
+    WristError
+        If the model or the recording cannot be used at all.
+    """
+    settings = settings or StreamSettings()
+    error_model = load_model(model)
+    source = open_recording(recording)
+    names = {
+        name: (topics or {}).get(name, name)
+        for name in (JOINT_STATES, LOAD_ESTIMATE, MOTOR_COMMANDS)
+    }
+    _require_topics(source, names)
+    summary = ReplaySummary()
+    predicting = PredictionStream(error_model, settings)
+    correcting = CorrectionStream(error_model, settings, enabled=True)
+    loads = _LoadsAhead(source, names[LOAD_ESTIMATE], predicting, correcting, summary)
+    total = sum(topic.count for topic in source.topics)
+    with RecordingWriter(output, overwrite=overwrite) as writer:
+        for done, raw in enumerate(source.raw_messages()):
+            if done % PROGRESS_EVERY == 0:
+                progress(done, total)
+            topic = raw.channel.topic
+            if topic in OUTPUTS:
+                summary.replaced += 1
+                continue
+            writer.write_raw(raw.channel, raw.payload, raw.log_time_ns)
+            if topic not in (names[JOINT_STATES], names[MOTOR_COMMANDS]):
+                continue
+            loads.read_until(raw.log_time_ns + LOOKAHEAD_NS)
+            try:
+                state = decode(JointState, raw.payload)
+                answer = _predict if topic == names[JOINT_STATES] else _correct
+                for name, message in answer(state, predicting, correcting, summary):
+                    writer.write(name, message, raw.log_time_ns)
+            except WristError as error:
+                summary.refused[f"{topic}: {error}"] += 1
+    progress(total, total)
+    summary.damage = source.damage
+    return summary
+
+
+def _require_topics(source: Recording, names: Mapping[str, str]) -> None:
+    present = {topic.name: topic for topic in source.topics}
+    for standard, wanted in ((JOINT_STATES, JointState), (LOAD_ESTIMATE, WrenchStamped)):
+        topic = present.get(names[standard])
+        if topic is None:
+            found = ", ".join(present) or "none"
+            raise RecordingError(
+                f"{source.path}: no topic {names[standard]} (it has {found}); "
+                f"name it with --topic {standard}:=ACTUAL"
+            )
+        if topic.ros_type != wanted.ros_type:
+            raise RecordingError(
+                f"{source.path}: {topic.name} is {topic.ros_type}, not {wanted.ros_type}"
+            )
+
+
+class _LoadsAhead:
+    """Feeds loads to the streams, a fixed time ahead of the joint states."""
+
+    def __init__(
+        self,
+        source: Recording,
+        topic: str,
+        predicting: PredictionStream,
+        correcting: CorrectionStream,
+        summary: ReplaySummary,
+    ) -> None:
+        self._messages: Iterator[tuple[str, int, Message]] = source.messages([topic])
+        self._next = next(self._messages, None)
+        self._streams = (predicting, correcting)
+        self._summary = summary
+
+    def read_until(self, log_time_ns: int) -> None:
+        while self._next is not None and self._next[1] <= log_time_ns:
+            topic, _, message = self._next
+            self._next = next(self._messages, None)
+            if not isinstance(message, WrenchStamped):
+                self._summary.refused[f"{topic}: {message.ros_type} is no WrenchStamped"] += 1
+                continue
+            force, torque = message.wrench.force, message.wrench.torque
+            try:
+                for stream in self._streams:
+                    stream.loads.add(
+                        message.header.stamp_ns,
+                        message.header.frame_id,
+                        (force.x, force.y, force.z),
+                        (torque.x, torque.y, torque.z),
+                    )
+            except WristError as error:
+                self._summary.refused[f"{topic}: {error}"] += 1
+
+
+def _predict(
+    state: JointState, predicting: PredictionStream, _: CorrectionStream, summary: ReplaySummary
+) -> Iterator[tuple[str, Message]]:
+    summary.joint_states += 1
+    sample = predicting.on_joint_state(state.header.stamp_ns, state.name, state.position)
+    prediction = sample.prediction
+    summary.predictions += 1
+    summary.shift_norm_um.append(1e6 * prediction.shift_norm)
+    summary.phi_mdeg.append(1e3 * float(np.degrees(prediction.phi)))
+    header = Header(state.header.stamp_ns, BASE_FRAME)
+    yield POSE_ERROR_PREDICTED, pose_message(header, prediction.twist, prediction.covariance)
+
+
+def _correct(
+    state: JointState, _: PredictionStream, correcting: CorrectionStream, summary: ReplaySummary
+) -> Iterator[tuple[str, Message]]:
+    summary.commands += 1
+    corrected = correcting.on_command(
+        state.header.stamp_ns, state.header.frame_id, state.name, state.position
+    )
+    if corrected.fault is not None:
+        summary.refused[f"{MOTOR_COMMANDS}: {corrected.fault}"] += 1
+    summary.corrections += corrected.correction is not None
+    header = Header(state.header.stamp_ns, CORRECTED_FRAME)
+    yield (
+        MOTOR_COMMANDS_CORRECTED,
+        JointState(
+            header, state.name, tuple(corrected.positions.tolist()), state.velocity, state.effort
+        ),
+    )
+    yield MOTOR_POSITIONS_CORRECTED, Float64MultiArray(data=tuple(corrected.theta.tolist()))
+    if corrected.correction is not None:
+        header = Header(state.header.stamp_ns, BASE_FRAME)
+        yield (
+            POSE_ERROR_RESIDUAL,
+            pose_message(
+                header, corrected.correction.after, corrected.correction.prediction.covariance
+            ),
+        )
+
+
+def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
+    """Return a twist as a recording's message.
+
+    Parameters
+    ----------
+    header : Header
+        Stamp and frame.
+    twist : (6,) float
+        At O in F [m, rad].
+    covariance : (6, 6) float
+        Of the twist.
+
+    Returns
+    -------
+    PoseWithCovarianceStamped
+        Position s, orientation R_err.
+    """
+    position, quaternion = pose_of_twist(twist)
+    pose = Pose(Point(*position.tolist()), Quaternion(*quaternion.tolist()))
+    return PoseWithCovarianceStamped(
+        header, PoseWithCovariance(pose, tuple(covariance.ravel().tolist()))
+    )
