@@ -137,9 +137,18 @@ def mechanism_of(geometry: Geometry) -> Mechanism:
 
 def _checksum(values: Mapping[str, Any]) -> str:
     """SHA-256 of the values, in an order and layout of its own."""
-    return hashlib.sha256(
-        json.dumps(values, sort_keys=True, separators=(",", ":")).encode()
-    ).hexdigest()
+    plain = {**_plain(values), "schema": SCHEMA}
+    text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Make every number a float: 40 and 40.0 are the same length."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_plain(inner) for inner in value]
+    return float(value) if isinstance(value, int) else value
 
 
 def _each(block: Block, build: Callable[[Block], T]) -> dict[str, T]:
@@ -249,8 +258,8 @@ def _readout_points(block: Block) -> Array:
     key = "readout_points_mm"
     points = block.rows(key, 1e-3, at_least=4)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if not spread[2] >= READOUT_SPREAD * spread[0]:
-        ratio = spread[2] / spread[0] if spread[0] > 0.0 else 0.0
+    ratio = spread[2] / spread[0] if spread[0] > 0.0 else 0.0
+    if ratio < READOUT_SPREAD:
         raise GeometryError(
             f"{block.place}.{key}: nearly coplanar, smallest over largest spread is {ratio:.3f}, "
             f"below {READOUT_SPREAD}"
