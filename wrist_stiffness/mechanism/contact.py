@@ -47,9 +47,12 @@ def solve_contact(
     Raises
     ------
     InputError
-        If an input is not finite or the matrix is not positive definite.
+        If shapes do not fit, an input is not finite or the matrix is not positive definite.
     """
     m = len(gap)
+    if approach.shape != (m, m) or (active is not None and active.shape != (m,)):
+        guess = "" if active is None else f" and a guess of shape {active.shape}"
+        raise InputError(f"contact: {m} gaps, but a flexibility of shape {approach.shape}{guess}")
     if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(approach))):
         raise InputError("contact: a gap or a flexibility is not finite")
     closed = np.zeros(m, dtype=bool) if active is None else active.copy()
