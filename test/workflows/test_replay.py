@@ -1,0 +1,208 @@
+"""Replay: the nodes' own path over recordings, among them one that this project did not write."""
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording.messages import (
+    Header,
+    JointState,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
+from wrist_stiffness.recording.reader import open_recording
+from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.replay import replay
+
+MODEL = shipped_file("config/palmieri2015_model.yaml")
+STORE = get_typestore(Stores.ROS2_JAZZY)
+MILLISECOND = 1_000_000
+MOTORS = ("motor_1_joint", "motor_2_joint")
+
+
+def joints(stamp_ns, degrees, names=MOTORS):
+    return JointState(Header(stamp_ns), names, tuple(np.radians(degrees).tolist()))
+
+
+def load(stamp_ns, force, frame="wrist_base"):
+    return WrenchStamped(Header(stamp_ns, frame), Wrench(Vector3(*force), Vector3()))
+
+
+# t [ms]      0     10    20    30
+# load       -1 N        -2 N (logged at 31: late, but by its stamp it belongs to the state at 20)
+# joints           10    20    30
+TIMELINE = [
+    (0, "/load_estimate", load(0, (0.0, 0.0, -1.0))),
+    (10, "/joint_states", joints(10 * MILLISECOND, (5.0, 10.0))),
+    (20, "/joint_states", joints(20 * MILLISECOND, (5.0, 10.0))),
+    (30, "/joint_states", joints(30 * MILLISECOND, (6.0, 10.0))),
+    (30, "/motor_commands", joints(30 * MILLISECOND, (6.0, 10.0))),
+    (31, "/load_estimate", load(20 * MILLISECOND, (0.0, 0.0, -2.0))),
+]
+
+
+def write(path, timeline):
+    with RecordingWriter(path) as writer:
+        for at_ms, topic, message in timeline:
+            writer.write(topic, message, at_ms * MILLISECOND)
+    return path
+
+
+def outputs(path, topic):
+    return [message for _, _, message in open_recording(path).messages([topic])]
+
+
+def shifts(path):
+    points = [m.pose.pose.position for m in outputs(path, "/pose_error_predicted")]
+    return np.array([(p.x, p.y, p.z) for p in points])
+
+
+def test_load_belongs_by_stamp_not_by_arrival(tmp_path):
+    summary = replay(write(tmp_path / "in", TIMELINE), MODEL, tmp_path / "out")
+    assert (summary.joint_states, summary.predictions, summary.corrections) == (3, 3, 1)
+    model = load_model(MODEL)
+    wanted = [
+        model.predict(np.radians((m1, 10.0)), Load(np.array([0.0, 0.0, f, 0.0, 0.0, 0.0]))).motion[
+            1
+        ]
+        for m1, f in ((5.0, -1.0), (5.0, -2.0), (6.0, -2.0))
+    ]
+    assert np.array_equal(shifts(tmp_path / "out"), np.array(wanted))
+
+
+def test_output_holds_the_input_and_is_the_same_every_time(tmp_path):
+    source = write(tmp_path / "in.mcap", TIMELINE)
+    replay(source, MODEL, tmp_path / "a.mcap")
+    replay(source, MODEL, tmp_path / "b.mcap")
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+    for topic in ("/joint_states", "/load_estimate", "/motor_commands"):
+        assert outputs(tmp_path / "a.mcap", topic) == outputs(source, topic)
+    corrected = outputs(tmp_path / "a.mcap", "/motor_commands_corrected")
+    assert [message.header.frame_id for message in corrected] == ["wrist_corrected"]
+
+
+def test_replay_of_a_replay_replaces_the_outputs(tmp_path):
+    replay(write(tmp_path / "in", TIMELINE), MODEL, tmp_path / "once")
+    summary = replay(tmp_path / "once", MODEL, tmp_path / "twice")
+    assert summary.replaced == 6
+    assert np.array_equal(shifts(tmp_path / "once"), shifts(tmp_path / "twice"))
+
+
+def test_recording_of_rosbags_with_foreign_names(tmp_path, capsys):
+    """Written by rosbags, other topics and joints in another order, read through the command."""
+    time_type = STORE.types["builtin_interfaces/msg/Time"]
+    header_type = STORE.types["std_msgs/msg/Header"]
+    state_type = STORE.types["sensor_msgs/msg/JointState"]
+    wrench_type = STORE.types["geometry_msgs/msg/WrenchStamped"]
+    vector, wrench = (
+        STORE.types["geometry_msgs/msg/Vector3"],
+        STORE.types["geometry_msgs/msg/Wrench"],
+    )
+    path = tmp_path / "foreign"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        states = writer.add_connection("/arm/joints", state_type.__msgtype__, typestore=STORE)
+        loads = writer.add_connection("/ft/wrench", wrench_type.__msgtype__, typestore=STORE)
+        for i in range(5):
+            ns = (i + 1) * MILLISECOND
+            stamp = header_type(time_type(0, ns), "wrist_base")
+            message = wrench_type(stamp, wrench(vector(0.1 * i, 0.0, -1.0), vector(0.0, 0.0, 0.0)))
+            writer.write(loads, ns, STORE.serialize_cdr(message, wrench_type.__msgtype__))
+            positions = np.radians([-10.0, 77.0, 20.0 + i])
+            message = state_type(stamp, ["b", "gripper", "a"], positions, np.zeros(0), np.zeros(0))
+            writer.write(states, ns, STORE.serialize_cdr(message, state_type.__msgtype__))
+    names = ["--topic", "/joint_states:=/arm/joints", "--topic", "/load_estimate:=/ft/wrench"]
+    names += ["--joint", "a", "--joint", "b"]
+    assert main(["replay", str(path), "-o", str(tmp_path / "out"), *names]) == 0
+    assert "5 predictions for 5 joint states" in capsys.readouterr().out
+    model = load_model(MODEL)
+    wanted = [
+        model.predict(
+            np.radians((20.0 + i, -10.0)), Load(np.array([0.1 * i, 0.0, -1.0, 0.0, 0.0, 0.0]))
+        ).motion[1]
+        for i in range(5)
+    ]
+    assert np.array_equal(shifts(tmp_path / "out"), np.array(wanted))
+
+
+FAULTS = {
+    "missing joint": (
+        joints(MILLISECOND, (1.0, 2.0), ("motor_1_joint", "x")),
+        "motor_2_joint is miss",
+    ),
+    "named twice": (joints(MILLISECOND, (1.0, 2.0), ("motor_1_joint",) * 2), "named 2 times"),
+    "NaN": (joints(MILLISECOND, (1.0, np.nan)), "not finite"),
+    "out of domain": (joints(MILLISECOND, (89.0, 0.0)), "outside the table's domain"),
+    "before any load": (joints(0, (1.0, 2.0)), "no load estimate with a stamp before"),
+    "stale load": (joints(900 * MILLISECOND, (1.0, 2.0)), "older than the joint state"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_bad_sample_is_counted_and_the_rest_goes_on(tmp_path, name):
+    bad, text = FAULTS[name]
+    timeline = [
+        (0, "/load_estimate", load(1, (0.0, 0.0, -1.0))),
+        (1, "/joint_states", bad),
+        (2, "/joint_states", joints(2 * MILLISECOND, (1.0, 2.0))),
+    ]
+    summary = replay(write(tmp_path / "in", timeline), MODEL, tmp_path / "out")
+    assert (summary.joint_states, summary.predictions) == (2, 1)
+    (reason,) = summary.refused
+    assert text in reason
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (load(0, (0.0, 0.0, -9.0)), "the table ends at 5 N"),
+        (load(0, (0.0, np.inf, 0.0)), "not finite"),
+        (load(0, (0.0, 0.0, -1.0), "gripper"), "frame 'gripper' is not known"),
+    ],
+    ids=["range", "inf", "frame"],
+)
+def test_a_bad_load_gives_no_prediction(tmp_path, message, text):
+    timeline = [
+        (0, "/load_estimate", message),
+        (1, "/joint_states", joints(MILLISECOND, (1.0, 2.0))),
+    ]
+    summary = replay(write(tmp_path / "in", timeline), MODEL, tmp_path / "out")
+    assert summary.predictions == 0
+    assert any(text in reason for reason in summary.refused)
+
+
+def test_truncated_recording_gives_what_is_there(tmp_path):
+    timeline = [
+        (i, *pair)
+        for i in range(2000)
+        for pair in (
+            ("/load_estimate", load(i * MILLISECOND, (0.0, 0.0, -1e-3 * (i % 97)))),
+            ("/joint_states", joints(i * MILLISECOND, (1e-2 * (i % 311), 2.0))),
+        )
+    ]
+    source = write(tmp_path / "in.mcap", timeline)
+    content = source.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: int(0.3 * len(content))])
+    replay(source, MODEL, tmp_path / "whole.mcap")
+    summary = replay(tmp_path / "cut.mcap", MODEL, tmp_path / "part.mcap")
+    assert summary.damage
+    part, whole = shifts(tmp_path / "part.mcap"), shifts(tmp_path / "whole.mcap")
+    assert 0 < len(part) < len(whole)
+    assert np.array_equal(part, whole[: len(part)])
+
+
+def test_recordings_that_cannot_be_used(tmp_path, capsys):
+    only_loads = write(tmp_path / "loads", [(0, "/load_estimate", load(0, (0.0, 0.0, -1.0)))])
+    with pytest.raises(RecordingError, match="no topic /joint_states"):
+        replay(only_loads, MODEL, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert main(["replay", str(tmp_path / "none"), "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("wrist-stiffness: error: ")
+    assert error.count("\n") == 1
