@@ -12,6 +12,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import (
     Header,
     JointState,
+    String,
     Vector3,
     Wrench,
     WrenchStamped,
@@ -178,17 +179,19 @@ def test_a_bad_load_gives_no_prediction(tmp_path, message, text):
 
 
 def test_truncated_recording_gives_what_is_there(tmp_path):
+    # The notes fill several chunks, so that the cut falls between joint states.
     timeline = [
         (i, *pair)
-        for i in range(2000)
+        for i in range(400)
         for pair in (
+            ("/recording_notes", String(f"{i:09d}" * 1000)),
             ("/load_estimate", load(i * MILLISECOND, (0.0, 0.0, -1e-3 * (i % 97)))),
             ("/joint_states", joints(i * MILLISECOND, (1e-2 * (i % 311), 2.0))),
         )
     ]
     source = write(tmp_path / "in.mcap", timeline)
     content = source.read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(content[: int(0.3 * len(content))])
+    (tmp_path / "cut.mcap").write_bytes(content[: int(0.5 * len(content))])
     replay(source, MODEL, tmp_path / "whole.mcap")
     summary = replay(tmp_path / "cut.mcap", MODEL, tmp_path / "part.mcap")
     assert summary.damage
