@@ -16,7 +16,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import CorrectionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import error_message, nanoseconds
-from wrist_stiffness.ros.qos import RELIABLE_QOS
+from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.settings import CORRECTION
 from wrist_stiffness.ros.wrist_node import WristNode
@@ -68,9 +68,9 @@ class AngleCorrector(WristNode):
     def make_inputs(self) -> list[Subscription]:
         """Listen to commands."""
         return [
-            self.create_subscription(JointState, "/motor_commands", self._on_command, RELIABLE_QOS),
+            self.create_subscription(JointState, "/motor_commands", self._on_command, COMMAND_QOS),
             self.create_subscription(
-                JointTrajectory, "/motor_trajectory", self._on_trajectory, RELIABLE_QOS
+                JointTrajectory, "/motor_trajectory", self._on_trajectory, COMMAND_QOS
             ),
         ]
 

@@ -5,8 +5,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Sensors in: hears reliable and best-effort drivers; 0.2 s of a 1 kHz stream may wait."""
 
+COMMAND_QOS = QoSProfile(depth=10)
+"""Commands in: reliable, but a corrector that cannot keep up drops old ones and does not lag."""
+
 RELIABLE_QOS = QoSProfile(depth=200)
-"""Commands in, and everything out."""
+"""Everything out."""
 
 RECORDING_QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """The recorder hears everybody."""

@@ -31,13 +31,18 @@ from wrist_stiffness.ros.qos import NOTES_QOS, RECORDING_QOS
 from wrist_stiffness.ros.run import run
 
 PARAMETERS = (
+    ParameterEntry("output", "", "new folder, or new file ending in .mcap", fixed=True),
     ParameterEntry(
-        "output", "", "new folder, or new file ending in .mcap", fixed=True
+        "begin_with",
+        "",
+        "topics, with blanks between, that must have a publisher first",
+        fixed=True,
     ),
 )
 
+LOOKS_PER_S = 20
+
 TOPICS: dict[str, type[Message]] = {
-    topics.JOINT_STATES: JointState,
     topics.LOAD_ESTIMATE: WrenchStamped,
     topics.TEMPERATURES: Temperature,
     topics.PLATFORM_POSE: PoseStamped,
@@ -55,7 +60,9 @@ TOPICS: dict[str, type[Message]] = {
     "/motor_trajectory_corrected": JointTrajectory,
     "/pose_error_residual": PoseWithCovarianceStamped,
     "/diagnostics": DiagnosticArray,
+    topics.JOINT_STATES: JointState,
 }
+"""The joint states last: who sees them heard knows that all the others are heard."""
 
 
 class Recorder(Node):
@@ -77,6 +84,13 @@ class Recorder(Node):
             raise InputError("recorder: the parameter output names no recording")
         self._recording = ExitStack()
         self._writer = self._recording.enter_context(RecordingWriter(output))
+        self._begin_with = self.get_parameter("begin_with").value.split()
+        self._looking = self.create_timer(1.0 / LOOKS_PER_S, self._look)
+
+    def _look(self) -> None:
+        if not all(self.count_publishers(topic) for topic in self._begin_with):
+            return
+        self._looking.cancel()
         for topic, message_type in TOPICS.items():
             package, kind, name = message_type.ros_type.split("/")
             self.create_subscription(

@@ -1,7 +1,10 @@
 """The nodes of a wrist and of the virtual cell: one list for the launch file and for `cell`."""
 
+from __future__ import annotations
+
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 ParameterValue = bool | int | float | str
 
@@ -12,13 +15,13 @@ class NodeEntry:
 
     Parameters
     ----------
-    executable
+    executable : str
         Name of the executable and of the module in `wrist_stiffness.ros`.
-    name
+    name : str
         Name of the node.
-    parameters
+    parameters : dict
         Values by parameter name.
-    remappings
+    remappings : tuple of (str, str)
         (standard, actual) topic names.
     """
 
@@ -26,6 +29,10 @@ class NodeEntry:
     name: str
     parameters: dict[str, ParameterValue] = field(default_factory=dict)
     remappings: tuple[tuple[str, str], ...] = ()
+
+    def having(self, parameters: Mapping[str, ParameterValue]) -> NodeEntry:
+        """Return the same entry with further parameters."""
+        return replace(self, parameters={**self.parameters, **parameters})
 
     def command(self) -> list[str]:
         """Return the process arguments that start this node with the running interpreter."""
@@ -49,3 +56,6 @@ SIMULATOR_NODE = NodeEntry(executable="cell_simulator", name="cell_simulator")
 
 CELL_NODES = (*WRIST_NODES, SIMULATOR_NODE)
 """The whole virtual cell."""
+
+RECORDER_NODE = NodeEntry(executable="recorder", name="recorder")
+"""Writes the wrist's topics into a recording; `ros2 bag` does where ROS is installed."""

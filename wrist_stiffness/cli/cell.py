@@ -1,0 +1,64 @@
+"""`wrist-stiffness cell`: all nodes and the virtual cell, started as processes."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wrist_stiffness.cli.main import OneLineParser
+
+DESCRIPTION = """\
+Start pose_error_predictor, angle_corrector and a virtual wrist as ROS 2 nodes on this machine.
+With --seconds the same motion runs twice, first without and then with correction, and the command
+ends by itself; else the motion goes on until Ctrl-C and
+'ros2 service call /angle_corrector/enable std_srvs/srv/SetBool "{data: true}"' switches the
+correction on. Without ROS_DOMAIN_ID in the environment the nodes get a domain of their own."""
+
+EPILOG = """\
+example:
+  wrist-stiffness cell --seconds 60 --record live
+  wrist-stiffness replay live -o replayed"""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `cell`."""
+    parser = commands.add_parser(
+        "cell",
+        help="run the nodes with a virtual wrist",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--model", type=Path, help="model of the nodes and of the cell (default: the shipped one)"
+    )
+    parser.add_argument(
+        "--seconds", type=float, metavar="S", help="about how long both motions take together"
+    )
+    parser.add_argument(
+        "--record", type=Path, metavar="OUT", help="recording to write: a folder or a .mcap file"
+    )
+    parser.add_argument(
+        "--rate", type=float, default=100.0, metavar="HZ", help="samples per second (default: 100)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of motion and noise (default: 0)")
+    parser.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.workflows.cell import run_cell
+
+    run_cell(
+        arguments.model,
+        arguments.seconds,
+        arguments.record,
+        arguments.rate,
+        arguments.seed,
+        Progress("cell"),
+    )
+    if arguments.record is not None:
+        print(f"written: {arguments.record}")
+    return 0

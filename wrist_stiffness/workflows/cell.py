@@ -1,0 +1,135 @@
+"""Run the nodes with the virtual cell, each as a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.workflows.node_list import (
+    RECORDER_NODE,
+    SIMULATOR_NODE,
+    WRIST_NODES,
+    NodeEntry,
+)
+
+LOOK_EVERY_S = 0.1
+
+PATIENCE_S = 60.0
+"""How long beyond its due time a run may take to start and to end."""
+
+END_PATIENCE_S = 15.0
+"""How long a node may take to end once it is told to."""
+
+DOMAINS = 90
+"""ROS domains 1 to 90; those above 101 clash with ports that Linux hands out."""
+
+Progress = Callable[[int, int], None]
+
+
+def run_cell(
+    model: Path | None = None,
+    seconds: float | None = None,
+    record: Path | None = None,
+    rate_hz: float = 100.0,
+    seed: int = 0,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Run predictor, corrector and virtual cell until the motion is over.
+
+    The same motion runs twice, first with the corrector off and then with it on, so that before
+    and after can be compared; the notes in the recording say where the second one begins.
+
+    Parameters
+    ----------
+    model : path, optional
+        Model file of nodes and cell; the shipped one if None.
+    seconds : float, optional
+        About how long both runs of the motion take together [s]; without it the motion goes on,
+        uncorrected, until the process is interrupted.
+    record : path, optional
+        Recording to write, as a rosbag2 folder or a `.mcap` file.
+    rate_hz : float
+        Samples per second.
+    seed : int
+        Of the motion and of the sensors' noise.
+    progress : callable
+        Called with seconds done and in all.
+
+    Raises
+    ------
+    WristError
+        If the model cannot be read, a node ends with an error, or the run does not end in time.
+    """
+    if find_spec("rclpy") is None:
+        raise InputError("cell: ROS 2 (rclpy) is not installed; pip install 'wrist_stiffness[ros]'")
+    if seconds is not None and not seconds > 0.0:
+        raise InputError(f"seconds: {seconds:g} is not positive")
+    chosen = {}
+    if model is not None:
+        load_model(model)
+        chosen["model_file"] = str(Path(model).resolve())
+    nodes = [node.having(chosen) for node in WRIST_NODES]
+    if record is not None:
+        heard = "/pose_error_predicted /motor_commands_corrected"
+        output = {"output": str(Path(record).resolve()), "begin_with": heard}
+        nodes.append(RECORDER_NODE.having(output))
+    moves: dict[str, float | int | bool] = {"rate_hz": float(rate_hz), "seed": seed}
+    # The predictor listens to the joint states, and so does the recorder.
+    moves["listeners"] = 1 if record is None else 2
+    if seconds is not None:
+        moves |= {"program_s": seconds / 2.0, "programs": 2, "enable_at_repeat": True}
+    with _processes([*nodes, SIMULATOR_NODE.having({**chosen, **moves})]) as running:
+        _wait(running, seconds, progress)
+
+
+def _wait(
+    running: Mapping[str, subprocess.Popen[bytes]], seconds: float | None, progress: Progress
+) -> None:
+    start_s = time.monotonic()
+    while True:
+        for name, process in running.items():
+            code = process.poll()
+            if code == 0 and name == SIMULATOR_NODE.name:
+                return
+            if code is not None:
+                raise InputError(f"cell: node {name} ended with code {code}")
+        elapsed_s = time.monotonic() - start_s
+        if seconds is not None:
+            if elapsed_s > 2.0 * seconds + PATIENCE_S:
+                raise InputError(f"cell: the motion is not over after {elapsed_s:.0f} s")
+            progress(round(min(elapsed_s, seconds)), round(seconds))
+        time.sleep(LOOK_EVERY_S)
+
+
+@contextmanager
+def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.Popen[bytes]]]:
+    """Start nodes; end them in any case, first asked and then forced."""
+    environment = {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": str(1 + os.getpid() % DOMAINS),
+        **os.environ,
+    }
+    running: dict[str, subprocess.Popen[bytes]] = {}
+    try:
+        for node in nodes:
+            # In a session of their own: an interrupt reaches them once, from here.
+            running[node.name] = subprocess.Popen(
+                node.command(), env=environment, start_new_session=True
+            )
+        yield running
+    finally:
+        for process in running.values():
+            process.terminate()
+        for process in running.values():
+            try:
+                process.wait(END_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
