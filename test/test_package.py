@@ -80,7 +80,6 @@ def test_message_packages_that_the_code_imports_are_declared():
     assert imported <= declared
 
 
-@pytest.mark.xfail(raises=FileNotFoundError, reason="the nodes are being written")
 def test_every_console_script_names_a_function_that_exists(source):
     run(sys.executable, "setup.py", "-q", "egg_info", cwd=source)
     scripts = configparser.ConfigParser()

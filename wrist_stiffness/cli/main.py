@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import NoReturn, Protocol
 
 from wrist_stiffness import __version__
-from wrist_stiffness.cli import predict, replay, table
+from wrist_stiffness.cli import cell, predict, replay, table
 from wrist_stiffness.errors import WristError
 
 PROG = "wrist-stiffness"
@@ -44,7 +44,7 @@ class CommandModule(Protocol):
         """Add this command's parser."""
 
 
-COMMANDS: tuple[CommandModule, ...] = (table, predict, replay)
+COMMANDS: tuple[CommandModule, ...] = (table, predict, replay, cell)
 
 
 class OneLineParser(argparse.ArgumentParser):
