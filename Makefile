@@ -24,7 +24,7 @@ help:
 	@echo "Each sets itself up in VENV=$(VENV) with PYTHON=$(PYTHON) (3.11 or 3.12)."
 
 demo: $(READY)
-	$(RUN) wrist_stiffness.workflows.demo -o demo
+	$(RUN) wrist_stiffness.cli.demo -o demo
 
 # The workers share the cores: threads of their own below them would only get in the way.
 test: export OPENBLAS_NUM_THREADS = 1

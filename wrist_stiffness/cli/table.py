@@ -110,12 +110,14 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows import table
     from wrist_stiffness.workflows.json_file import write_json
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
-    shown, pictures = table.show(path, arguments.output)
+    shown = load_table(path)
+    pictures = table.draw_maps(shown, arguments.output)
     _print_facts(shown)
     summary = table.summarise(shown)
     print("1 N downward, own weight left out, operative workspace:")

@@ -257,33 +257,28 @@ def summarise(table: Table, poses: Array | None = None) -> MapSummary:
     return MapSummary(operative, domain)
 
 
-def show(path: str | Path, folder: str | Path) -> tuple[Table, list[Path]]:
-    """Draw the maps of a table: displacement and orientation error over the joint space.
+def draw_maps(table: Table, folder: str | Path) -> list[Path]:
+    """Draw displacement and orientation error over the joint space (the paper's Figs. 5 and 6).
 
     Parameters
     ----------
-    path : path
-        Table file.
+    table : Table
+        The lookup.
     folder : path
-        Where the PNG files go.
+        Where the PNG files go; made if missing.
 
     Returns
     -------
-    Table
-        The lookup.
     list of Path
-        `map_s.png` and `map_phi.png` (the paper's Figs. 5 and 6) in the folder.
+        `map_s.png` and `map_phi.png`.
 
     Raises
     ------
-    TableError
-        If the table cannot be read.
     InputError
         If the folder cannot be made.
     """
     from wrist_stiffness.workflows.plotting import draw_map
 
-    table = load_table(path)
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -296,7 +291,7 @@ def show(path: str | Path, folder: str | Path) -> tuple[Table, list[Path]]:
     ):
         draw_map(table, column, scale, label, folder / name)
         pictures.append(folder / name)
-    return table, pictures
+    return pictures
 
 
 def facts(table: Table) -> Iterable[tuple[str, str]]:

@@ -1,0 +1,80 @@
+"""`make demo`: the main job from end to end, said in words."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from wrist_stiffness.cli.main import EXIT_BAD_INPUT, PROG
+from wrist_stiffness.cli.progress import Progress
+from wrist_stiffness.errors import WristError
+
+SECONDS = 60.0
+
+
+def main() -> int:
+    """Run the demo and say what it showed.
+
+    Returns
+    -------
+    int
+        0 done, 1 live and replayed predictions do not agree, 2 a step failed.
+    """
+    parser = argparse.ArgumentParser(prog="python -m wrist_stiffness.cli.demo", description=__doc__)
+    parser.add_argument("-o", "--output", default="demo", help="folder (default: demo)")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of the live run")
+    arguments = parser.parse_args()
+    try:
+        return _run(arguments.output, arguments.seconds)
+    except WristError as error:
+        print(f"{PROG}: error: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+
+
+def _run(output: str, seconds: float) -> int:
+    import numpy as np
+
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.before_after import rms
+    from wrist_stiffness.workflows.demo import beyond, run_demo
+    from wrist_stiffness.workflows.table import facts
+
+    model = shipped_file("config/palmieri2015_model.yaml")
+    print(f"Live: predictor, corrector and a virtual wrist as ROS 2 nodes, {seconds:g} s ...")
+    result = run_demo(output, model, seconds, Progress)
+
+    print("\nThe table")
+    for name, text in facts(result.table):
+        print(f"  {name + ':':26} {text}")
+
+    live = result.comparison
+    print("\nLive against replayed")
+    print(f"  equal to the bit:          {live.equal} predictions")
+    print(f"  load had not arrived:      {live.late} (live used the load before)")
+    print(f"  other differences:         {live.unexplained}")
+    print(f"  only live / only replayed: {live.only_live} / {live.only_replay}")
+
+    before, after = result.before, result.after
+    millidegrees = 1e3 * 180.0 / np.pi
+    pointing = [millidegrees * value for value in (rms(before.pointing), rms(after.pointing))]
+    floor = millidegrees * before.floor
+    elastic = [beyond(value, floor) for value in pointing]
+    shift = [1e6 * rms(values) for values in (before.shift, after.shift, after.shift_handed_on)]
+    print("\nTrue error of the virtual wrist at rest, RMS (it shares the model's elastic table)")
+    print(f"  pointing, without correction:      {pointing[0]:7.2f} mdeg")
+    print(f"  pointing, with correction:         {pointing[1]:7.2f} mdeg")
+    print(
+        f"  the encoder step alone makes:      {floor:7.2f} mdeg; {removed:.0f} % of the rest gone"
+    )
+    print(f"  shift s, without / with:           {shift[0]:7.2f} / {shift[1]:.2f} um")
+    print("  (two motors turn the platform about O, they cannot shift it)")
+    print(f"  shift s, if a manipulator takes it:{shift[2]:7.2f} um")
+    print(f"\nwritten: {output}/live, {output}/replayed")
+    for picture in result.pictures:
+        print(f"written: {picture}")
+    agreed = live.unexplained == 0 and live.equal > 0
+    return 0 if agreed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
