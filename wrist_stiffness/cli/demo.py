@@ -63,9 +63,8 @@ def _run(output: str, seconds: float) -> int:
     print("\nTrue error of the virtual wrist at rest, RMS (it shares the model's elastic table)")
     print(f"  pointing, without correction:      {pointing[0]:7.2f} mdeg")
     print(f"  pointing, with correction:         {pointing[1]:7.2f} mdeg")
-    print(
-        f"  the encoder step alone makes:      {floor:7.2f} mdeg; {removed:.0f} % of the rest gone"
-    )
+    print(f"  the encoder step alone makes:      {floor:7.2f} mdeg")
+    print(f"  beyond the step, without / with:   {elastic[0]:7.2f} / {elastic[1]:.2f} mdeg")
     print(f"  shift s, without / with:           {shift[0]:7.2f} / {shift[1]:.2f} um")
     print("  (two motors turn the platform about O, they cannot shift it)")
     print(f"  shift s, if a manipulator takes it:{shift[2]:7.2f} um")
