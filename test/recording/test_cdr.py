@@ -285,3 +285,12 @@ def test_both_byte_orders_in_one_topic_form_two_batches():
     batches, _ = decode_batches(Float64, [encode(message), big, encode(message)])
     assert [batch.indices.tolist() for batch in batches] == [[0, 2], [1]]
     assert [batch.columns["data"][0] for batch in batches] == [1.25, 1.25]
+
+
+def test_equal_sizes_with_other_lengths_inside_are_kept_apart():
+    # Only the counts tell these two apart.
+    first = JointState(position=(1.0, 2.0), velocity=(3.0,))
+    second = JointState(position=(1.0,), velocity=(2.0, 3.0))
+    assert len(encode(first)) == len(encode(second))
+    batches, _ = decode_batches(JointState, [encode(first), encode(second)])
+    assert [batch.first for batch in batches] == [first, second]

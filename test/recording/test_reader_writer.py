@@ -5,9 +5,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mcap.records import Chunk
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel as McapChannel
+from mcap.records import Chunk, MessageIndex, Schema
+from mcap.records import Header as McapHeader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.highlevel import AnyReader
@@ -162,8 +166,8 @@ def test_reads_what_rosbags_wrote(tmp_path):
 def test_reads_every_form_of_mcap(tmp_path, compression, use_chunking, with_index):
     path = tmp_path / "foreign.mcap"
     channel = channel_of("/covariates/humidity", Float64)
-    # Times jump back and forth across chunks and within them.
-    times = np.random.default_rng(7).permutation(2000).tolist()
+    # Times jump back and forth across chunks and within them, with many ties.
+    times = np.random.default_rng(7).integers(0, 300, 2000).tolist()
     with path.open("wb") as stream:
         writer = Writer(
             stream,
@@ -179,19 +183,20 @@ def test_reads_every_form_of_mcap(tmp_path, compression, use_chunking, with_inde
         writer.start("ros2")
         schema_id = writer.register_schema("std_msgs/Float64", "ros2msg", channel.schema_text)
         channel_id = writer.register_channel(channel.topic, "cdr", schema_id)
-        for time_ns in times:
-            writer.add_message(channel_id, time_ns, encode(Float64(float(time_ns))), time_ns)
+        for number, time_ns in enumerate(times):
+            writer.add_message(channel_id, time_ns, encode(Float64(float(number))), time_ns)
         writer.finish()
     recording = open_recording(path, strict=True)
     (info,) = recording.topics
     assert (info.ros_type, info.count, info.first_ns, info.last_ns) == (
         "std_msgs/msg/Float64",
         2000,
-        0,
-        1999,
+        min(times),
+        max(times),
     )
+    numbered = sorted(enumerate(times), key=lambda item: item[1])
     assert list(recording.messages()) == [
-        ("/covariates/humidity", time_ns, Float64(float(time_ns))) for time_ns in range(2000)
+        ("/covariates/humidity", time_ns, Float64(float(number))) for number, time_ns in numbered
     ]
 
 
@@ -302,6 +307,32 @@ def test_a_cut_file_gives_a_prefix_and_says_so(tmp_path, small):
     # Cuts in the summary lose nothing, cuts in the data whole chunks.
     assert len(entries) in found_lengths
     assert len(found_lengths) > 10
+
+
+@pytest.mark.parametrize("channels_first", [True, False], ids=["before chunks", "in chunks"])
+def test_a_cut_between_the_indexes_of_a_chunk_loses_no_topic(tmp_path, channels_first):
+    path = written(tmp_path / "cut.mcap", timeline(50))
+    declarations = RecordBuilder()
+    with path.open("rb") as stream:
+        for record in StreamReader(stream, emit_chunks=True).records:
+            if isinstance(record, McapHeader):
+                after_header = stream.tell()
+            elif isinstance(record, MessageIndex):
+                after_last_index = stream.tell()
+            elif isinstance(record, Schema | McapChannel):
+                record.write(declarations)
+    data = path.read_bytes()[: after_last_index - 1]
+    if channels_first:
+        data = data[:after_header] + declarations.end() + data[after_header:]
+    path.write_bytes(data)
+    recording = open_recording(path)
+    assert {info.name: info.count for info in recording.topics} == {
+        "/joint_states": 50,
+        "/load_estimate": 25,
+        "/recording_notes": 1,
+    }
+    assert "76 messages stand before that" in recording.damage
+    assert len(list(recording.messages())) == 76
 
 
 def test_flipped_bytes_never_escape_as_another_error(tmp_path, small):
@@ -472,6 +503,34 @@ def test_a_folder_with_anything_else_in_it_is_never_replaced(tmp_path):
     ):
         pass
     assert (path / "thesis.tex").exists()
+
+
+def test_metadata_is_what_rosbags_states_for_the_same_messages(tmp_path):
+    entries = list(timeline(20))
+    ours = written(tmp_path / "bag", entries)
+    theirs = tmp_path / "theirs"
+    with RosbagsWriter(theirs, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {}
+        for topic, time_ns, message in entries:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic, message.ros_type, typestore=TYPESTORE
+                )
+            writer.write(connections[topic], time_ns, encode(message))
+
+    def metadata(path):
+        information = yaml.safe_load((path / "metadata.yaml").read_text())[
+            "rosbag2_bagfile_information"
+        ]
+        del information["ros_distro"]
+        for topic in information["topics_with_message_count"]:
+            del topic["topic_metadata"]["offered_qos_profiles"]
+        return information
+
+    expected = metadata(theirs)
+    expected["files"][0]["path"] = "bag_0.mcap"
+    expected["relative_file_paths"] = ["bag_0.mcap"]
+    assert metadata(ours) == expected
 
 
 def test_an_empty_recording_is_a_recording(tmp_path):
