@@ -1,0 +1,147 @@
+"""What a writer leaves behind, whatever happens."""
+
+import pytest
+import yaml
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+from rosbags.typesys import Stores, get_typestore
+
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording import RecordingWriter, open_recording
+from wrist_stiffness.recording.cdr import encode
+from wrist_stiffness.recording.messages import (
+    Float64,
+    Header,
+    JointState,
+    Pose,
+    PoseStamped,
+)
+
+TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
+FORMS = pytest.mark.parametrize("name", ["bag", "file.mcap"], ids=["folder", "bare"])
+
+
+@FORMS
+def test_equal_messages_give_equal_bytes(tmp_path, name, timeline, written, mcap_of):
+    (tmp_path / "elsewhere").mkdir()
+    first = written(tmp_path / name, timeline(400))
+    second = written(tmp_path / "elsewhere" / f"other_{name}", timeline(400))
+    assert mcap_of(first).read_bytes() == mcap_of(second).read_bytes()
+
+
+@FORMS
+def test_an_exception_leaves_nothing_behind(tmp_path, name, timeline):
+    def write_and_fail():
+        with RecordingWriter(tmp_path / name) as writer:
+            for topic, time_ns, message in timeline(100):
+                writer.write(topic, message, time_ns)
+            assert not (tmp_path / name).exists()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        write_and_fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+@FORMS
+def test_an_existing_recording_is_replaced_only_on_request(
+    tmp_path, name, timeline, written, mcap_of, hidden_in
+):
+    path = written(tmp_path / name, timeline(5))
+    before = mcap_of(path).read_bytes()
+    with pytest.raises(RecordingError, match="exists already"), RecordingWriter(path):
+        pass
+    assert mcap_of(path).read_bytes() == before
+    with RecordingWriter(path, overwrite=True) as writer:
+        writer.write("/covariates/a", Float64(1.0), 1)
+        assert mcap_of(path).read_bytes() == before
+    assert len(list(open_recording(path, strict=True).messages())) == 1
+    assert hidden_in(tmp_path) == []
+
+
+def test_a_failed_replacement_keeps_the_old_recording(tmp_path, timeline, written, hidden_in):
+    path = written(tmp_path / "bag", timeline(5))
+
+    def replace_and_fail():
+        with RecordingWriter(path, overwrite=True) as writer:
+            writer.write("/covariates/a", "no message", 1)
+
+    with pytest.raises(AttributeError):
+        replace_and_fail()
+    assert len(list(open_recording(path, strict=True).messages())) == 9
+    assert hidden_in(tmp_path) == []
+
+
+def test_a_folder_with_anything_else_in_it_is_never_replaced(tmp_path, timeline, written):
+    path = written(tmp_path / "bag", timeline(5))
+    (path / "thesis.tex").write_text("years of work")
+    with (
+        pytest.raises(RecordingError, match="never overwritten"),
+        RecordingWriter(path, overwrite=True),
+    ):
+        pass
+    assert (path / "thesis.tex").exists()
+
+
+def test_metadata_is_what_rosbags_states_for_the_same_messages(tmp_path, timeline, written):
+    entries = list(timeline(20))
+    ours = written(tmp_path / "bag", entries)
+    theirs = tmp_path / "theirs"
+    with RosbagsWriter(theirs, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {}
+        for topic, time_ns, message in entries:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic, message.ros_type, typestore=TYPESTORE
+                )
+            writer.write(connections[topic], time_ns, encode(message))
+
+    def metadata(path):
+        information = yaml.safe_load((path / "metadata.yaml").read_text())[
+            "rosbag2_bagfile_information"
+        ]
+        del information["ros_distro"]
+        for topic in information["topics_with_message_count"]:
+            del topic["topic_metadata"]["offered_qos_profiles"]
+        return information
+
+    expected = metadata(theirs)
+    expected["files"][0]["path"] = "bag_0.mcap"
+    expected["relative_file_paths"] = ["bag_0.mcap"]
+    assert metadata(ours) == expected
+
+
+def test_an_empty_recording_is_a_recording(tmp_path, written):
+    path = written(tmp_path / "bag", [])
+    recording = open_recording(path, strict=True)
+    assert recording.topics == ()
+    assert list(recording.messages()) == []
+    with AnyReader([path], default_typestore=TYPESTORE) as reader:
+        assert list(reader.messages()) == []
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "time_ns", "reason"),
+    [
+        ("/joint_states", Float64(0.0), 1, "carries sensor_msgs/msg/JointState, not std_msgs"),
+        ("relative", Float64(0.0), 1, "does not begin with '/'"),
+        ("/a", Float64(0.0), -1, "log time -1 ns is outside"),
+        ("/a", Float64(0.0), 2**63, "is outside"),
+        ("/a", PoseStamped(Header(), Pose(position=None)), 1, "NoneType"),
+    ],
+)
+def test_what_cannot_be_written_is_refused(tmp_path, topic, message, time_ns, reason):
+    with RecordingWriter(tmp_path / "bag") as writer:
+        writer.write("/joint_states", JointState(), 1)
+        with pytest.raises(RecordingError, match=reason):
+            writer.write(topic, message, time_ns)
+    assert len(list(open_recording(tmp_path / "bag", strict=True).messages())) == 1
+
+
+def test_a_missing_parent_folder_is_named(tmp_path):
+    with (
+        pytest.raises(RecordingError, match="nowhere does not exist"),
+        RecordingWriter(tmp_path / "nowhere" / "bag"),
+    ):
+        pass
