@@ -30,7 +30,7 @@ def scaled(operators):
 def test_pack_and_unpack_are_inverse(shipped, poses):
     configuration = shipped.mechanism.forward(poses)
     before = shipped.operators_at(configuration, "closed_form")
-    after = unpack(pack(before), shipped.layout, configuration)
+    after = unpack(pack(before), shipped.components, configuration)
     for a, b in zip(scaled(before), scaled(after), strict=True):
         assert np.max(np.abs(a - b), initial=0.0) <= ROUNDING * np.max(np.abs(a), initial=1.0)
     assert np.allclose(before.screw_gap, after.screw_gap, atol=1e-14)

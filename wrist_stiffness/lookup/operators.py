@@ -7,46 +7,19 @@ the nodes; its Cholesky factor keeps it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wrist_stiffness.errors import TableError
-from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
+from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.kinematics import Configuration
-from wrist_stiffness.mechanism.statics import ContactOperators, contact_joints
+from wrist_stiffness.mechanism.statics import ContactOperators
 
 
-@dataclass(frozen=True)
-class SectorLayout:
-    """Which joint and which way each contact sector belongs to.
-
-    Parameters
-    ----------
-    slide : (m,) int
-        Index of the sector's joint in `PASSIVE_JOINTS`.
-    sign : (m,) float
-        Opening of the gap for a unit slide.
-    """
-
-    slide: np.ndarray
-    sign: Array
-
-    @classmethod
-    def of(cls, components: ElasticComponents) -> SectorLayout:
-        """Return the layout in which `contact_operators` stacks the sectors."""
-        joints = contact_joints(components)
-        sizes = [len(components.contact[joint].gap) for joint in joints]
-        slide = np.repeat([PASSIVE_JOINTS.index(joint) for joint in joints], sizes).astype(int)
-        signs = [components.contact[joint].sign for joint in joints]
-        return cls(slide, np.concatenate(signs) if signs else np.zeros(0))
-
-    @property
-    def columns(self) -> int:
-        """Number of spline columns per pose."""
-        size = 6 + len(self.sign)
-        return size * (size + 1) // 2 + len(self.sign) + 6
+def column_count(sectors: int) -> int:
+    """Return how many spline columns a pose has with this many flange sectors."""
+    size = 6 + sectors
+    return size * (size + 1) // 2 + sectors + 6
 
 
 def pack(operators: ContactOperators) -> Array:
@@ -85,15 +58,17 @@ def pack(operators: ContactOperators) -> Array:
     )
 
 
-def unpack(columns: Array, layout: SectorLayout, configuration: Configuration) -> ContactOperators:
+def unpack(
+    columns: Array, components: ElasticComponents, configuration: Configuration
+) -> ContactOperators:
     """Return the operators from interpolated spline columns.
 
     Parameters
     ----------
     columns : (..., columns) float
         As `pack` orders them.
-    layout : SectorLayout
-        Of the table.
+    components : ElasticComponents
+        Of the table: they say which joint each sector belongs to.
     configuration : Configuration
         The poses, for the slides that a screw at a component makes (kinematics, not elasticity).
 
@@ -102,28 +77,21 @@ def unpack(columns: Array, layout: SectorLayout, configuration: Configuration) -
     ContactOperators
         C and A positive semi-definite at every pose.
     """
-    m = len(layout.sign)
+    slide = components.sectors.slide
+    m = len(slide)
     size = 6 + m
     rows, places = np.tril_indices(size)
-    lead = columns.shape[:-1]
-    factor = np.zeros((*lead, size, size))
+    factor = np.zeros((*columns.shape[:-1], size, size))
     factor[..., rows, places] = columns[..., : len(rows)]
     whole = factor @ np.swapaxes(factor, -1, -2)
-    gap = columns[..., len(rows) : len(rows) + m]
+    slides = influence(configuration).slides()
+    screw_gap = np.zeros((*slides.shape[:-3], m, len(ELASTIC), 6))
+    screw_gap[..., :3] = np.einsum("mj,...kji->...mki", slide, slides)
     return ContactOperators(
         compliance=whole[..., :6, :6],
         force_twist=whole[..., :6, 6:],
         approach=whole[..., 6:, 6:],
-        gap=gap,
+        gap=columns[..., len(rows) : len(rows) + m],
         weight_twist=columns[..., len(rows) + m :],
-        screw_gap=sector_slides(layout, configuration),
+        screw_gap=screw_gap,
     )
-
-
-def sector_slides(layout: SectorLayout, configuration: Configuration) -> Array:
-    """Return each gap's opening by the slides that a component's screw makes, (..., m, 8, 6)."""
-    slides = influence(configuration).slides()
-    out = np.zeros((*slides.shape[:-3], len(layout.sign), len(ELASTIC), 6))
-    for i, (joint, sign) in enumerate(zip(layout.slide, layout.sign, strict=True)):
-        out[..., i, :, :3] = sign * slides[..., :, joint, :]
-    return out

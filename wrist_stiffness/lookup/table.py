@@ -15,7 +15,7 @@ import numpy as np
 
 from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.biharmonic import BiharmonicSpline, Kernel
-from wrist_stiffness.lookup.operators import SectorLayout, unpack
+from wrist_stiffness.lookup.operators import unpack
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
@@ -107,11 +107,6 @@ class Table:
         return Workspace(self.mechanism, self.geometry.limits)
 
     @cached_property
-    def layout(self) -> SectorLayout:
-        """Which joint each contact sector belongs to."""
-        return SectorLayout.of(self.components)
-
-    @cached_property
     def operator_spline(self) -> BiharmonicSpline:
         """Spline of the operators over the motor angles."""
         return BiharmonicSpline.fit(self.nodes, self.operators, self.header.kernel)
@@ -139,7 +134,7 @@ class Table:
             Of shape (...), with own weight in the geometry's gravity.
         """
         if (evaluation or self.header.evaluation) == "spline":
-            return unpack(self.operator_spline(configuration.theta), self.layout, configuration)
+            return unpack(self.operator_spline(configuration.theta), self.components, configuration)
         return contact_operators(configuration, self.components, self.geometry.gravity)
 
     def shares(self, configuration: Configuration) -> Array:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.errors import TableError, WristError
-from wrist_stiffness.lookup.operators import SectorLayout
+from wrist_stiffness.lookup.operators import column_count
 from wrist_stiffness.lookup.table import EVALUATIONS, MAP_COLUMNS, Table, TableHeader
 from wrist_stiffness.mechanism.components import (
     ELASTIC,
@@ -156,10 +156,10 @@ def load_table(path: str | Path) -> Table:
 
 
 def _check(table: Table, path: str | Path) -> None:
-    n, layout = len(table.nodes), SectorLayout.of(table.components)
+    n, sectors = len(table.nodes), len(table.components.sectors.gap)
     for name, array, shape in (
         ("nodes", table.nodes, (n, 2)),
-        ("operators", table.operators, (n, layout.columns)),
+        ("operators", table.operators, (n, column_count(sectors))),
         ("map_values", table.map_values, (n, len(MAP_COLUMNS))),
         ("flexibility", table.components.flexibility, (len(ELASTIC), 6, 6)),
     ):

@@ -15,7 +15,6 @@ import numpy as np
 from wrist_stiffness.mechanism.components import (
     CARRIER,
     ELASTIC,
-    PASSIVE_JOINTS,
     Array,
     ElasticComponents,
 )
@@ -192,11 +191,6 @@ class ContactOperators:
     gap: Array
     weight_twist: Array
     screw_gap: Array
-
-
-def contact_joints(components: ElasticComponents) -> list[str]:
-    """Return the passive joints with flanges, in the order in which their sectors are stacked."""
-    return [joint for joint in PASSIVE_JOINTS if joint in components.contact]
 
 
 def contact_operators(

@@ -309,7 +309,7 @@ def facts(table: Table) -> Iterable[tuple[str, str]]:
         "parts",
         f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces",
     )
-    yield "contact", f"{len(table.layout.sign)} flange sectors"
+    yield "contact", f"{len(table.components.sectors.gap)} flange sectors"
     yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
     yield "evaluation", header.evaluation
     yield (

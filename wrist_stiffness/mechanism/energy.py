@@ -1,0 +1,81 @@
+"""Whose share is it?  The strain energy of each component, with flanges in contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.influence import influence
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.statics import (
+    component_rotations,
+    turned_flexibilities,
+)
+from wrist_stiffness.mechanism.vectors import block_diagonal
+
+
+def component_wrenches(
+    configuration: Configuration, components: ElasticComponents, wrench: Array, force: Array
+) -> Array:
+    """Return the wrench through each component under a platform load and contact forces.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of shape (...).
+    components : ElasticComponents
+        Condensed parts.
+    wrench : (..., 6) float
+        On the platform at O in F [N, N m].
+    force : (..., m) float
+        Contact force of each sector [N], as the contact solution gives it.
+
+    Returns
+    -------
+    (..., 8, 6) float
+        G_k' W + N_k' lambda at O in F [N, N m]; own weight is not in it.
+    """
+    projectors = influence(configuration)
+    halves = np.reshape(wrench, (*np.shape(wrench)[:-1], 1, 2, 3))
+    through = np.einsum("...kji,...khj->...khi", projectors.of_components(), halves)
+    through = through.reshape(*through.shape[:-2], 6).copy()
+    # Net push of the hubs along the joint axes, by virtual work on the slides.
+    push = force @ components.sectors.slide
+    through[..., :3] += np.einsum("...j,...kji->...ki", push, projectors.slides())
+    return through
+
+
+def strain_energies(
+    configuration: Configuration, components: ElasticComponents, wrench: Array, force: Array
+) -> Array:
+    """Return the strain energy of each component; a bushing's flanges belong to it.
+
+    Where every touching sector had no gap, the energies add up to half the load's work: shares are
+    then an error budget.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of shape (...).
+    components : ElasticComponents
+        Condensed parts.
+    wrench : (..., 6) float
+        On the platform at O in F [N, N m].
+    force : (..., m) float
+        Contact force of each sector [N].
+
+    Returns
+    -------
+    (..., 8) float
+        In the order of `ELASTIC` [J].
+    """
+    through = component_wrenches(configuration, components, wrench, force)
+    flexibility = turned_flexibilities(configuration, components)
+    energy: Array = 0.5 * np.einsum("...ki,...kij,...kj->...k", through, flexibility, through)
+    sectors = components.sectors
+    turn = block_diagonal(component_rotations(configuration).take(sectors.component, axis=-3))
+    bent = np.einsum("...mij,mj,...m->...mi", turn, sectors.screw, force)
+    own = np.einsum("...mi,...mi->...m", through.take(sectors.component, axis=-2), bent)
+    own += 0.5 * force * (force @ sectors.approach)
+    belongs = sectors.component[:, None] == np.arange(len(ELASTIC))
+    return energy + own @ belongs
