@@ -82,9 +82,7 @@ def write_model(folder, table, name="synthetic"):
     save_table(table, folder / f"{name}.npz")
     path = folder / f"{name}_model.yaml"
     path.write_text(
-        yaml.safe_dump(
-            {"schema": 1, "name": name, "table": {"path": f"{name}.npz"}, "effects": []}
-        )
+        yaml.safe_dump({"schema": 1, "name": name, "table": {"path": f"{name}.npz"}, "effects": []})
     )
     return path
 

@@ -12,8 +12,8 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
-STEP_TOLERANCE = 1e-9
-"""A fixed-point step below this ends the search [rad]; 1e-5 of an encoder step."""
+STEP_TOLERANCE = 1e-10
+"""A fixed-point step below this ends the search [rad]; 1e-6 of an encoder step."""
 
 MAX_ITERATIONS = 20
 

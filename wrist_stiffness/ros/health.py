@@ -26,6 +26,11 @@ class Health:
         self._faults_before = 0
         self._last = ""
 
+    @property
+    def faults(self) -> int:
+        """How many samples were refused since the start."""
+        return self._faults.total()
+
     def good(self) -> None:
         """Count a sample that went well."""
         self._good += 1
@@ -52,8 +57,8 @@ class Health:
             came, else OK.
         """
         good = self._good - self._good_before
-        faults = self._faults.total() - self._faults_before
-        self._good_before, self._faults_before = self._good, self._faults.total()
+        faults = self.faults - self._faults_before
+        self._good_before, self._faults_before = self._good, self.faults
         if missing:
             level, message = DiagnosticStatus.ERROR, missing
         elif faults:

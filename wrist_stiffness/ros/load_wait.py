@@ -30,6 +30,10 @@ class LoadWait:
         self._clock_ns = clock_ns
         self._waiting: deque[tuple[int, JointState]] = deque()
 
+    def __len__(self) -> int:
+        """Return how many wait."""
+        return len(self._waiting)
+
     def put(self, message: JointState) -> None:
         """Add a joint state."""
         self._waiting.append((self._clock_ns() + self._limit_ns, message))

@@ -38,7 +38,7 @@ class PoseErrorPredictor(WristNode):
         super().__init__("pose_error_predictor", PREDICTION, **options)
         wait_s = self.get_parameter("load_wait_s").value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._wait = LoadWait(wait_s, lambda: steady.now().nanoseconds)
+        self.waiting = LoadWait(wait_s, lambda: steady.now().nanoseconds)
         if wait_s > 0.0:
             self.create_timer(wait_s / CHECKS_PER_WAIT, self.after_load, clock=steady)
         self.autostart()
@@ -71,12 +71,12 @@ class PoseErrorPredictor(WristNode):
         ]
 
     def _on_joint_state(self, message: JointState) -> None:
-        self._wait.put(message)
+        self.waiting.put(message)
         self.after_load()
 
     def after_load(self) -> None:
         """Predict for the joint states that need not wait any longer."""
-        for message in self._wait.ready(self.stream.loads.history.newest_ns):
+        for message in self.waiting.ready(self.stream.loads.history.newest_ns):
             self._predict(message)
 
     def _predict(self, message: JointState) -> None:

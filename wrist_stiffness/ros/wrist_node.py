@@ -60,7 +60,7 @@ class WristNode(LifecycleNode):
         super().__init__(name, **options)
         self._entries = (*COMMON, *entries)
         declare(self, self._entries)
-        self.health = Health(name)
+        self.health = Health(self.get_name())
         self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
         self._model_fault = "no model is loaded"
         self.add_on_set_parameters_callback(self._check_parameters)

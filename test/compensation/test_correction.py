@@ -1,0 +1,129 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.compensation.correction import correct
+from wrist_stiffness.compensation.objective import OBJECTIVES
+from wrist_stiffness.errors import LoadRangeError, SingularPoseError, UnreachablePoseError
+from wrist_stiffness.model.error_model import ErrorModel, Load
+
+FIXED_POINT = 1e-9  # rad; the search ends at steps of 1e-10 rad
+FORCE, MOMENT = 1.0, 0.03
+
+
+def random_cases(model, count, seed=3):
+    rng = np.random.default_rng(seed)
+    lower, upper = model.table.workspace.rectangle
+    for _ in range(count):
+        wrench = rng.normal(size=6) * np.repeat([FORCE, MOMENT], 3) / np.sqrt(3.0)
+        yield 0.6 * rng.uniform(lower, upper), Load(wrench, bool(rng.integers(2)))
+
+
+def actual_pose(model, theta, load):
+    """Return rotation and shift of the platform by composing the parts, without `correction`."""
+    prediction = model.predict(theta, load)
+    bent = Rotation.from_rotvec(prediction.twist[3:]).as_matrix()
+    return bent @ model.table.mechanism.forward(theta).platform, prediction.motion[1]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_normal_points_where_it_was_commanded(model, objective, seed):
+    normal = model.table.geometry.platform.normal
+    for theta, load in random_cases(model, 20, seed):
+        correction = correct(model, theta, load, objective("pointing"))
+        wanted = model.table.mechanism.forward(theta).platform @ normal
+        before = actual_pose(model, theta, load)[0] @ normal
+        after = actual_pose(model, theta + correction.delta, load)[0] @ normal
+        assert np.linalg.norm(np.cross(after, wanted)) < FIXED_POINT
+        assert np.linalg.norm(np.cross(before, wanted)) > 1e3 * FIXED_POINT
+
+
+@pytest.mark.parametrize("name", ["orientation", "tool_point"])
+def test_no_small_change_of_the_angles_is_better(model, objective, name):
+    def size(theta, load, wanted):
+        rotation, shift = actual_pose(model, theta, load)
+        if name == "tool_point":
+            point = objective(name).tool_point
+            return np.linalg.norm(rotation @ point + shift - wanted @ point)
+        return Rotation.from_matrix(rotation @ wanted.T).magnitude()
+
+    for theta, load in random_cases(model, 10):
+        correction = correct(model, theta, load, objective(name))
+        wanted = model.table.mechanism.forward(theta).platform
+        best = size(theta + correction.delta, load, wanted)
+        assert best < size(theta, load, wanted)
+        change = 0.05 * np.max(np.abs(correction.delta))
+        for direction in ([1, 0], [-1, 0], [0, 1], [0, -1]):
+            moved = theta + correction.delta + change * np.array(direction)
+            assert best < size(moved, load, wanted)
+
+
+@pytest.mark.parametrize("name", OBJECTIVES)
+def test_objective_is_the_derivative_of_the_task(model, objective, name):
+    rng = np.random.default_rng(5)
+    configuration = model.table.mechanism.forward(np.array([0.3, -0.2]))
+    twist = 1e-6 * rng.normal(size=6)
+    moved = Rotation.from_rotvec(twist[3:]).as_matrix() @ configuration.platform
+    task = objective(name).matrix(configuration) @ twist
+    if name == "pointing":
+        normal = objective(name).normal
+        change = np.linalg.norm((moved - configuration.platform) @ normal)
+        assert np.linalg.norm(task) == pytest.approx(change, rel=1e-5)
+    elif name == "orientation":
+        assert np.allclose(task, twist[3:], rtol=1e-12)
+    else:
+        point = objective(name).tool_point
+        change = (moved - configuration.platform) @ point + twist[:3]
+        assert np.allclose(task, change, rtol=1e-5, atol=1e-12)
+
+
+def test_residuals_are_actual_minus_desired(model, objective):
+    theta, load = next(random_cases(model, 1))
+    correction = correct(model, theta, load, objective("pointing"))
+    wanted = model.table.mechanism.forward(theta).platform
+    for twist, angles in ((correction.before, theta), (correction.after, theta + correction.delta)):
+        rotation, shift = actual_pose(model, angles, load)
+        assert np.allclose(
+            Rotation.from_rotvec(twist[3:]).as_matrix(), rotation @ wanted.T, atol=1e-14
+        )
+        # Half of the rotation acts on the shift: 1e-4 rad times 1e-5 m.
+        assert np.allclose(twist[:3], shift, atol=1e-8)
+
+
+def test_a_load_in_the_platform_frame_turns_with_the_platform(model, objective):
+    theta = np.array([0.3, -0.4])
+    wrench = np.array([0.4, -0.7, 0.2, 0.01, 0.0, -0.02])
+    turn = model.table.mechanism.forward(theta).platform
+    in_base = Load(np.concatenate([turn @ wrench[:3], turn @ wrench[3:]]))
+    on_platform = Load(wrench, on_platform=True)
+    assert np.allclose(
+        model.predict(theta, in_base).twist, model.predict(theta, on_platform).twist, rtol=1e-12
+    )
+    moved = theta + 0.2
+    assert not np.allclose(
+        model.predict(moved, in_base).twist, model.predict(moved, on_platform).twist, rtol=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("theta", "wrench", "error"),
+    [
+        ([2.0, 0.0], [0, 0, -1.0, 0, 0, 0], UnreachablePoseError),
+        ([0.0, 0.0], [0, 0, -6.0, 0, 0, 0], LoadRangeError),
+        ([0.0, 0.0], [0, 0, 0, 0, 0.2, 0], LoadRangeError),
+    ],
+)
+def test_outside_of_the_table_nothing_is_corrected(model, objective, theta, wrench, error):
+    with pytest.raises(error):
+        correct(model, np.array(theta), Load(np.array(wrench, dtype=float)), objective("pointing"))
+
+
+def test_a_singular_pose_is_refused(make_table, objective):
+    table = make_table()
+    header = replace(table.header, geometry=dict(table.header.geometry))
+    header.geometry["limits"] = {**header.geometry["limits"], "singularity": 0.9}
+    strict = ErrorModel("strict", replace(table, header=header), "closed_form")
+    with pytest.raises(SingularPoseError, match="below the limit 0.9"):
+        correct(strict, np.array([0.8, 0.0]), Load(np.zeros(6)), objective("pointing"))

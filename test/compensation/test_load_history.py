@@ -1,0 +1,121 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.load_history import LoadHistory, LoadIntake
+from wrist_stiffness.errors import InputError, StaleLoadError
+from wrist_stiffness.model.error_model import Load
+
+SECOND = 1_000_000_000
+AGE_LIMIT_S = 0.5
+
+
+def load_of(value, on_platform=False):
+    return Load(np.full(6, float(value)), on_platform)
+
+
+# Within the age limit of each other, so that no clock jump is seen.
+stamps = st.integers(SECOND, SECOND + SECOND // 2)
+
+
+@given(st.lists(stamps, min_size=1, max_size=30), st.integers(SECOND // 2, 3 * SECOND))
+def test_the_newest_load_that_is_not_younger_belongs_to_a_joint_state(arriving, asked):
+    history = LoadHistory(AGE_LIMIT_S)
+    last = {}
+    for value, stamp in enumerate(arriving):
+        history.add(stamp, load_of(value))
+        last[stamp] = value
+    older = [stamp for stamp in arriving if stamp <= asked]
+    if older and asked - max(older) <= SECOND // 2:
+        found, load = history.at(asked)
+        assert found == max(older)
+        assert load.wrench[0] == last[max(older)]
+    else:
+        with pytest.raises(StaleLoadError):
+            history.at(asked)
+
+
+@given(st.permutations(range(8)))
+def test_arrival_order_does_not_matter(order):
+    history = LoadHistory(AGE_LIMIT_S)
+    for i in order:
+        history.add(SECOND + i, load_of(i))
+    assert [history.at(SECOND + i)[1].wrench[0] for i in range(8)] == list(range(8))
+
+
+def test_a_stale_load_is_named_with_age_and_limit():
+    history = LoadHistory(AGE_LIMIT_S)
+    history.add(SECOND, load_of(1))
+    with pytest.raises(StaleLoadError, match=r"1\.250 s older.*limit 0\.5 s"):
+        history.at(2 * SECOND + SECOND // 4)
+
+
+def test_loads_that_come_too_late_for_their_joint_state_are_counted():
+    # load stamps      10       12   13
+    # joint state          11           14
+    # arrival: 10, ask 11, 12, ask 14, 13 (late), 15
+    history = LoadHistory(AGE_LIMIT_S)
+    history.add(10, load_of(10))
+    history.at(11)
+    history.add(12, load_of(12))
+    assert history.late == 0
+    history.at(14)
+    history.add(13, load_of(13))
+    assert history.late == 1
+    history.add(15, load_of(15))
+    assert history.late == 1
+
+
+def test_after_the_clock_jumped_back_old_loads_are_forgotten():
+    history = LoadHistory(AGE_LIMIT_S)
+    for i in range(10):
+        history.add(100 * SECOND + i, load_of(1))
+    history.add(2 * SECOND, load_of(2))
+    assert history.at(2 * SECOND)[1].wrench[0] == 2
+    assert len(history) == 1
+
+
+def test_memory_is_bounded_and_the_newest_stay():
+    history = LoadHistory(AGE_LIMIT_S)
+    for i in range(3 * LoadHistory.CAPACITY):
+        history.add(i, load_of(i))
+    assert len(history) == LoadHistory.CAPACITY
+    assert history.at(3 * LoadHistory.CAPACITY)[1].wrench[0] == 3 * LoadHistory.CAPACITY - 1
+
+
+def intake():
+    return LoadIntake(Frames(), AGE_LIMIT_S)
+
+
+def test_tare_takes_the_mean_of_the_last_second_as_zero():
+    loads = intake()
+    loads.add(0, "wrist_base", [9.0, 0, 0], [0, 0, 0])
+    for i in range(5):
+        loads.add(2 * SECOND + i * SECOND // 10, "wrist_base", [i, 0, 0], [0, 0, 1.0])
+    assert loads.tare().wrench.tolist() == [2.0, 0, 0, 0, 0, 1.0]
+    _, load = loads.at(2 * SECOND + SECOND // 10)
+    assert load.wrench.tolist() == [-1.0, 0, 0, 0, 0, 0]
+
+
+def test_tare_without_a_load_is_refused():
+    with pytest.raises(StaleLoadError, match="no load estimate has arrived"):
+        intake().tare()
+
+
+def test_tare_of_mixed_frames_is_refused():
+    loads = intake()
+    loads.add(SECOND, "wrist_base", [0, 0, 0], [0, 0, 0])
+    loads.add(SECOND + 1, "wrist_platform", [0, 0, 0], [0, 0, 0])
+    with pytest.raises(InputError, match="mixed"):
+        loads.tare()
+
+
+def test_a_tare_in_another_frame_than_the_load_is_refused():
+    loads = intake()
+    loads.add(SECOND, "wrist_base", [1, 0, 0], [0, 0, 0])
+    loads.tare()
+    loads.add(2 * SECOND, "wrist_platform", [0, 0, 0], [0, 0, 0])
+    with pytest.raises(InputError, match="another frame"):
+        loads.at(2 * SECOND)

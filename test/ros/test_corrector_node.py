@@ -1,0 +1,256 @@
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Duration
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool, Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from wrist_stiffness.compensation.correction import correct
+from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.ros.angle_corrector import AngleCorrector
+from wrist_stiffness.ros.conversions import nanoseconds, time_message
+
+SECOND = 1_000_000_000
+THETA = (0.1, -0.2)
+DOWN = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+NAME = "angle_corrector"
+NAMES = ("motor_1_joint", "motor_2_joint")
+OUTPUTS = {
+    "/motor_commands_corrected": JointState,
+    "/motor_positions_corrected": Float64MultiArray,
+    "/motor_trajectory_corrected": JointTrajectory,
+    "/pose_error_residual": PoseWithCovarianceStamped,
+}
+
+
+def add_corrector(graph, model_path, **parameters):
+    node = graph.add(AngleCorrector, model_file=str(model_path), **parameters)
+    for topic, message_type in OUTPUTS.items():
+        graph.listen(message_type, topic)
+        graph.connected(topic)
+    return node
+
+
+@pytest.fixture
+def corrector(graph, model_path):
+    return add_corrector(graph, model_path, enabled_on_start=True)
+
+
+def commands(graph):
+    return graph.heard["/motor_commands_corrected"]
+
+
+def wait_for_commands(graph, count):
+    for topic in ("/motor_commands_corrected", "/motor_positions_corrected"):
+        graph.until(lambda topic=topic: len(graph.heard[topic]) >= count, f"{topic} {count}")
+
+
+def send_load(graph, node, stamp_ns, wrench=DOWN):
+    graph.load(stamp_ns, wrench)
+    graph.until(lambda: node.stream.loads.history.newest_ns == stamp_ns, "load")
+
+
+def expected(model, theta=THETA, name="pointing"):
+    platform = model.table.geometry.platform
+    objective = Objective(name, platform.normal, platform.tool_point)
+    return correct(model, np.array(theta), Load(np.array(DOWN)), objective)
+
+
+def test_an_enabled_corrector_corrects_to_the_bit(graph, corrector, model):
+    send_load(graph, corrector, SECOND)
+    graph.joints(
+        "/motor_commands", SECOND + 5, (THETA[1], 9.0, THETA[0]), (NAMES[1], "gripper", NAMES[0])
+    )
+    wait_for_commands(graph, 1)
+    command, correction = commands(graph)[0], expected(model)
+    corrected = np.array(THETA) + correction.delta
+    assert np.max(np.abs(correction.delta)) > 1e-6
+    assert command.position.tolist() == [corrected[1], 9.0, corrected[0]]
+    assert list(command.name) == [NAMES[1], "gripper", NAMES[0]]
+    assert nanoseconds(command.header.stamp) == SECOND + 5
+    assert command.header.frame_id == "wrist_corrected"
+    graph.until(lambda: graph.heard["/pose_error_residual"], "residual")
+    assert graph.heard["/motor_positions_corrected"][0].data.tolist() == corrected.tolist()
+    pose = graph.heard["/pose_error_residual"][0].pose.pose
+    position, quaternion = pose_of_twist(correction.after)
+    assert [pose.position.x, pose.position.y, pose.position.z] == position.tolist()
+    assert pose.orientation.x == quaternion[0]
+
+
+def test_it_starts_disabled_and_passes_commands_unchanged(graph, model_path, model):
+    node = add_corrector(graph, model_path)
+    send_load(graph, node, SECOND)
+    graph.joints("/motor_commands", SECOND + 5, frame_id="plan")
+    wait_for_commands(graph, 1)
+    assert commands(graph)[0].position.tolist() == list(THETA)
+    assert commands(graph)[0].header.frame_id == "plan"
+    answer = graph.call(SetBool, f"/{NAME}/enable", SetBool.Request(data=True))
+    assert answer.success
+    assert "on" in answer.message
+    graph.joints("/motor_commands", SECOND + 6)
+    wait_for_commands(graph, 2)
+    assert commands(graph)[1].position.tolist() == (THETA + expected(model).delta).tolist()
+    graph.call(SetBool, f"/{NAME}/enable", SetBool.Request(data=False))
+    graph.joints("/motor_commands", SECOND + 7)
+    wait_for_commands(graph, 3)
+    assert commands(graph)[2].position.tolist() == list(THETA)
+
+
+UNSAFE = {
+    "no load yet": (None, THETA, "", "StaleLoadError"),
+    "stale load": (SECOND - 2 * SECOND // 3, THETA, "", "StaleLoadError"),
+    "corrected already": (SECOND, THETA, "wrist_corrected", "InputError"),
+    "out of the domain": (SECOND, (2.0, 0.0), "", "UnreachablePoseError"),
+}
+
+
+@pytest.mark.parametrize(("load", "theta", "frame", "reason"), UNSAFE.values(), ids=UNSAFE)
+def test_where_a_correction_is_not_safe_the_command_passes_unchanged(
+    graph, corrector, load, theta, frame, reason
+):
+    if load is not None:
+        send_load(graph, corrector, load)
+    graph.joints("/motor_commands", SECOND, theta, frame_id=frame)
+    wait_for_commands(graph, 1)
+    assert commands(graph)[0].position.tolist() == list(theta)
+    assert graph.heard["/motor_positions_corrected"][0].data.tolist() == list(theta)
+    _, values = graph.status(NAME, lambda status, values: f"refused {reason}" in values)
+    assert values[f"refused {reason}"] == "1"
+    assert graph.heard["/pose_error_residual"] == []
+
+
+BAD = {
+    "nan": ((float("nan"), 0.0), NAMES),
+    "infinite": ((0.0, float("-inf")), NAMES),
+    "another joint is nan": ((0.0, 0.0, float("nan")), (*NAMES, "gripper")),
+    "missing": ((0.1,), NAMES[:1]),
+    "duplicated": ((0.1, 0.2, 0.3), (*NAMES, NAMES[1])),
+}
+
+
+@pytest.mark.parametrize(("theta", "names"), BAD.values(), ids=BAD)
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_command_that_is_no_command_is_not_forwarded(graph, model_path, theta, names, enabled):
+    node = add_corrector(graph, model_path, enabled_on_start=enabled)
+    send_load(graph, node, SECOND)
+    graph.joints("/motor_commands", SECOND + 1, theta, names)
+    graph.joints("/motor_commands", SECOND + 2)
+    wait_for_commands(graph, 1)
+    assert nanoseconds(commands(graph)[0].header.stamp) == SECOND + 2
+    assert node.health.faults == 1
+
+
+def trajectory(stamp_ns, points):
+    message = JointTrajectory(joint_names=list(reversed(NAMES)))
+    message.header.stamp = time_message(stamp_ns)
+    for i, (first, second) in enumerate(points):
+        message.points.append(
+            JointTrajectoryPoint(
+                positions=[second, first],
+                velocities=[0.1, 0.2],
+                time_from_start=Duration(sec=i),
+            )
+        )
+    return message
+
+
+def test_a_whole_trajectory_is_corrected_point_by_point(graph, corrector, model):
+    send_load(graph, corrector, SECOND)
+    points = [(0.0, 0.0), (0.2, 0.1), (0.4, -0.3)]
+    graph.publish("/motor_trajectory", trajectory(SECOND, points))
+    graph.until(lambda: graph.heard["/motor_trajectory_corrected"], "trajectory")
+    message = graph.heard["/motor_trajectory_corrected"][0]
+    assert message.header.frame_id == "wrist_corrected"
+    for i, (point, theta) in enumerate(zip(message.points, points, strict=True)):
+        corrected = theta + expected(model, theta).delta
+        assert np.allclose(point.positions, corrected[::-1], rtol=0, atol=1e-15)
+        assert point.velocities.tolist() == [0.1, 0.2]
+        assert point.time_from_start.sec == i
+
+
+def test_a_trajectory_is_corrected_whole_or_not_at_all(graph, corrector):
+    send_load(graph, corrector, SECOND)
+    graph.publish("/motor_trajectory", trajectory(SECOND, [(0.0, 0.0), (2.0, 0.0)]))
+    graph.publish("/motor_trajectory", trajectory(SECOND, [(0.0, float("nan"))]))
+    graph.publish("/motor_trajectory", trajectory(SECOND, [(0.3, 0.0)]))
+    graph.until(lambda: len(graph.heard["/motor_trajectory_corrected"]) == 2, "trajectories")
+    first, second = graph.heard["/motor_trajectory_corrected"]
+    assert [point.positions.tolist() for point in first.points] == [[0.0, 0.0], [0.0, 2.0]]
+    assert len(second.points) == 1
+    assert second.points[0].positions[1] != 0.3
+
+
+def test_of_two_correctors_in_a_chain_only_one_corrects(graph, corrector, model, model_path):
+    rules = ["--ros-args", "-r", "__node:=second"]
+    for topic in OUTPUTS:
+        rules += ["-r", f"{topic}:=/second{topic}"]
+    rules += ["-r", "/motor_commands:=/motor_commands_corrected"]
+    second = AngleCorrector(
+        context=graph.context,
+        cli_args=rules,
+        parameter_overrides=[
+            Parameter("model_file", value=str(model_path)),
+            Parameter("enabled_on_start", value=True),
+        ],
+    )
+    graph.executor.add_node(second)
+    graph.listen(JointState, "/second/motor_commands_corrected")
+    graph.connected("/second/motor_commands_corrected")
+    graph.until(lambda: graph.probe.count_subscribers("/motor_commands_corrected") == 2, "chain")
+    send_load(graph, corrector, SECOND)
+    graph.until(lambda: second.stream.loads.history.newest_ns == SECOND, "load")
+    graph.joints("/motor_commands", SECOND)
+    graph.until(lambda: graph.heard["/second/motor_commands_corrected"], "command")
+    message = graph.heard["/second/motor_commands_corrected"][0]
+    assert message.position.tolist() == (THETA + expected(model).delta).tolist()
+    _, values = graph.status("second", lambda status, values: "refused InputError" in values)
+    assert "not twice" in values["last fault"]
+
+
+def test_parameters_are_checked_when_they_change(graph, corrector, model):
+    for name, value in (
+        ("objective", "beauty"),
+        ("correction_limit_deg", -1.0),
+        ("frames", "{ft: {parent: moon}}"),
+        ("motor_1_joint", "motor_2_joint"),
+        ("enabled_on_start", False),
+        ("load_age_limit_s", "long"),
+    ):
+        (result,) = corrector.set_parameters([Parameter(name, value=value)])
+        assert not result.successful, name
+        assert result.reason
+    (result,) = corrector.set_parameters([Parameter("objective", value="orientation")])
+    assert result.successful
+    send_load(graph, corrector, SECOND)
+    graph.joints("/motor_commands", SECOND)
+    wait_for_commands(graph, 1)
+    wanted = THETA + expected(model, name="orientation").delta
+    assert commands(graph)[0].position.tolist() == wanted.tolist()
+
+
+def test_a_correction_beyond_the_limit_is_not_applied(graph, model_path):
+    node = add_corrector(graph, model_path, enabled_on_start=True, correction_limit_deg=1e-6)
+    send_load(graph, node, SECOND)
+    graph.joints("/motor_commands", SECOND)
+    wait_for_commands(graph, 1)
+    assert commands(graph)[0].position.tolist() == list(THETA)
+    _, values = graph.status(NAME, lambda status, values: values["last fault"])
+    assert "larger than the limit" in values["last fault"]
+
+
+def test_a_damaged_model_leaves_the_running_one_in_use(graph, corrector, model, tmp_path):
+    path = tmp_path / "damaged.yaml"
+    path.write_text("schema: 7")
+    assert corrector.set_parameters([Parameter("model_file", value=str(path))])[0].successful
+    answer = graph.call(Trigger, f"/{NAME}/reload_model", Trigger.Request())
+    assert not answer.success
+    assert "schema 7" in answer.message
+    send_load(graph, corrector, SECOND)
+    graph.joints("/motor_commands", SECOND)
+    wait_for_commands(graph, 1)
+    assert commands(graph)[0].position.tolist() == (THETA + expected(model).delta).tolist()

@@ -1,0 +1,182 @@
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.ros.conversions import nanoseconds
+from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
+
+SECOND = 1_000_000_000
+THETA = (0.1, -0.2)
+DOWN = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+NAME = "pose_error_predictor"
+NAMES = ("motor_1_joint", "motor_2_joint")
+
+
+@pytest.fixture
+def predictor(graph, model_path):
+    node = graph.add(PoseErrorPredictor, model_file=str(model_path))
+    for message_type, topic in (
+        (PoseWithCovarianceStamped, "/pose_error_predicted"),
+        (Float64, "/pose_error/s_um"),
+        (Float64, "/pose_error/phi_mdeg"),
+    ):
+        graph.listen(message_type, topic)
+        graph.connected(topic)
+    return node
+
+
+def predictions(graph):
+    return graph.heard["/pose_error_predicted"]
+
+
+def wait_for_predictions(graph, count):
+    graph.until(lambda: len(predictions(graph)) >= count, f"prediction {count}")
+
+
+def wait_for_load(graph, predictor, stamp_ns):
+    graph.until(lambda: predictor.stream.loads.history.newest_ns == stamp_ns, "load")
+
+
+def numbers(message):
+    pose = message.pose.pose
+    p, q = pose.position, pose.orientation
+    return [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+
+
+def expected(model, theta=THETA, wrench=DOWN):
+    twist = model.predict(np.array(theta), Load(np.array(wrench))).twist
+    return np.concatenate(pose_of_twist(twist)).tolist()
+
+
+def test_publishes_what_the_model_predicts_to_the_bit(graph, predictor, model):
+    graph.load(SECOND)
+    wait_for_load(graph, predictor, SECOND)
+    # Another joint in between, motors in the other order.
+    graph.joints(
+        "/joint_states", SECOND + 7, (THETA[1], 9.0, THETA[0]), (NAMES[1], "gripper", NAMES[0])
+    )
+    wait_for_predictions(graph, 1)
+    message = predictions(graph)[0]
+    prediction = model.predict(np.array(THETA), Load(np.array(DOWN)))
+    assert nanoseconds(message.header.stamp) == SECOND + 7
+    assert message.header.frame_id == "wrist_base"
+    assert numbers(message) == expected(model)
+    assert message.pose.covariance.tolist() == prediction.covariance.ravel().tolist()
+    graph.until(lambda: graph.heard["/pose_error/phi_mdeg"], "phi")
+    assert graph.heard["/pose_error/s_um"][0].data == pytest.approx(1e6 * prediction.shift_norm)
+    assert graph.heard["/pose_error/phi_mdeg"][0].data == pytest.approx(
+        1e3 * np.degrees(prediction.phi)
+    )
+
+
+BAD_JOINTS = {
+    "missing": ((0.1,), NAMES[:1], "InputError"),
+    "duplicated": ((0.1, 0.2, 0.3), (*NAMES, NAMES[0]), "InputError"),
+    "nan": ((float("nan"), 0.0), NAMES, "InputError"),
+    "infinite": ((0.0, float("inf")), NAMES, "InputError"),
+    "too few positions": ((0.1,), NAMES, "InputError"),
+    "out of the domain": ((2.0, 0.0), NAMES, "UnreachablePoseError"),
+}
+
+
+@pytest.mark.parametrize(("theta", "names", "reason"), BAD_JOINTS.values(), ids=BAD_JOINTS)
+def test_a_bad_joint_state_gives_no_prediction_and_a_reason(
+    graph, predictor, model, theta, names, reason
+):
+    graph.load(SECOND)
+    wait_for_load(graph, predictor, SECOND)
+    graph.joints("/joint_states", SECOND + 1, theta, names)
+    graph.joints("/joint_states", SECOND + 2, THETA)
+    wait_for_predictions(graph, 1)
+    assert nanoseconds(predictions(graph)[0].header.stamp) == SECOND + 2
+    _, values = graph.status(NAME, lambda status, values: f"refused {reason}" in values)
+    assert values[f"refused {reason}"] == "1"
+    assert values["samples"] == "1"
+
+
+BAD_LOADS = {
+    "wrong frame": (DOWN, "tool0", "FrameError", "StaleLoadError"),
+    "nan": ((0, 0, float("nan"), 0, 0, 0), "wrist_base", "InputError", "StaleLoadError"),
+    "beyond range": ((0, 0, -9.0, 0, 0, 0), "wrist_base", "LoadRangeError", "LoadRangeError"),
+}
+
+
+@pytest.mark.parametrize(("wrench", "frame", "reason", "then"), BAD_LOADS.values(), ids=BAD_LOADS)
+def test_a_bad_load_gives_no_prediction_and_a_reason(graph, predictor, wrench, frame, reason, then):
+    graph.load(SECOND, wrench, frame)
+    graph.until(
+        lambda: len(predictor.stream.loads.history) or predictor.health.faults, "answer to the load"
+    )
+    graph.joints("/joint_states", SECOND + 1)
+    graph.status(NAME, lambda status, values: f"refused {reason}" in values)
+    _, values = graph.status(NAME, lambda status, values: f"refused {then}" in values)
+    assert values["samples"] == "0"
+    assert predictions(graph) == []
+
+
+def test_a_silent_load_stops_the_predictions_after_the_age_limit(graph, predictor):
+    graph.load(SECOND)
+    wait_for_load(graph, predictor, SECOND)
+    for stamp in (SECOND + SECOND // 2, SECOND + SECOND // 2 + 1, 3 * SECOND):
+        graph.joints("/joint_states", stamp)
+    graph.until(lambda: predictor.health.faults == 2, "two refused samples")
+    graph.load(3 * SECOND)
+    wait_for_load(graph, predictor, 3 * SECOND)
+    graph.joints("/joint_states", 3 * SECOND + 1)
+    wait_for_predictions(graph, 2)
+    stamps = [nanoseconds(message.header.stamp) for message in predictions(graph)]
+    assert stamps == [SECOND + SECOND // 2, 3 * SECOND + 1]
+
+
+def test_tare_makes_the_present_load_zero(graph, predictor, model):
+    refused = graph.call(Trigger, f"/{NAME}/tare", Trigger.Request())
+    assert not refused.success
+    assert "no load estimate" in refused.message
+    graph.load(SECOND)
+    wait_for_load(graph, predictor, SECOND)
+    assert graph.call(Trigger, f"/{NAME}/tare", Trigger.Request()).success
+    graph.joints("/joint_states", SECOND)
+    wait_for_predictions(graph, 1)
+    assert numbers(predictions(graph)[0]) == expected(model, wrench=np.zeros(6))
+
+
+def test_a_joint_state_waits_for_its_load(graph, model_path, model):
+    node = graph.add(PoseErrorPredictor, model_file=str(model_path), load_wait_s=1.0)
+    graph.listen(PoseWithCovarianceStamped, "/pose_error_predicted")
+    graph.connected("/pose_error_predicted")
+    graph.load(SECOND, np.zeros(6))
+    wait_for_load(graph, node, SECOND)
+    graph.joints("/joint_states", SECOND + 10)
+    graph.until(lambda: len(node.waiting) == 1, "waiting joint state")
+    graph.load(SECOND + 10)
+    wait_for_predictions(graph, 1)
+    assert numbers(predictions(graph)[0]) == expected(model)
+    # No further load: predicted with the one that is there when the wait is over.
+    graph.joints("/joint_states", SECOND + 20)
+    wait_for_predictions(graph, 2)
+    assert numbers(predictions(graph)[1]) == expected(model)
+
+
+def test_without_a_model_nothing_is_predicted_until_one_is_loaded(graph, tmp_path, model_path):
+    graph.add(PoseErrorPredictor, model_file=str(tmp_path / "none.yaml"))
+    status, _ = graph.status(NAME, lambda status, values: True)
+    assert status.level == status.ERROR
+    assert "none.yaml: cannot be read" in status.message
+    refused = graph.call(Trigger, f"/{NAME}/reload_model", Trigger.Request())
+    assert not refused.success
+    assert "none.yaml" in refused.message
+    node = next(node for node in graph.executor.get_nodes() if node.get_name() == NAME)
+    node.set_parameters([Parameter("model_file", value=str(model_path))])
+    answer = graph.call(Trigger, f"/{NAME}/reload_model", Trigger.Request())
+    assert answer.success, answer.message
+    graph.load(SECOND)
+    wait_for_load(graph, node, SECOND)
+    graph.listen(PoseWithCovarianceStamped, "/pose_error_predicted")
+    graph.connected("/pose_error_predicted")
+    graph.joints("/joint_states", SECOND)
+    wait_for_predictions(graph, 1)

@@ -1,0 +1,144 @@
+"""Nodes as processes: started, stopped, and the whole cell recorded and replayed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from wrist_stiffness.cli import main as command_line
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.recording import open_recording
+from wrist_stiffness.workflows.cell import run_cell
+from wrist_stiffness.workflows.node_list import WRIST_NODES
+from wrist_stiffness.workflows.replay import replay
+
+DEADLINE_S = 60.0
+NODES = {node.name: node for node in WRIST_NODES}
+
+pytestmark = pytest.mark.slow
+
+
+def listed_nodes(graph):
+    graph.executor.spin_once(timeout_sec=0.05)
+    return graph.probe.get_node_names()
+
+
+@pytest.mark.parametrize("name", NODES)
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_node_cleanly(graph, name, ending):
+    with subprocess.Popen(NODES[name].command(), stderr=subprocess.PIPE, text=True) as process:
+        try:
+            graph.until(lambda: name in listed_nodes(graph), name)
+            graph.status(name, lambda status, values: True)
+            process.send_signal(ending)
+            _, errors = process.communicate(timeout=DEADLINE_S)
+        finally:
+            process.kill()
+    assert process.returncode == 0
+    assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize(
+    ("parameters", "text"),
+    [
+        ({"load_age_limit_s": -1.0}, "load_age_limit_s"),
+        ({"load_age_limit_s": "long"}, "load_age_limit_s"),
+        ({"frames": "'{ft: {parent: moon}}'"}, "parent 'moon'"),
+    ],
+)
+def test_a_node_does_not_start_with_wrong_parameters(parameters, text):
+    node = NODES["pose_error_predictor"].having(parameters)
+    ended = subprocess.run(node.command(), capture_output=True, text=True, timeout=DEADLINE_S)
+    assert ended.returncode == 2
+    assert "Traceback" not in ended.stderr
+    assert text in ended.stderr.splitlines()[-1]
+
+
+def test_a_killed_node_comes_back(graph):
+    node = NODES["pose_error_predictor"]
+    for _ in range(2):
+        with subprocess.Popen(node.command()) as process:
+            try:
+                graph.heard["/diagnostics"].clear()
+                status, _ = graph.status(node.name, lambda status, values: True)
+                assert status.level != status.ERROR
+            finally:
+                process.kill()
+
+
+def payloads(path, topic):
+    """Return the stored bytes of a topic by their log time and order."""
+    return [raw.payload for raw in open_recording(path).raw_messages([topic])]
+
+
+def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path):
+    live, replayed = tmp_path / "live", tmp_path / "replayed"
+    run_cell(seconds=3.0, record=live, rate_hz=50.0)
+    counts = {topic.name: topic.count for topic in open_recording(live).topics}
+    assert counts["/joint_states"] > 100
+    for topic in (
+        "/load_estimate",
+        "/motor_commands",
+        "/motor_commands_corrected",
+        "/motor_positions_corrected",
+        "/platform_pose_measured",
+        "/pose_error_predicted",
+        "/pose_error/s_um",
+        "/pose_error/phi_mdeg",
+    ):
+        assert counts[topic] == counts["/joint_states"], topic
+    assert 0 < counts["/pose_error_residual"] < counts["/joint_states"]
+    late = [
+        value.value
+        for _, _, message in open_recording(live).messages(["/diagnostics"])
+        for status in message.status
+        for value in status.values
+        if status.name == "pose_error_predictor" and value.key == "loads that came late"
+    ]
+    replay(live, model_path, replayed)
+    differing = sum(
+        before != after
+        for before, after in zip(
+            payloads(live, "/pose_error_predicted"),
+            payloads(replayed, "/pose_error_predicted"),
+            strict=True,
+        )
+    )
+    assert differing <= int(late[-1])
+
+
+def test_the_cell_stops_when_it_is_interrupted(tmp_path):
+    path = tmp_path / "interrupted.mcap"
+    with subprocess.Popen(
+        [sys.executable, "-m", "wrist_stiffness", "cell", "--record", str(path)],
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            end_s = time.monotonic() + DEADLINE_S
+            while not list(tmp_path.glob(f".{path.name}.*")) and time.monotonic() < end_s:
+                assert process.poll() is None
+                os.sched_yield()
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=DEADLINE_S)
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert open_recording(path).damage == ""
+
+
+def test_the_cell_says_which_node_failed(tmp_path, capfd):
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(InputError, match="node recorder ended with code 2"):
+        run_cell(seconds=1.0, record=tmp_path / "taken")
+    assert "exists already" in capfd.readouterr().err
+
+
+def test_the_cell_refuses_wrong_input(tmp_path, capsys):
+    assert command_line.main(["cell", "--seconds", "-1"]) == 2
+    assert command_line.main(["cell", "--model", str(tmp_path / "none.yaml")]) == 2
+    assert "none.yaml" in capsys.readouterr().err
