@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,14 +86,11 @@ class ErrorModel:
         Elastic lookup of the wrist.
     evaluation : str
         `closed_form` or `spline`.
-    source : Path or None
-        The model file.
     """
 
     name: str
     table: Table
     evaluation: Evaluation
-    source: Path | None = None
 
     def with_evaluation(self, evaluation: Evaluation) -> ErrorModel:
         """Return the same model with the other evaluation of its table."""

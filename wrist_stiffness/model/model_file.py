@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.lookup.table import EVALUATIONS
+from wrist_stiffness.lookup.table import EVALUATIONS, Evaluation
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
 from wrist_stiffness.model.error_model import ErrorModel
 
 SCHEMA = 1
-KEYS = {"schema", "name", "table", "evaluation", "effects", "provenance"}
 
 
 def load_model(path: str | Path) -> ErrorModel:
@@ -32,51 +29,32 @@ def load_model(path: str | Path) -> ErrorModel:
     Raises
     ------
     InputError
-        If the file cannot be read or a key is missing, unknown or wrong.
+        If the file cannot be read, a key is missing, unknown or wrong, or the table is another one
+        than the model was made for.
     TableError
-        If the table cannot be read or is another one than the model names.
+        If the table cannot be read.
     """
     path = Path(path)
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a YAML file: {' '.join(str(error).split())}") from error
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: not a model file, expected a mapping")
-    if unknown := set(values) - KEYS:
-        raise InputError(f"{path}: unknown key {', '.join(sorted(map(str, unknown)))}")
-    if values.get("schema") != SCHEMA:
-        raise InputError(f"{path}: schema {values.get('schema')!r} is not {SCHEMA}")
-    name = values.get("name")
-    if not isinstance(name, str):
-        raise InputError(f"{path}: name is missing or no text")
-    if values.get("effects") != []:
+    root = Block(read_yaml(path, InputError), str(path), InputError, sources=())
+    schema = root.number("schema")
+    if schema != SCHEMA:
+        raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
+    name = root.text("name")
+    effects = root.take("effects")
+    if effects != []:
         raise InputError(
-            f"{path}: effects: {values.get('effects')!r}: this version knows no effects, use []"
+            f"{path}.effects: this version knows no effects, found {effects!r}; use []"
         )
-    place, checksum = _table_entry(values.get("table"), path)
-    table = load_table(path.parent / place)
-    if checksum is not None and table.checksum != checksum:
+    entry = root.block("table")
+    table = load_table(path.parent / entry.text("path"))
+    if "checksum" in entry.values and (wanted := entry.text("checksum")) != table.checksum:
         raise InputError(
-            f"{path}: its table {place} has checksum {table.checksum[:12]}, the model was made for "
-            f"{checksum[:12]}"
+            f"{path}.table.checksum: the model was made for {wanted[:12]}, "
+            f"{entry.text('path')} is {table.checksum[:12]}"
         )
-    evaluation = values.get("evaluation", table.header.evaluation)
-    if evaluation not in EVALUATIONS:
-        raise InputError(
-            f"{path}: evaluation {evaluation!r} is not one of {', '.join(EVALUATIONS)}"
-        )
-    return ErrorModel(name, table, evaluation, path)
-
-
-def _table_entry(entry: Any, path: Path) -> tuple[str, str | None]:
-    if not isinstance(entry, dict) or not isinstance(entry.get("path"), str):
-        raise InputError(f"{path}: table.path is missing")
-    if unknown := set(entry) - {"path", "checksum"}:
-        raise InputError(f"{path}: table: unknown key {', '.join(sorted(map(str, unknown)))}")
-    checksum = entry.get("checksum")
-    if checksum is not None and not isinstance(checksum, str):
-        raise InputError(f"{path}: table.checksum: {checksum!r} is no text")
-    return entry["path"], checksum
+    entry.no_more_keys()
+    evaluation: Evaluation = table.header.evaluation
+    if "evaluation" in root.values:
+        evaluation = root.text("evaluation", EVALUATIONS)  # type: ignore[assignment]
+    root.no_more_keys()
+    return ErrorModel(name, table, evaluation)
