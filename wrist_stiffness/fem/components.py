@@ -10,8 +10,9 @@ from importlib.metadata import version
 import numpy as np
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.fem.parts import Part, Solid, assemble_body, cross_matrix, wrist_parts
-from wrist_stiffness.fem.solids import FLANGES, SECTORS, MeshSettings
+from wrist_stiffness.fem.parts import Part, Solid, assemble_body, wrist_parts
+from wrist_stiffness.fem.revolve import SECTORS
+from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement, condense
 from wrist_stiffness.mechanism.components import (
     PASSIVE_JOINTS,
@@ -20,8 +21,11 @@ from wrist_stiffness.mechanism.components import (
     FlangeContact,
 )
 from wrist_stiffness.mechanism.geometry import BushingDimensions, Geometry, PlatformDimensions
+from wrist_stiffness.mechanism.vectors import skew
 
-SHIPPED_SIZES = MeshSettings(link=2.0e-3, bore=0.8e-3, bushing=0.5e-3)
+SHIPPED_SIZES = MeshSettings(
+    link=1.2e-3, bore=0.8e-3, bushing=0.5e-3, bushing_corner=0.02e-3, bushing_arc=1.4e-3
+)
 """Element sizes of the shipped tables; `convergence.py` states their error."""
 
 PACKAGES = ("netgen-mesher", "scikit-fem", "scipy", "numpy", "pymetis")
@@ -153,21 +157,19 @@ def place_components(
     )
 
 
-def _flange_contact(
-    part: Part, element: Superelement, bushing: BushingDimensions
-) -> FlangeContact:
+def _flange_contact(part: Part, element: Superelement, bushing: BushingDimensions) -> FlangeContact:
     wrench, screw = element.sector_wrench, element.sector_screw
-    along = wrench.T @ screw
+    on_hub = wrench.T @ (element.flexibility @ wrench + screw)
     gap_of = dict(zip(FLANGES, (bushing.inner_gap, bushing.outer_gap), strict=True))
     return FlangeContact(
         sign=np.sign(wrench[2]) * np.sign(bushing.radius),
         screw=part.home.screw @ (element.flexibility @ wrench + screw),
-        approach=wrench.T @ element.flexibility @ wrench + along + along.T + element.sector_approach,
+        approach=on_hub + screw.T @ wrench + element.sector_approach,
         weight_approach=element.sector_weight @ part.home.rotation.T,
         gap=np.repeat([gap_of[flange] for flange in part.solid.flanges], SECTORS).astype(float),
     )
 
 
 def _platform_weight(platform: PlatformDimensions) -> Array:
-    centre = cross_matrix(platform.centre_of_gravity)
+    centre = skew(platform.centre_of_gravity)
     return platform.mass * np.vstack([np.eye(3), centre])

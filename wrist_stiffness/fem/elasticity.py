@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from skfem import Basis, ElementTetP2, FacetBasis
+from skfem import Basis, ElementTetP2, ElementTriP2
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTri
 
 from wrist_stiffness.fem.mesh import SolidMesh
 from wrist_stiffness.mechanism.components import Array
@@ -83,7 +85,9 @@ def thermal_load(mesh: SolidMesh, material: Material) -> Array:
 def volume_integrals(mesh: SolidMesh) -> Array:
     """Integral of each node's shape function over the solid (n,) [m^3]."""
     basis = Basis(mesh.tets, ElementTetP2(), intorder=LOAD_ORDER)
-    values = np.array([np.einsum("eq,eq->e", field[0].value, basis.dx) for field in basis.basis])
+    values = np.array(
+        [np.einsum("eq,eq->e", np.asarray(field[0]), basis.dx) for field in basis.basis]
+    )
     integrals = np.zeros(len(mesh.nodes))
     np.add.at(integrals, mesh.elements, values.T)
     return integrals
@@ -104,21 +108,25 @@ def surface_integrals(mesh: SolidMesh, surface: str) -> Array:
     Array
         (n, 4) integrals of N [m^2] and of N x, N y, N z [m^3].
     """
-    basis = FacetBasis(
-        mesh.tets, ElementTetP2(), facets=mesh.surfaces[surface], intorder=LOAD_ORDER
+    triangles = mesh.surface_triangles(surface)
+    points, weights = get_quadrature(RefTri, LOAD_ORDER)
+    shape, slope = map(
+        np.array, zip(*(ElementTriP2().lbasis(points, i) for i in range(6)), strict=True)
     )
-    factors = np.stack([np.ones_like(basis.dx), *np.asarray(basis.global_coordinates())])
+    corners = mesh.nodes[triangles]
+    tangents = np.einsum("fni,ndq->dfqi", corners, slope)
+    area = weights * np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1)
+    place = np.einsum("fni,nq->fqi", corners, shape)
+    factors = np.concatenate([np.ones((*area.shape, 1)), place], axis=-1)
     integrals = np.zeros((len(mesh.nodes), 4))
-    dofs = np.asarray(basis.element_dofs)
-    for shape, nodes in zip(basis.basis, dofs, strict=True):
-        values = np.broadcast_to(shape[0].value, basis.dx.shape)
-        np.add.at(integrals, nodes, np.einsum("kfq,fq,fq->fk", factors, values, basis.dx))
+    np.add.at(integrals, triangles, np.einsum("nq,fq,fqk->fnk", shape, area, factors))
     return integrals
 
 
 def body_force(mesh: SolidMesh, density: float) -> Array:
     """Nodal forces of a unit acceleration field along x, y and z (3 n, 3) [N/(m/s^2)]."""
-    return np.kron(density * volume_integrals(mesh)[:, None], np.eye(3))
+    forces = density * volume_integrals(mesh)[:, None, None] * np.eye(3)
+    return forces.reshape(-1, 3)
 
 
 def rigid_motion(points: Array) -> Array:

@@ -61,9 +61,8 @@ def factorise(matrix: sparse.spmatrix, unknowns: NDArray[np.int64]) -> Factor:
     links.setdiag(False)
     links.eliminate_zeros()
     graph = pymetis.CSRAdjacency(links.indptr, links.indices)
-    nodes, _ = pymetis.nested_dissection(graph)
-    rank = np.empty(len(nodes), dtype=np.int64)
-    rank[nodes] = np.arange(len(nodes))
+    nodes = np.asarray(pymetis.nested_dissection(graph)[0])
+    rank = np.argsort(nodes)
     order = np.argsort(rank[group], kind="stable").astype(np.int64)
     reordered = sparse.csc_matrix(sparse.csr_matrix(matrix)[order][:, order])
     lu = splu(

@@ -42,12 +42,15 @@ class SolidMesh:
         """Node numbers of the tetrahedra in the order of `SKFEM_TET10` (n, 10)."""
         return np.asarray(self.tets.dofs.element_dofs.T, dtype=np.int64)
 
+    def surface_triangles(self, name: str) -> NDArray[np.int64]:
+        """Nodes of a named surface's triangles: corners, then middles of 01, 12, 02 (m, 6)."""
+        facets = self.surfaces[name]
+        middles = self.tets.dofs.edge_dofs[0][self.tets.f2e[:, facets]]
+        return np.concatenate([self.tets.facets[:, facets], middles]).T.astype(np.int64)
+
     def surface_nodes(self, name: str) -> NDArray[np.int64]:
         """Node numbers on a named surface, sorted (n,)."""
-        facets = self.surfaces[name]
-        vertices = self.tets.facets[:, facets]
-        edges = self.tets.dofs.edge_dofs[0][self.tets.f2e[:, facets]]
-        return np.unique(np.concatenate([vertices.ravel(), edges.ravel()])).astype(np.int64)
+        return np.unique(self.surface_triangles(name))
 
 
 def mesh_solid(shape: OCCGeometry) -> SolidMesh:
@@ -71,20 +74,25 @@ def mesh_solid(shape: OCCGeometry) -> SolidMesh:
     return SolidMesh(tets, _named_surfaces(netgen, volume[:, :4], tets))
 
 
+def match_facets(tets: MeshTet2, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Facet numbers of triangles given by their vertex numbers (n, 3), sorted and unique (m,)."""
+    count = tets.nvertices
+    keys = _triple_key(np.sort(tets.facets.T, axis=1), count)
+    order = np.argsort(keys)
+    found = np.searchsorted(keys[order], _triple_key(np.sort(triangles, axis=1), count))
+    return np.unique(order[found]).astype(np.int64)
+
+
 def _named_surfaces(
     netgen: NetgenMesh, corners: NDArray[np.int64], tets: MeshTet2
 ) -> dict[str, NDArray[np.int64]]:
     """Facets by surface name; scikit-fem has renumbered the vertices in ascending order."""
     surface = netgen.Elements2D().NumPy()
-    vertices = np.unique(corners)
-    triangles = np.sort(np.searchsorted(vertices, surface["nodes"][:, :3].astype(np.int64) - 1))
-    facet_keys = _triple_key(np.sort(tets.facets.T, axis=1), len(vertices))
-    order = np.argsort(facet_keys)
-    found = order[np.searchsorted(facet_keys[order], _triple_key(triangles, len(vertices)))]
-    names = np.array([face.bcname for face in netgen.FaceDescriptors()])
-    name_of = names[surface["index"] - 1]
+    triangles = np.searchsorted(np.unique(corners), surface["nodes"][:, :3].astype(np.int64) - 1)
+    names = np.array([face.bcname for face in netgen.FaceDescriptors()])[surface["index"] - 1]
     return {
-        str(name): np.unique(found[name_of == name]) for name in np.unique(names) if name != "default"
+        str(name): match_facets(tets, triangles[names == name])
+        for name in np.unique(names[names != "default"])
     }
 
 

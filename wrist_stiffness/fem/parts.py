@@ -14,13 +14,8 @@ from scipy import sparse
 
 from wrist_stiffness.fem.elasticity import body_force, stiffness_matrix, surface_integrals
 from wrist_stiffness.fem.mesh import SolidMesh, mesh_solid
-from wrist_stiffness.fem.solids import (
-    FLANGES,
-    SECTORS,
-    MeshSettings,
-    bushing_shape,
-    link_shape,
-)
+from wrist_stiffness.fem.revolve import SECTORS, revolve
+from wrist_stiffness.fem.solids import FLANGES, MeshSettings, bushing_section, link_shape
 from wrist_stiffness.mechanism.components import ELASTIC, LINKS, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.geometry import (
     BushingDimensions,
@@ -28,6 +23,7 @@ from wrist_stiffness.mechanism.geometry import (
     LinkDimensions,
     Material,
 )
+from wrist_stiffness.mechanism.vectors import skew
 
 
 @dataclass(frozen=True)
@@ -50,7 +46,7 @@ class Placement:
         """Screws at the part's origin in its axes to screws at O in F (6, 6)."""
         return np.block(
             [
-                [self.rotation, cross_matrix(self.origin) @ self.rotation],
+                [self.rotation, skew(self.origin) @ self.rotation],
                 [np.zeros((3, 3)), self.rotation],
             ]
         )
@@ -61,7 +57,7 @@ class Placement:
         return np.block(
             [
                 [self.rotation, np.zeros((3, 3))],
-                [cross_matrix(self.origin) @ self.rotation, self.rotation],
+                [skew(self.origin) @ self.rotation, self.rotation],
             ]
         )
 
@@ -173,10 +169,9 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
         In the solid's own axes.
     """
     if isinstance(solid.dimensions, LinkDimensions):
-        shape = link_shape(solid.dimensions, solid.angle, sizes)
+        mesh = mesh_solid(link_shape(solid.dimensions, solid.angle, sizes))
     else:
-        shape = bushing_shape(solid.dimensions, sizes)
-    mesh = mesh_solid(shape)
+        mesh = _bushing_mesh(solid.dimensions, sizes)
     pressure = np.zeros((len(mesh.nodes), 3, len(solid.sectors)))
     for k, sector in enumerate(solid.sectors):
         share = surface_integrals(mesh, sector)[:, 0]
@@ -191,12 +186,6 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
     )
 
 
-def cross_matrix(vector: Array) -> Array:
-    """Matrix of the cross product with a vector (3, 3)."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def _link_part(geometry: Geometry, name: str) -> Part:
     motor_side, platform_side = geometry.link_ends(name)
     normal = np.cross(motor_side, platform_side)
@@ -207,6 +196,12 @@ def _link_part(geometry: Geometry, name: str) -> Part:
     axes = np.column_stack([motor_side, np.cross(normal, motor_side), normal])
     solid = Solid(geometry.links[name], angle, "motor_bore", "platform_bore", ())
     return Part(name, solid, Placement(axes, np.zeros(3)))
+
+
+def _bushing_mesh(bushing: BushingDimensions, sizes: MeshSettings) -> SolidMesh:
+    sector_arc = math.pi / SECTORS * (bushing.pin_diameter + 2.0 * bushing.wall)
+    arcs = max(1, math.ceil(sector_arc / sizes.bushing_arc))
+    return revolve(bushing_section(bushing, sizes), arcs)
 
 
 def _bushing_part(geometry: Geometry, name: str) -> Part:

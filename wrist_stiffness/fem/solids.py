@@ -2,8 +2,8 @@
 
 A link lies in its own axes: O at the origin, the motor-side bore on +x, the arc in the xy-plane
 towards +y.  A bushing lies in its own axes: centre of the sleeve at the origin, bore along z,
-"inner" end at -z.  Shapes are built in millimetres because the CAD kernel's tolerance is 1e-7
-units; `mesh.py` turns them back into metres.
+"inner" end at -z; only its half section is drawn, `revolve.py` sweeps the mesh.  Shapes are built
+in millimetres because the CAD kernel's tolerance is 1e-7 units; the meshes are in metres.
 """
 
 from __future__ import annotations
@@ -16,11 +16,8 @@ from netgen.occ import (
     Axis,
     Cylinder,
     Dir,
-    Glue,
     OCCGeometry,
     Pnt,
-    TopoDS_Shape,
-    Vec,
     WorkPlane,
     X,
     Y,
@@ -30,14 +27,18 @@ from netgen.occ import (
 from wrist_stiffness.errors import GeometryError
 from wrist_stiffness.mechanism.geometry import BushingDimensions, LinkDimensions
 
-SECTORS = 8
-"""Contact sectors of each flange, equal in angle, counted from the bushing's x towards its y."""
-
 FLANGES = ("inner", "outer")
 """Ends of a bushing that can carry a flange, in the order of the contact modes."""
 
 MILLIMETRES = 1e3
 """CAD units per metre."""
+
+PIN_CORNER = 5.0
+"""Element size at the ends of a bushing's bore over that at the re-entrant corners of its hub wall,
+where the stress is far more singular."""
+
+CAD_TOLERANCE = 1e-6
+"""Two corners nearer than this are one [mm]."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,18 @@ class MeshSettings:
         In the bar of a link.
     bore : float
         At the bore walls of a link, where the rotational terms of its flexibility converge slowest.
-    bushing : float
-        In a bushing.
+    bushing, bushing_corner : float
+        In the half section of a bushing, and at the ends of its hub wall, where the stress of a
+        held edge under a flange is singular.
+    bushing_arc : float
+        Along the circumference of a bushing, at the hub wall.
     """
 
     link: float
     bore: float
     bushing: float
+    bushing_corner: float
+    bushing_arc: float
 
 
 def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGeometry:
@@ -114,12 +120,13 @@ def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGe
     return OCCGeometry(bar)
 
 
-def bushing_shape(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometry:
-    """Solid of a flanged bushing in eight equal wedges that share their cut faces.
+def bushing_section(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometry:
+    """Half section of a flanged bushing in the plane of x = radius and y = place along the bore.
 
-    Faces: `pin_wall` (the whole bore, under the flanges too), `hub_wall` (the sleeve's outside
-    between the flanges) and, where there is a flange, its face towards the hub as `inner_0` ...
-    `inner_7` or `outer_0` ... `outer_7`.
+    Edges: `pin_wall` (the whole bore, under the flanges too), `hub_wall` (the sleeve's outside
+    between the flanges) and, where there is a flange, its edge towards the hub, `inner` or `outer`.
+    The ends of the hub wall and of the bore carry the singular stresses of a held edge, so the
+    mesh is graded towards them; a section can afford it, a tetrahedral mesh of the solid cannot.
 
     Parameters
     ----------
@@ -131,7 +138,7 @@ def bushing_shape(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometr
     Returns
     -------
     OCCGeometry
-        The shape, in millimetres.
+        The plane shape, in millimetres.
 
     Raises
     ------
@@ -149,7 +156,7 @@ def bushing_shape(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometr
             f"flange of {bushing.flange_diameter * 1e3:.3f} mm is not wider than its sleeve "
             f"of {2e3 * r_hub / MILLIMETRES:.3f} mm"
         )
-    # Corners (r, z) of the section, each with the name of the edge that starts there.
+    # Corners (r, z), each with the name of the edge that starts there.
     inner = [(r_flange, -half - thickness, None), (r_flange, -half, "inner")] if has_inner else []
     outer = [(r_flange, half, None), (r_flange, half + thickness, None)] if has_outer else []
     outline = [
@@ -160,22 +167,17 @@ def bushing_shape(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometr
         *outer,
         (r_pin, half + thickness * has_outer, "pin_wall"),
     ]
-    shape = Glue([_wedge(outline, sector) for sector in range(SECTORS)])
-    shape.solids.maxh = MILLIMETRES * sizes.bushing
-    return OCCGeometry(shape)
-
-
-def _wedge(outline: list[tuple[float, float, str | None]], sector: int) -> TopoDS_Shape:
-    """One sector of a bushing; the edges' names pass to the faces that they sweep."""
-    start = 2.0 * math.pi * sector / SECTORS
-    radially = Vec(math.cos(start), math.sin(start), 0.0)
-    section_normal = Vec(math.sin(start), -math.cos(start), 0.0)
-    drawing = WorkPlane(Axes((0, 0, 0), n=section_normal, h=radially))
-    drawing.MoveTo(*outline[0][:2])
+    drawing = WorkPlane().MoveTo(*outline[0][:2])
     for r, z, _ in outline[1:]:
         drawing.LineTo(r, z)
     section = drawing.Close().Face()
+    section.maxh = MILLIMETRES * sizes.bushing
     for edge, (_, _, name) in zip(section.edges, outline, strict=True):
         if name is not None:
-            edge.name = f"{name}_{sector}" if name in FLANGES else name
-    return section.Revolve(Axis((0, 0, 0), Z), 360.0 / SECTORS)
+            edge.name = name
+    for corner in section.vertices:
+        if abs(corner.p.x - r_hub) < CAD_TOLERANCE:
+            corner.maxh = MILLIMETRES * sizes.bushing_corner
+        elif abs(corner.p.x - r_pin) < CAD_TOLERANCE:
+            corner.maxh = MILLIMETRES * min(sizes.bushing, PIN_CORNER * sizes.bushing_corner)
+    return OCCGeometry(section, dim=2)

@@ -126,7 +126,7 @@ def frame_stiffness(body: ElasticBody, loads: Array) -> tuple[Array, Array, Arra
 
 def _condense_rigid(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:
     stiffness, on_frames, inner = frame_stiffness(body, loads)
-    flexibility = _symmetric(np.linalg.inv(stiffness[6:, 6:]))
+    flexibility = _inverse(stiffness[6:, 6:])
     return flexibility, on_frames[:6], on_frames[6:], inner
 
 
@@ -146,7 +146,7 @@ def _condense_distributing(body: ElasticBody, loads: Array) -> tuple[Array, Arra
     displacement -= rigid @ (motor.T @ displacement)
     work = _symmetric(balanced.T @ displacement)
     flexibility = work[:6, :6]
-    on_platform = np.linalg.solve(flexibility, work[:6, 6:])
+    on_platform = _inverse(flexibility) @ work[:6, 6:]
     inner = work[6:, 6:] - on_platform.T @ flexibility @ on_platform
     return flexibility, rigid.T @ loads - on_platform, on_platform, inner
 
@@ -163,7 +163,7 @@ def _wall_average(body: ElasticBody, wall: str) -> Array:
     moments[:, 0, 5], moments[:, 1, 5] = -y, x
     spread = moments.reshape(-1, 6)
     gram = rigid_motion(body.mesh.nodes).T @ spread
-    return spread @ np.linalg.inv(gram)
+    return spread @ np.asarray(np.linalg.inv(gram), dtype=np.float64)
 
 
 def _determinate_support(nodes: Array) -> Array:
@@ -179,6 +179,10 @@ def _determinate_support(nodes: Array) -> Array:
         if np.linalg.matrix_rank(motion[[*chosen, row]], tol=1e-9) > len(chosen):
             chosen.append(row)
     return candidates[chosen]
+
+
+def _inverse(matrix: Array) -> Array:
+    return _symmetric(np.asarray(np.linalg.inv(matrix), dtype=np.float64))
 
 
 def _symmetric(matrix: Array) -> Array:

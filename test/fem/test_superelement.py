@@ -1,0 +1,148 @@
+"""Condensed parts: rigid motions, symmetry, reciprocity, weights, interface models."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
+
+from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
+from wrist_stiffness.fem.revolve import SECTORS
+from wrist_stiffness.fem.solids import link_shape
+from wrist_stiffness.fem.superelement import condense, frame_stiffness
+
+ROUND_OFF = 1e-9
+"""Of a solve whose stiffnesses span the metre and the radian."""
+
+
+@pytest.fixture(scope="module", params=["link_body", "flanged_bushing"])
+def body(request):
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="module", params=["rigid", "distributing"])
+def element(request, body):
+    return condense(body, request.param)
+
+
+def test_frames_carry_exactly_six_rigid_motions(body):
+    stiffness, _, _ = frame_stiffness(body, body.weight)
+    both = np.vstack([np.eye(6), np.eye(6)])
+    scale = np.sqrt(np.outer(np.diag(stiffness), np.diag(stiffness)))
+    assert np.abs((stiffness @ both) / scale[:, :6]).max() < ROUND_OFF
+    values = np.linalg.eigvalsh(stiffness / scale)
+    assert np.sum(values < ROUND_OFF * values[-1]) == 6
+
+
+def test_flexibility_is_symmetric_positive_definite(element):
+    np.testing.assert_array_equal(element.flexibility, element.flexibility.T)
+    assert np.linalg.eigvalsh(element.flexibility)[0] > 0
+
+
+def test_weight_on_the_two_frames_is_the_whole_weight(body, element):
+    total = element.weight_motor_side + element.weight_platform_side
+    resultant = rigid_motion(body.mesh.nodes).T @ body.weight
+    # Each nearly zero entry cancels from two sides: compare on the scale of mass times size.
+    scale = np.abs(resultant).max(axis=1).max()
+    np.testing.assert_allclose(total, resultant, atol=ROUND_OFF * scale)
+
+
+def test_weight_is_density_times_volume(link_body, oracle_link, coarse):
+    # The CAD kernel integrates the exact cylinders; a coarse quadratic mesh misses 1e-4 of them.
+    solid = link_shape(oracle_link, math.pi / 2, coarse).shape
+    mass = oracle_link.material.density * solid.mass * 1e-9
+    force, moment = np.split(rigid_motion(link_body.mesh.nodes).T @ link_body.weight, 2)
+    np.testing.assert_allclose(force, mass * np.eye(3), rtol=1e-4, atol=mass * 1e-12)
+    centre = np.array([*solid.center]) * 1e-3
+    np.testing.assert_allclose(
+        moment[2], [-mass * centre[1], mass * centre[0], 0], atol=1e-4 * mass
+    )
+
+
+def test_bushing_weight_is_density_times_volume(flanged_bushing):
+    bushing = flanged_bushing.solid.dimensions
+    pin, sleeve = bushing.pin_diameter / 2, bushing.pin_diameter / 2 + bushing.wall
+    volume = math.pi * (sleeve**2 - pin**2) * bushing.length
+    volume += 2 * math.pi * ((bushing.flange_diameter / 2) ** 2 - pin**2) * bushing.flange_thickness
+    # One quadratic arc over 45 degrees misses 8e-4 of a circle's area.
+    assert flanged_bushing.weight.sum() / 3 == pytest.approx(
+        bushing.material.density * volume, rel=1e-3
+    )
+
+
+def test_condensed_loads_move_the_free_frame_as_in_the_full_model(body):
+    """One solve with the frame's six unknowns beside all inner ones, nothing condensed."""
+    element = condense(body, "rigid")
+    size = body.stiffness.shape[0]
+    held, rigid = (
+        (3 * body.mesh.surface_nodes(wall)[:, None] + np.arange(3)).ravel()
+        for wall in (body.solid.motor_wall, body.solid.platform_wall)
+    )
+    inner = np.setdiff1d(np.arange(size), np.concatenate([held, rigid]))
+    on_wall = np.zeros((size, 6))
+    on_wall[rigid] = rigid_motion(body.mesh.nodes)[rigid]
+    follow = sparse.hstack([sparse.eye(size).tocsc()[:, inner], sparse.csc_matrix(on_wall)])
+    loads = np.hstack([body.weight, body.pressure])
+    solution = spsolve((follow.T @ body.stiffness @ follow).tocsc(), follow.T @ loads)
+
+    expected = np.hstack([element.flexibility @ element.weight_platform_side, element.sector_screw])
+    for half in (slice(0, 3), slice(3, 6)):
+        scale = np.abs(expected[half]).max()
+        np.testing.assert_allclose(solution[-6:][half], expected[half], atol=ROUND_OFF * scale)
+    work = body.pressure.T @ (follow @ solution)[:, 3:]
+    np.testing.assert_allclose(work, element.sector_approach, rtol=1e-7, atol=1e-14)
+
+
+def test_a_rigid_wall_is_never_softer_than_a_distributing_one(body):
+    softer = condense(body, "distributing").flexibility - condense(body, "rigid").flexibility
+    scale = np.sqrt(np.diag(condense(body, "rigid").flexibility))
+    assert np.linalg.eigvalsh(softer / np.outer(scale, scale))[0] > 0
+
+
+def test_interface_model_matters_as_much_as_known(link_body):
+    """Load-distributing walls turn the oracle link's joint 5.5 to 11 per cent further."""
+    rigid, distributing = (condense(link_body, m).flexibility for m in ("rigid", "distributing"))
+    ratio = np.diag(distributing)[3:] / np.diag(rigid)[3:]
+    assert np.all((ratio > 1.05) & (ratio < 1.11))
+
+
+def test_sector_forces_balance_between_hub_and_flange(flanged_bushing):
+    wrench = condense(flanged_bushing, "rigid").sector_wrench
+    bushing = flanged_bushing.solid.dimensions
+    pin = bushing.pin_diameter / 2 + bushing.wall
+    rim = bushing.flange_diameter / 2
+    # Inner flange pushes the hub outwards, centre of pressure at the centroid of a 45 deg sector.
+    np.testing.assert_allclose(wrench[2], np.repeat([1.0, -1.0], SECTORS), atol=1e-12)
+    np.testing.assert_allclose(wrench[[0, 1, 5]], 0, atol=1e-15)
+    half = math.pi / SECTORS
+    centroid = 2 / 3 * math.sin(half) / half * (rim**3 - pin**3) / (rim**2 - pin**2)
+    # One quadratic arc over 45 degrees places the centroid within 1e-3.
+    np.testing.assert_allclose(np.hypot(*wrench[3:5]), centroid, rtol=2e-3)
+
+
+@pytest.mark.parametrize("interface", ["rigid", "distributing"])
+def test_sectors_are_equal_under_turns_by_an_eighth(flanged_bushing, interface):
+    """The swept mesh is symmetric to the last digits, not only up to its error."""
+    element = condense(flanged_bushing, interface)
+    inner = element.sector_approach[:SECTORS, :SECTORS]
+    for shift in range(1, SECTORS):
+        turned = np.roll(inner, (shift, shift), axis=(0, 1))
+        np.testing.assert_allclose(turned, inner, atol=1e-9 * inner.max())
+    axial = element.sector_screw[2, :SECTORS]
+    np.testing.assert_allclose(axial, axial[0], rtol=1e-8)
+
+
+def test_flange_modes_are_positive_definite(flanged_bushing):
+    element = condense(flanged_bushing, "rigid")
+    approach = element.sector_approach
+    np.testing.assert_array_equal(approach, approach.T)
+    assert np.linalg.eigvalsh(approach)[0] > 0
+
+
+def test_free_heating_turns_nothing_and_grows_everything(link_body):
+    """One kelvin's nodal forces are the stiffness times the free growth about any point."""
+    expansion = link_body.solid.material.expansion
+    growth = expansion * link_body.mesh.nodes.ravel()
+    load = thermal_load(link_body.mesh, link_body.solid.material)
+    np.testing.assert_allclose(link_body.stiffness @ growth, load, atol=1e-9 * np.abs(load).max())
