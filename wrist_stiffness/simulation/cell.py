@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from wrist_stiffness.errors import InputError, UnreachablePoseError
-from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import angles_text, first_where
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.drive import Drive
-from wrist_stiffness.simulation.experiment import rich
+from wrist_stiffness.simulation.experiment import experiment
 from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, instrument
+from wrist_stiffness.simulation.laws.law import Law
 from wrist_stiffness.simulation.program import Program
+from wrist_stiffness.simulation.wrist import TrueState, TrueWrist
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,14 @@ class CellSettings:
         About how long the program takes before it repeats [s].
     program_seed : int
         Chooses poses and loads of the program.
+    experiment : str
+        Design of the program, one of `experiment.EXPERIMENTS`.
     instrument : str
         Pose sensor: `interferometer`, `tracker`, `cmm` or `ideal`.
     load_sensor : LoadSensor
         Noise of the load estimate.
+    hidden : tuple of HiddenEffect
+        What the true wrist has besides its base.
 
     Raises
     ------
@@ -44,8 +51,10 @@ class CellSettings:
     rate_hz: float = 100.0
     program_seconds: float = 120.0
     program_seed: int = 0
+    experiment: str = "rich"
     instrument: str = "interferometer"
     load_sensor: LoadSensor = LoadSensor()
+    hidden: tuple[HiddenEffect, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -74,6 +83,8 @@ class CellSample:
         Rotation as measured.
     measured_shift : (..., 3) float
         Position as measured [m].
+    temperature : (..., 7) float
+        Of the bodies `heat.HEATED`, absolute [degC].
     """
 
     encoder: Array
@@ -82,6 +93,7 @@ class CellSample:
     pose_shift: Array
     measured_rotation: Array
     measured_shift: Array
+    temperature: Array
 
     def __getitem__(self, place: int) -> CellSample:
         """Return one sample of a block."""
@@ -104,11 +116,14 @@ class VirtualCell:
     def __init__(self, table: Table, settings: CellSettings, rng: np.random.Generator) -> None:
         self.table = table
         self.settings = settings
-        self.program: Program = rich(
+        self.program: Program = experiment(
+            settings.experiment,
             table.workspace,
             np.random.default_rng(settings.program_seed),
             settings.program_seconds,
         )
+        self._laws: Sequence[Law] = [build(hidden, table) for hidden in settings.hidden]
+        self._wrist = TrueWrist(table, self._laws)
         drive_rng, load_rng, pose_rng = rng.spawn(3)
         sensor, pose_sensor = settings.load_sensor, instrument(settings.instrument)
         self._drive = Drive(table.geometry.limits.encoder_step, drive_rng)
@@ -162,23 +177,35 @@ class VirtualCell:
             If an angle is beyond the end stops, or the loop does not close.
         """
         self._stop_at_ends(sent)
-        shaft = self._drive.shaft(sent)
-        load = self.program.load(self.program.phase(time_s))
-        configuration = self.table.mechanism.forward(shaft)
-        twist = respond(self.table.operators_at(configuration, "closed_form"), load).twist
-        bent, shift = exp_twist(twist)
-        rotation = bent @ configuration.platform
+        shaft = self._drive.shaft(time_s, sent)
+        phase = self.program.phase(time_s)
+        load, room = self.program.load(phase), self.program.ambient(phase)[:, 0]
+        true = self._wrist.run(time_s, shaft, load, room)
+        encoder, wrench, rotation, shift = self._readings(time_s, shaft, load, true)
         noise = self._pose_noise(time_s)
         # A tracker's errors in position and orientation are separate, not one rigid motion.
         wobble, _ = exp_twist(noise)
         return CellSample(
-            encoder=self._drive.read(shaft),
-            wrench=load + self._load_noise(time_s),
-            pose_rotation=rotation,
-            pose_shift=shift,
+            encoder=encoder,
+            wrench=wrench + self._load_noise(time_s),
+            pose_rotation=true.rotation,
+            pose_shift=true.shift,
             measured_rotation=wobble @ rotation,
             measured_shift=shift + noise[:, :3],
+            temperature=self.table.geometry.reference_temperature + true.block.temperature,
         )
+
+    def _readings(
+        self, time_s: Array, shaft: Array, load: Array, true: TrueState
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return what error-free noise-free sensors with the hidden laws say."""
+        encoder, wrench = self._drive.read(shaft), load
+        rotation, shift = true.rotation, true.shift
+        for law in self._laws:
+            encoder = law.read_angles(time_s, encoder)
+            wrench = law.read_load(true.block, wrench)
+            rotation, shift = law.read_pose(true.block, rotation, shift)
+        return encoder, wrench, rotation, shift
 
     def _stop_at_ends(self, sent: Array) -> None:
         limits = self.table.geometry.limits

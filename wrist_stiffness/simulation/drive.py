@@ -21,22 +21,31 @@ class Drive:
         Belongs to the drive alone.
     """
 
+    SETTLING_S = 0.1
+    """Time constant with which the shaft goes to another place within the count."""
+
     def __init__(self, step: float, rng: np.random.Generator) -> None:
         self._step = step
         self._rng = rng
-        self._sent = np.full(2, np.nan)
+        self._time_s: float | None = None
+        self._sent = np.zeros(2)
         self._moving = np.zeros(2, dtype=bool)
-        self._rest = self._draw()
+        self._goal = self._draw()
+        self._rest = self._goal
 
-    def shaft(self, sent: Array) -> Array:
-        """Return the shaft angles (n, 2) for the next n angles sent (n, 2) [rad]."""
+    def shaft(self, time_s: Array, sent: Array) -> Array:
+        """Return the shaft angles (n, 2) for the next n times (n,) [s] and angles sent [rad]."""
         out = np.empty_like(sent)
         for i, angles in enumerate(sent):
-            moving = (angles != self._sent) & np.isfinite(self._sent)
-            started = moving & ~self._moving
-            if started.any():
-                self._rest = np.where(started, self._draw(), self._rest)
-            self._sent, self._moving = angles, moving
+            if self._time_s is not None:
+                moving = angles != self._sent
+                started = moving & ~self._moving
+                if started.any():
+                    self._goal = np.where(started, self._draw(), self._goal)
+                stay = np.exp(-max(time_s[i] - self._time_s, 0.0) / self.SETTLING_S)
+                self._rest = self._goal + stay * (self._rest - self._goal)
+                self._moving = moving
+            self._time_s, self._sent = float(time_s[i]), angles
             out[i] = angles + self._rest
         return out
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import unit
 from wrist_stiffness.mechanism.workspace import Workspace
@@ -43,7 +46,7 @@ def move_seconds(start: Array, end: Array) -> float:
 
 
 def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
-    """Random poses, loads and approach directions; loads put on at rest and carried through moves.
+    """Return random poses, loads and approach sides; loads put on at rest or carried along.
 
     Every fifth dwell returns to a reference pose without load, every fourth re-approaches and
     re-loads the dwell before (a replicate), every eleventh is a hold of 15 s; the room drifts.
@@ -94,3 +97,96 @@ def _approach(
             schedule.move(target, move_seconds(schedule.theta, target))
     if not carried:
         schedule.put_on(load, LOADING_S)
+
+
+def paper(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
+    """Return the paper's 25 poses in rows, 1 N downward all the time, approached from one side.
+
+    Repeated until `seconds` are over; see `rich` for the parameters.
+    """
+    lower, upper = workspace.rectangle
+    inside = TILT_SHARE / workspace.limits.map_margin
+    middle, half = (lower + upper) / 2.0, (upper - lower) / 2.0
+    axis = np.linspace(-1.0, 1.0, 5)
+    # The corners of the square lie outside of the round workspace: it is drawn in.
+    poses = [middle + 0.7 * inside * half * np.array([x, y]) for x in axis for y in axis]
+    load = np.array([0.0, 0.0, -FORCE, 0.0, 0.0, 0.0])
+    schedule = Schedule(poses[0])
+    schedule.put_on(load, LOADING_S)
+    while schedule.time_s < seconds:
+        for pose in poses:
+            before = pose - np.radians(3.0)
+            for target in (before, pose):
+                schedule.move(target, move_seconds(schedule.theta, target))
+            schedule.rest(DWELL_S)
+    return schedule.program(LOADING_S)
+
+
+def dead_weights(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
+    """Return what weights on the platform allow: straight down, at four points, put on at rest.
+
+    See `rich` for the parameters.
+    """
+    schedule = Schedule(random_pose(workspace, rng))
+    down = np.array([0.0, 0.0, -1.0])
+    while schedule.time_s < seconds:
+        theta = random_pose(workspace, rng)
+        schedule.put_on(np.zeros(6), LOADING_S)
+        _approach(schedule, workspace, theta, np.zeros(6), rng)
+        schedule.rest(DWELL_S)
+        platform = workspace.mechanism.forward(theta).platform
+        point = LEVER * np.array(
+            [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)]
+        )
+        for mass in rng.permutation([0.02, 0.05, 0.1])[:2]:
+            force = 9.81 * mass * down
+            at = platform @ point[rng.integers(4)]
+            schedule.put_on(np.concatenate([force, np.cross(at, force)]), LOADING_S)
+            schedule.rest(DWELL_S)
+        schedule.ambient(float(rng.uniform(-3.0, 3.0)))
+    return schedule.program(LOADING_S)
+
+
+def production(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
+    """Return pick-and-assemble cycles between four poses: weight carried, a push at the end.
+
+    See `rich` for the parameters.
+    """
+    pick, lift, above, place = (random_pose(workspace, rng) for _ in range(4))
+    schedule = Schedule(lift)
+    weight = np.array([0.0, 0.0, -0.3, 0.0, 0.0, 0.0])
+    push = weight + random_load(rng) * 0.6
+    while schedule.time_s < seconds:
+        for target, load in ((pick, weight), (lift, None), (above, None), (place, push)):
+            schedule.move(target, move_seconds(schedule.theta, target))
+            schedule.rest(0.3)
+            if load is not None:
+                schedule.put_on(load, 0.4)
+                schedule.rest(0.5)
+        schedule.put_on(np.zeros(6), 0.4)
+        schedule.move(above, move_seconds(schedule.theta, above))
+        schedule.ambient(2.0 * float(np.sin(schedule.time_s / 100.0)))
+    return schedule.program(LOADING_S)
+
+
+EXPERIMENTS: dict[str, Callable[[Workspace, np.random.Generator, float], Program]] = {
+    "rich": rich,
+    "paper": paper,
+    "dead_weights": dead_weights,
+    "production": production,
+}
+
+
+def experiment(
+    name: str, workspace: Workspace, rng: np.random.Generator, seconds: float
+) -> Program:
+    """Return the program of an experiment by its name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in EXPERIMENTS:
+        raise InputError(f"experiment {name!r} is not one of {', '.join(EXPERIMENTS)}")
+    return EXPERIMENTS[name](workspace, rng, seconds)

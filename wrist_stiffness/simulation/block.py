@@ -1,0 +1,49 @@
+"""What the laws of the true wrist see of a run of samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.statics import component_rotations
+from wrist_stiffness.simulation.heat import HEATED
+
+
+@dataclass(frozen=True)
+class Block:
+    """A run of n samples in the order of time.
+
+    Parameters
+    ----------
+    time_s : (n,) float
+        Time since the start [s].
+    configuration : Configuration
+        The rigid wrist at the true angles of the links that the motors turn.
+    load : (n, 6) float
+        Wrench on the platform at O in F, own weight aside [N, N m].
+    flexibility : (n, 8, 6, 6) float
+        Of each elastic component at O in F.
+    temperature : (n, 7) float
+        Of each of `HEATED` above the reference temperature [K].
+    """
+
+    time_s: Array
+    configuration: Configuration
+    load: Array
+    flexibility: Array
+    temperature: Array
+
+    @cached_property
+    def rotations(self) -> Array:
+        """Rotation from home of the body that carries each component, (n, 8, 3, 3)."""
+        return component_rotations(self.configuration)
+
+    def rotation(self, component: str) -> Array:
+        """Rotation from home of the body that carries one component, (n, 3, 3)."""
+        return self.rotations[:, ELASTIC.index(component)]
+
+    def temperature_of(self, body: str) -> Array:
+        """Temperature of a body above the reference temperature, (n,) [K]."""
+        return self.temperature[:, HEATED.index(body)]

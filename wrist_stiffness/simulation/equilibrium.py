@@ -1,0 +1,282 @@
+"""Fast path: equilibrium at a pose, with contact and with laws that bend with the load.
+
+The complementary energy of all parts is convex in the flange forces, so the equilibrium is unique:
+
+    0 <= lambda  perpendicular to  gap + B'W + sum_k N_k delta_k(w_k) + A lambda >= 0
+    w_k = wrench through component k = G_k'W + own weight + N_k' lambda
+
+It is found by Newton's method over all samples of a block at once; each step is a contact problem
+with the tangent flexibilities of the laws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.contact import solve_contact
+from wrist_stiffness.mechanism.influence import Influence, influence
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.statics import (
+    ContactOperators,
+    component_rotations,
+    contact_operators,
+    platform_twist,
+    weight_response,
+)
+from wrist_stiffness.mechanism.vectors import block_diagonal
+
+Bend = Callable[[Array], tuple[Array, Array]]
+"""Law of one component: wrench (n, 6) to screw (n, 6) and its symmetric tangent (n, 6, 6)."""
+
+MAX_STEPS = 60
+MAX_EXCHANGES = 25
+FORCE_TOLERANCE = 1e-9
+"""A change of the flange forces this small against the largest one ends the iteration."""
+
+SMALL_FORCE = 1e-6
+"""Flange forces below this do not count [N]."""
+
+BISECTIONS = 12
+
+ROUNDING = 1e-11
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Solution of a block of n samples.
+
+    Parameters
+    ----------
+    twist : (n, 6) float
+        Of the platform at O in F [m, rad].
+    through : (n, 8, 6) float
+        Wrench through each component at O in F [N, N m].
+    slides : (n, 3) float
+        Of joint_2 to joint_4 [m].
+    force : (n, m) float
+        Of each flange sector [N].
+    closed : (n, m) bool
+        Sectors in contact.
+    """
+
+    twist: Array
+    through: Array
+    slides: Array
+    force: Array
+    closed: NDArray[np.bool_]
+
+
+class Pose:
+    """The elastic wrist at a block of poses, ready to be loaded.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of n samples.
+    parts : ElasticComponents
+        Of the true wrist.
+    gravity : (3,) float
+        In F [m/s^2].
+    """
+
+    def __init__(
+        self, configuration: Configuration, parts: ElasticComponents, gravity: Array
+    ) -> None:
+        self.projectors: Influence = influence(configuration)
+        self.operators: ContactOperators = contact_operators(configuration, parts, gravity)
+        self.rows = self.projectors.slides()
+        self._carry = block_diagonal(np.swapaxes(self.projectors.of_components(), -1, -2))
+        self._weight = weight_response(configuration, parts, gravity)
+        rotation = block_diagonal(component_rotations(configuration))
+        self.flexibility = rotation @ parts.flexibility @ np.swapaxes(rotation, -1, -2)
+        own = parts.sectors.component
+        self._own = own
+        turned = rotation.take(own, axis=-3) @ parts.sectors.screw[..., None]
+        self._sector_screw = turned[..., 0]
+
+    def friction_wrench(self, friction: Array) -> Array:
+        """Wrench through each component (n, 8, 6) of friction in joint_2 to joint_4.
+
+        Parameters
+        ----------
+        friction : (n, 3, 2) float
+            Force and torque along each axis, of the joint's outer body on the inner one's hub
+            [N, N m]; they act on slide and turn.
+        """
+        halves = np.einsum("nkjx,njh->nkhx", self.rows, friction)
+        return halves.reshape(*halves.shape[:2], 6)
+
+    def solve(
+        self,
+        load: Array,
+        screws: Array,
+        bends: Sequence[tuple[int, Bend]] = (),
+        extra: Array | None = None,
+    ) -> Equilibrium:
+        """Find the equilibrium.
+
+        Parameters
+        ----------
+        load : (n, 6) float
+            Wrench on the platform at O in F.
+        screws : (n, 8, 6) float
+            Screws at the components that no wrench changes [m, rad].
+        bends : sequence of (int, Bend)
+            Number of a component and its law besides its elasticity.
+        extra : (n, 8, 6) float, optional
+            Wrench through the components from inside the wrist, friction for instance.
+
+        Returns
+        -------
+        Equilibrium
+            Of the block.
+
+        Raises
+        ------
+        InputError
+            If Newton's method does not converge.
+        """
+        ops, n_k = self.operators, self.operators.screw_gap
+        free = self._weight.wrench + (self._carry @ load[:, None, :, None])[..., 0]
+        gap = ops.gap + np.einsum("nim,ni->nm", ops.force_twist, load)
+        given = screws
+        if extra is not None:
+            free = free + extra
+            given = given + (self.flexibility @ extra[..., None])[..., 0]
+            gap = gap + np.einsum("nmi,nmi->nm", self._sector_screw, extra.take(self._own, axis=1))
+        gap = gap + np.einsum("nmki,nki->nm", n_k, given)
+        force, closed = self._contact(gap, free, bends)
+        through = free + np.einsum("nmki,nm->nki", n_k, force)
+        total = given.copy()
+        for k, law in bends:
+            total[:, k] += law(through[:, k])[0]
+        twist = (
+            ops.weight_twist
+            + (ops.compliance @ load[..., None])[..., 0]
+            + np.einsum("nim,nm->ni", ops.force_twist, force)
+            + platform_twist(self.projectors, total)
+        )
+        elastic = (self.flexibility @ (through - (0.0 if extra is None else extra))[..., None])[
+            ..., 0
+        ]
+        belongs = np.eye(elastic.shape[1])[self._own]
+        own = np.einsum("nmi,nm,mk->nki", self._sector_screw, force, belongs)
+        slides = np.einsum("nkji,nki->nj", self.rows, (total + elastic + own)[..., :3])
+        return Equilibrium(twist, through, slides, force, closed)
+
+    def _contact(
+        self, gap: Array, free: Array, bends: Sequence[tuple[int, Bend]]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return forces and contact state for gaps (n, m) and wrenches (n, 8, 6) without them."""
+        approach, n_k = self.operators.approach, self.operators.screw_gap
+        force, closed = np.zeros_like(gap), np.zeros(gap.shape, dtype=bool)
+        if gap.shape[1] == 0:
+            return force, closed
+
+        def bent(at: Array) -> list[tuple[Array, Array, Array]]:
+            return [
+                (n_k[:, :, k], *law(free[:, k] + np.einsum("nmi,nm->ni", n_k[:, :, k], at)))
+                for k, law in bends
+            ]
+
+        def opening(at: Array) -> Array:
+            out = gap + (approach @ at[..., None])[..., 0]
+            return out + sum(np.einsum("nmi,ni->nm", rows, screw) for rows, screw, _ in bent(at))
+
+        for _ in range(MAX_STEPS):
+            tangent_gap, tangent = gap, approach
+            for rows, screw, slope in bent(force):
+                down = rows @ slope
+                linear = screw - np.einsum("nmi,nm->ni", down, force)
+                tangent_gap = tangent_gap + np.einsum("nmi,ni->nm", rows, linear)
+                tangent = tangent + down @ np.swapaxes(rows, -1, -2)
+            new, closed = solve_contacts(tangent, tangent_gap, closed)
+            change = new - force
+            if not bends:
+                return new, closed
+            scale = np.max(np.abs(new), axis=1, initial=SMALL_FORCE)
+            if np.all(np.abs(change) <= FORCE_TOLERANCE * scale[:, None]):
+                return new, closed
+            force = force + _step_length(opening, force, change)[:, None] * change
+        worst = float(np.max(np.abs(change)))
+        raise InputError(
+            f"true wrist: no equilibrium after {MAX_STEPS} steps; "
+            f"flange forces still change by {worst:.2e} N"
+        )
+
+
+def _step_length(opening: Callable[[Array], Array], force: Array, change: Array) -> Array:
+    """Return how far to go from `force` by `change` (n, m) to the least energy, (n,) in 0 to 1.
+
+    The slope of the convex energy along the way is the opening times the change; where a full
+    step would pass its zero, the zero is found by bisection.
+    """
+
+    def slope(share: Array) -> Array:
+        return np.sum(opening(force + share[:, None] * change) * change, axis=1)
+
+    high = np.ones(len(force))
+    passed = slope(high) > 0.0
+    if not passed.any():
+        return high
+    low = np.where(passed, 0.0, 1.0)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        beyond = slope(middle) > 0.0
+        high = np.where(passed & beyond, middle, high)
+        low = np.where(passed & ~beyond, middle, low)
+    return high
+
+
+def solve_contacts(
+    approach: Array, gap: Array, closed: NDArray[np.bool_]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve the contact problems of n samples at once by block principal pivoting.
+
+    Parameters
+    ----------
+    approach : (n, m, m) float
+        Symmetric positive definite [m/N].
+    gap : (n, m) float
+        Opening without forces [m].
+    closed : (n, m) bool
+        First guess.
+
+    Returns
+    -------
+    force : (n, m) float
+        Not negative [N].
+    closed : (n, m) bool
+        Sectors in contact.
+    """
+    closed = closed | (gap < 0.0) if not closed.any() else closed.copy()
+    force = np.zeros_like(gap)
+    scale = np.max(np.abs(gap), axis=1)
+    stiff = scale / np.max(np.diagonal(approach, axis1=1, axis2=2), axis=1)
+    todo = np.arange(len(gap))
+    identity = np.eye(gap.shape[1])
+    for _ in range(MAX_EXCHANGES):
+        on = closed[todo]
+        matrix = np.where(on[:, :, None] & on[:, None, :], approach[todo], identity)
+        right = np.where(on, -gap[todo], 0.0)
+        force[todo] = np.linalg.solve(matrix, right[..., None])[..., 0]
+        opening = gap[todo] + (approach[todo] @ force[todo][..., None])[..., 0]
+        wrong = np.where(
+            on,
+            force[todo] < -ROUNDING * stiff[todo, None],
+            opening < -ROUNDING * scale[todo, None],
+        )
+        closed[todo] ^= wrong
+        todo = todo[wrong.any(axis=1)]
+        if len(todo) == 0:
+            break
+    for i in todo:
+        # Pivoting in blocks can cycle; one change at a time always ends.
+        force[i], closed[i] = solve_contact(approach[i], gap[i])
+    return np.maximum(force, 0.0), closed

@@ -1,0 +1,102 @@
+"""`drive_compliance`, `mount_compliance`, `frame_compliance`, `platform_compliance`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.equilibrium import Equilibrium
+from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Law
+
+
+@dataclass(frozen=True)
+class MountSpring(Law):
+    """A spring in the frame in series with a motor: its bracket, or its gears and coupling.
+
+    Parameters
+    ----------
+    motor : str
+        Which motor.
+    flexibility : (6, 6) float
+        At O in F, positive semi-definite.
+    """
+
+    motor: str
+    flexibility: Array
+
+    def parts(self, parts: ElasticComponents) -> ElasticComponents:
+        """Add it to the bushing of the driven joint, which sits in the frame as well."""
+        flexibility = parts.flexibility.copy()
+        flexibility[ELASTIC.index(DRIVEN[self.motor])] += self.flexibility
+        return replace(parts, flexibility=flexibility)
+
+
+@dataclass(frozen=True)
+class StiffeningDrive(Law):
+    """Gears whose teeth touch more fully under torque: soft at first, then stiff.
+
+    Parameters
+    ----------
+    joint : str
+        Driven joint.
+    axis : (3,) float
+        Motor axis in F.
+    softness : float
+        Turn per torque at rest [rad/(N m)].
+    torque : float
+        Torque at which the softness has halved [N m].
+    """
+
+    joint: str
+    axis: Array
+    softness: float
+    torque: float
+
+    @property
+    def bends(self) -> str:
+        """The joint."""
+        return self.joint
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Turn by a saturating logarithm of the torque."""
+        column = np.concatenate([np.zeros(3), self.axis])
+        torque = wrench @ column
+        turn = self.softness * self.torque * np.arcsinh(torque / self.torque)
+        slope = self.softness / np.sqrt(1.0 + (torque / self.torque) ** 2)
+        return turn[:, None] * column, slope[:, None, None] * np.outer(column, column)
+
+
+@dataclass(frozen=True)
+class OuterSpring(Law):
+    """A spring under both limbs (frame), or between platform and tool (platform).
+
+    Parameters
+    ----------
+    flexibility : (6, 6) float
+        At O, in F or in U.
+    on_platform : bool
+        Whether it turns with the platform and carries the load alone; the frame's carries all
+        weights as well.
+    """
+
+    flexibility: Array
+    on_platform: bool
+
+    def twist(self, block: Block, state: Equilibrium) -> Array:
+        """Give way to the whole wrench."""
+        if self.on_platform:
+            turn = block_diagonal(block.configuration.platform)
+            local = np.einsum("nji,nj->ni", turn, block.load)
+            return np.einsum("nij,nj->ni", turn, local @ self.flexibility)
+        whole = sum(state.through[:, ELASTIC.index(joint)] for joint in DRIVEN.values())
+        return np.asarray(whole) @ self.flexibility
+
+
+def drive_flexibility(motor: str, axes: tuple[Array, Array], softness: float) -> Array:
+    """Return the flexibility of a turn about a motor's axis, (6, 6)."""
+    column = np.concatenate([np.zeros(3), axes[MOTOR[motor]]])
+    return softness * np.outer(column, column)

@@ -1,0 +1,102 @@
+"""`bushing_hardening`, `thermal_softening`: what a polymer bushing does besides being elastic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.laws.law import Law
+
+
+@dataclass(frozen=True)
+class BushingHardening(Law):
+    """Stiffening with load: the complementary energy grows slower than the square of the load.
+
+    Parameters
+    ----------
+    joint : str
+        Joint.
+    fall : float
+        How much of the flexibility is gone at high load (`saturating`, up to 0.65), or the power
+        by which it falls (`power`, up to 0.5) [-].
+    energy : float
+        Complementary energy at which the fall sets in [J].
+    form : str
+        `saturating` or `power`.
+    """
+
+    joint: str
+    fall: float
+    energy: float
+    form: str
+
+    @property
+    def bends(self) -> str:
+        """The joint."""
+        return self.joint
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Take back a part of the elastic screw; the tangent follows from the energy."""
+        flexibility = block.flexibility[:, ELASTIC.index(self.joint)]
+        screw = (flexibility @ wrench[..., None])[..., 0]
+        x = 0.5 * np.sum(screw * wrench, axis=-1) / self.energy
+        if self.form == "saturating":
+            factor = -self.fall * (1.0 - np.exp(-x))
+            slope = -self.fall * np.exp(-x) / self.energy
+        else:
+            factor = (1.0 + x) ** -self.fall - 1.0
+            slope = -self.fall * (1.0 + x) ** (-self.fall - 1.0) / self.energy
+        tangent = factor[:, None, None] * flexibility + slope[:, None, None] * (
+            screw[:, :, None] * screw[:, None, :]
+        )
+        return factor[:, None] * screw, tangent
+
+
+@dataclass(frozen=True)
+class ThermalSoftening(Law):
+    """The modulus falls with the temperature of the bodies that the bushing joins.
+
+    Parameters
+    ----------
+    joint : str
+        Joint.
+    bodies : tuple of str
+        Whose mean temperature the bushing has.
+    rate : float
+        Fall of the modulus [1/K].
+    form : str
+        `exponential`, or `glassy`: little at first, then a drop around 10 K above the reference.
+    """
+
+    joint: str
+    bodies: tuple[str, str]
+    rate: float
+    form: str
+
+    @property
+    def bends(self) -> str:
+        """The joint."""
+        return self.joint
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Add flexibility in proportion to the lost modulus."""
+        kelvin = np.mean([block.temperature_of(body) for body in self.bodies], axis=0)
+        if self.form == "exponential":
+            extra = np.expm1(np.clip(self.rate * kelvin, -5.0, 5.0))
+        else:
+            extra = 20.0 * self.rate * (np.tanh((kelvin - 10.0) / 6.0) + np.tanh(10.0 / 6.0))
+        tangent = extra[:, None, None] * block.flexibility[:, ELASTIC.index(self.joint)]
+        return (tangent @ wrench[..., None])[..., 0], tangent
+
+
+JOINED = {
+    "joint_1": ("frame", "link_1"),
+    "joint_2": ("link_1", "platform"),
+    "joint_3": ("link_3", "platform"),
+    "joint_4": ("link_2", "link_3"),
+    "joint_5": ("frame", "link_2"),
+}
+"""Bodies that a joint joins."""

@@ -1,0 +1,51 @@
+"""`inertia`: fast motion bends the wrist."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import cross
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.laws.law import Law
+
+
+class Inertia(Law):
+    """Newton's and Euler's forces of platform and tool in the motion that the motors make.
+
+    Parameters
+    ----------
+    mass : float
+        [kg].
+    place : (3,) float
+        Centre of gravity in U [m].
+    gyration : float
+        Radius of gyration about it [m].
+    """
+
+    def __init__(self, mass: float, place: Array, gyration: float) -> None:
+        self._mass, self._place, self._gyration = mass, place, gyration
+        self._past: list[tuple[float, Array]] = []
+
+    def wrench(self, block: Block) -> Array:
+        """Differentiate three spots of the body twice, each a third of it, by the last 3 samples.
+
+        Three equal masses on a circle of the radius of gyration about the centre of gravity.
+        """
+        angles = 2.0 * np.pi * np.arange(3) / 3.0
+        circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=-1)
+        spots = self._place + np.sqrt(2.0) * self._gyration * circle
+        at = np.einsum("nij,sj->nsi", block.configuration.platform, spots)
+        out = np.zeros((len(at), 6))
+        for i, now in enumerate(block.time_s):
+            self._past = [*self._past[-2:], (float(now), at[i])]
+            if len(self._past) == 3:
+                force = -self._mass / 3.0 * _acceleration(self._past)
+                out[i, :3] = force.sum(axis=0)
+                out[i, 3:] = cross(at[i], force).sum(axis=0)
+        return out
+
+
+def _acceleration(past: list[tuple[float, Array]]) -> Array:
+    (t0, x0), (t1, x1), (t2, x2) = past
+    return 2.0 * ((x2 - x1) / (t2 - t1) - (x1 - x0) / (t1 - t0)) / (t2 - t0)

@@ -1,0 +1,70 @@
+"""`joint_clearance`: the pin leans on the bore at both ends as the reactions there push it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.seat import Seat
+
+
+@dataclass(frozen=True)
+class JointClearance(Law):
+    """Play of a pin in its bore: contact equilibrium of the two ends, each on its own.
+
+    An end at which the reaction F pushes lies at the radial distance (c/2) g(|F|/F0): it has
+    crossed the gap when F is well above the little force F0 that squeezes the contact shut.
+
+    Parameters
+    ----------
+    joint : str
+        Joint.
+    seat : Seat
+        Of its bushing.
+    clearance : float
+        Diametral [m].
+    squeeze : float
+        F0, the force that takes up the rough contact [N].
+    form : str
+        `algebraic`, g = x/sqrt(1+x^2), or `exponential`, g = 1-exp(-x) with a rounded tip.
+    """
+
+    joint: str
+    seat: Seat
+    clearance: float
+    squeeze: float
+    form: str
+
+    @property
+    def bends(self) -> str:
+        """The joint."""
+        return self.joint
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Push both ends of the pin against the bore."""
+        to_origin = self.seat.to_origin(block.rotation(self.joint))
+        local = np.einsum("nji,nj->ni", to_origin, wrench)
+        rings = self.seat.rings
+        push = np.einsum("rij,nj->nri", rings, local)
+        size = np.sqrt(np.sum(push * push, axis=-1) + (1e-3 * self.squeeze) ** 2)[..., None]
+        half, x = self.clearance / 2.0, size / self.squeeze
+        if self.form == "algebraic":
+            over = half / self.squeeze / np.sqrt(1.0 + x * x)
+            fall = -half / self.squeeze**3 / (1.0 + x * x) ** 1.5 * size
+        else:
+            over = half * (1.0 - np.exp(-x)) / size
+            fall = half * np.exp(-x) / (self.squeeze * size) - over / size
+        displaced = over * push
+        slope = over[..., None] * np.eye(3) + (fall / size)[..., None] * (
+            push[..., :, None] * push[..., None, :]
+        )
+        screw = np.einsum("rij,nri->nj", rings, displaced)
+        tangent = np.einsum("rij,nrik,rkl->njl", rings, slope, rings)
+        return (
+            np.einsum("nij,nj->ni", to_origin, screw),
+            to_origin @ tangent @ np.swapaxes(to_origin, -1, -2),
+        )

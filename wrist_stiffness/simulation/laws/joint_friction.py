@@ -1,0 +1,122 @@
+"""`joint_friction`: a passive joint sticks and slips, in turn and slide together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.vectors import dot
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
+from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.seat import Seat
+
+BODIES_JOINED = {
+    "joint_2": ("link_1", "platform"),
+    "joint_3": ("link_3", "platform"),
+    "joint_4": ("link_2", "link_3"),
+}
+"""Inner and outer body of each passive joint."""
+
+
+class JointFriction(Law):
+    """Elasto-plastic friction of a cylindrical joint with one budget for slide and turn.
+
+    Bristles of the stiffness sigma carry the friction force p = -sigma z on (slide, radius x turn)
+    until its length reaches the budget mu N + p0, N being the sum of the radial reactions at both
+    ends of the bushing; from then on they are dragged along.  A joint that turns therefore has
+    little friction left along its axis; one at rest locks its slide.
+
+    Parameters
+    ----------
+    joint : str
+        Passive joint.
+    seat : Seat
+        Of its bushing.
+    mu : float
+        Coefficient of friction [-].
+    preload : float
+        p0, the budget of the unloaded joint [N].
+    stiffness : float
+        sigma, of the bristles [N/m].
+    stribeck : float
+        How much more the budget is at rest than in motion [-].
+    """
+
+    STRIBECK_SPEED = 5e-5
+    """Slip at which the budget has fallen to that of motion [m/s]."""
+
+    def __init__(
+        self,
+        joint: str,
+        seat: Seat,
+        mu: float,
+        preload: float,
+        stiffness: float,
+        stribeck: float,
+    ) -> None:
+        self._joint = joint
+        self._seat, self._mu, self._preload = seat, mu, preload
+        self._stiffness, self._stribeck = stiffness, stribeck
+        self._state: tuple[float, Array, Array] | None = None
+
+    @property
+    def rubs(self) -> str:
+        """The joint."""
+        return self._joint
+
+    def rub(
+        self, block: Block, pose: Pose, state: Equilibrium, acting: Array, remember: bool
+    ) -> Array:
+        """Return the friction of each sample by an implicit step from the one before."""
+        joint = self._joint
+        j, arm = PASSIVE_JOINTS.index(joint), self._seat.radius
+        to_slip = np.array([1.0, arm])
+        path = np.stack([state.slides[:, j], self._turn(block)], axis=-1) * to_slip
+        give = self._give(pose, j) * to_slip[:, None] * to_slip
+        free = path - (give @ (acting / to_slip)[..., None])[..., 0]
+        budget = self._preload + self._mu * self._reaction(block, state)
+        if self._state is None:
+            before, past, bristle = block.time_s[0], path[0], np.zeros(2)
+        else:
+            before, past, bristle = self._state
+        out = np.empty_like(path)
+        for i, now in enumerate(block.time_s):
+            pull = self._stiffness * (bristle + free[i] - past)
+            stuck = -np.linalg.solve(np.eye(2) + self._stiffness * give[i], pull)
+            moved = free[i] + give[i] @ stuck - past
+            speed = np.hypot(*moved) / max(now - before, 1e-9)
+            most = budget[i] * (1.0 + self._stribeck * np.exp(-speed / self.STRIBECK_SPEED))
+            size = np.hypot(*stuck)
+            out[i] = stuck if size <= most else most / size * stuck
+            bristle = -out[i] / self._stiffness
+            before, past = now, free[i] + give[i] @ out[i]
+        if remember:
+            self._state = float(before), past, bristle
+        return out * to_slip
+
+    def _turn(self, block: Block) -> Array:
+        """Turn of the joint from home, (n,) [rad]."""
+        inner, outer = BODIES_JOINED[self._joint]
+        bodies = block.configuration.rotations
+        relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
+        axis = self._seat.axis
+        across = np.linalg.svd(axis[None])[2][1]
+        turned = relative @ across
+        return np.arctan2(turned @ np.cross(axis, across), turned @ across)
+
+    def _reaction(self, block: Block, state: Equilibrium) -> Array:
+        """Sum of the radial forces at both ends of the bushing, (n,) [N]."""
+        joint = self._joint
+        to_origin = self._seat.to_origin(block.rotation(joint))
+        through = state.through[:, ELASTIC.index(joint)]
+        local = np.einsum("nji,nj->ni", to_origin, through)
+        push = np.einsum("rij,nj->nri", self._seat.rings, local)
+        return np.sqrt(dot(push, push)).sum(axis=-1)
+
+    def _give(self, pose: Pose, j: int) -> Array:
+        """Slide and turn that unit friction makes with open flanges, (n, 2, 2)."""
+        rows = pose.rows[:, :, j]
+        on = np.zeros((*rows.shape[:2], 2, 6))
+        on[:, :, 0, :3] = on[:, :, 1, 3:] = rows
+        return (on @ pose.flexibility @ np.swapaxes(on, -1, -2)).sum(axis=1)

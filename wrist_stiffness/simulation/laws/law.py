@@ -1,0 +1,108 @@
+"""What every hidden law offers; a hook that is not overridden leaves the base as it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.simulation.block import Block
+
+if TYPE_CHECKING:
+    from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
+
+
+class Law:
+    """One departure of the true wrist from its base.
+
+    Hooks are called once for each block, in the order of time and in the order in which they stand
+    here.  A law with a history advances it in the hook that ends with "and remember".
+    """
+
+    @property
+    def bends(self) -> str | None:
+        """Component with a law of its own between wrench and screw (`bend`)."""
+        return None
+
+    @property
+    def flows(self) -> str | None:
+        """Component whose screw follows the history of its wrench (`flow`)."""
+        return None
+
+    @property
+    def rubs(self) -> str | None:
+        """Passive joint with friction (`rub`)."""
+        return None
+
+    def parts(self, parts: ElasticComponents) -> ElasticComponents:
+        """Return other elastic parts, once before the start."""
+        return parts
+
+    def gravity(self, gravity: Array) -> Array:
+        """Return another gravity (3,) in F, once before the start [m/s^2]."""
+        return gravity
+
+    def turn(self, time_s: Array, shaft: Array) -> Array:
+        """Return by how much the driven links are ahead of the encoders, (n, 2) [rad]; remember."""
+        return np.zeros_like(shaft)
+
+    def wrench(self, block: Block) -> Array:
+        """Return a wrench on the platform at O in F, (n, 6) [N, N m]; remember."""
+        return np.zeros_like(block.load)
+
+    def screws(self, block: Block) -> Array:
+        """Return screws at the components, (n, 8, 6) at O in F [m, rad]; remember."""
+        return no_screws(block)
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Return screw (n, 6) and tangent (n, 6, 6) of `bends` under its wrench (n, 6)."""
+        raise NotImplementedError
+
+    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+        """Return the screw (n, 6) of `flows` after the history of its wrench (n, 6)."""
+        raise NotImplementedError
+
+    def rub(
+        self, block: Block, pose: Pose, state: Equilibrium, acting: Array, remember: bool
+    ) -> Array:
+        """Return force and torque of friction along the axis of `rubs`, (n, 2) [N, N m].
+
+        `state` was found with the friction `acting` (n, 2) in this joint.
+        """
+        raise NotImplementedError
+
+    def twist(self, block: Block, state: Equilibrium) -> Array:
+        """Return a twist of the whole platform, (n, 6) at O in F [m, rad]; remember."""
+        return np.zeros_like(block.load)
+
+    def read_angles(self, time_s: Array, angles: Array) -> Array:
+        """Return what the encoders say instead, (n, 2) [rad]; remember."""
+        return angles
+
+    def read_load(self, block: Block, wrench: Array) -> Array:
+        """Return what the load sensor says instead of a wrench (n, 6); remember."""
+        return wrench
+
+    def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
+        """Return what the pose sensor sees instead of (n, 3, 3) and (n, 3); remember."""
+        return rotation, shift
+
+
+def no_screws(block: Block) -> Array:
+    """Return zeros (n, 8, 6)."""
+    return np.zeros((len(block.time_s), len(ELASTIC), 6))
+
+
+def at_component(block: Block, component: str, screw: Array) -> Array:
+    """Return screws (n, 8, 6) with `screw` (n, 6) at one component."""
+    out = no_screws(block)
+    out[:, ELASTIC.index(component)] = screw
+    return out
+
+
+DRIVEN = {"motor_1": "joint_1", "motor_2": "joint_5"}
+"""The joint that a motor turns."""
+
+MOTOR = {"motor_1": 0, "motor_2": 1}
+"""Number of a motor among the motor angles."""

@@ -1,0 +1,162 @@
+"""How large an effect is in the data, and the magnitude that gives a wanted size.
+
+size = sqrt(mean over samples of xi' Sigma^-1 xi / 6), xi being the change of the residual twist by
+the effect over all samples that are loaded or moving, less its mean; Sigma is the covariance of
+one sample: that of the pose instrument, and a hidden encoder count spread over its step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
+from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
+from wrist_stiffness.simulation.residual import residual
+
+SIZE_TOLERANCE = 2e-3
+"""Relative, of the size that `magnitude_for` reaches."""
+
+MAX_TRIALS = 40
+
+
+def sample_covariance(table: Table, theta: Array, name: str) -> Array:
+    """Return the covariance of one sample of the residual twist.
+
+    Parameters
+    ----------
+    table : Table
+        For the encoder step.
+    theta : (n, 2) float
+        Motor angles [rad].
+    name : str
+        Pose instrument.
+
+    Returns
+    -------
+    (n, 6, 6) float
+        Translation first, fixed axes of F.
+    """
+    mechanism = table.mechanism
+    jacobian = np.zeros((len(theta), 6, 2))
+    jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
+    step = table.geometry.limits.encoder_step
+    count = jacobian @ np.swapaxes(jacobian, -1, -2) * step**2 / 12.0
+    return count + np.diag(instrument(name).sigma ** 2)
+
+
+class Scale:
+    """Measures sizes of effects in one experiment.
+
+    Parameters
+    ----------
+    table : Table
+        Of the wrist.
+    settings : CellSettings
+        Experiment, rate and instrument; other hidden effects in it act in both runs.
+    seconds : float
+        Duration of the experiment [s].
+    """
+
+    def __init__(self, table: Table, settings: CellSettings, seconds: float) -> None:
+        self._table, self._settings = table, settings
+        quiet = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
+        self._quiet = replace(settings, instrument="ideal", load_sensor=quiet)
+        self.time_s = np.arange(max(1, round(seconds * settings.rate_hz))) / settings.rate_hz
+        without = self._run(())
+        self._residual = residual(table, without)
+        covariance = sample_covariance(table, without.encoder, settings.instrument)
+        self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+        self.counted = self._loaded_or_moving(without)
+
+    def _run(self, hidden: tuple[HiddenEffect, ...]) -> CellSample:
+        settings = replace(self._quiet, hidden=self._settings.hidden + hidden)
+        cell = VirtualCell(self._table, settings, np.random.default_rng(0))
+        return cell.run(self.time_s, cell.desired(self.time_s))
+
+    def _loaded_or_moving(self, sample: CellSample) -> NDArray[np.bool_]:
+        moving = np.any(np.diff(sample.encoder, axis=0, prepend=sample.encoder[:1]) != 0.0, axis=1)
+        return moving | np.any(sample.wrench != 0.0, axis=1)
+
+    def signature(self, hidden: HiddenEffect) -> Array:
+        """Return the change of the residual twist by an effect, (n, 6) [m, rad]."""
+        return residual(self._table, self._run((hidden,))) - self._residual
+
+    def size(self, hidden: HiddenEffect) -> float:
+        """Return the size of an effect in units of one sample's noise."""
+        change = self.signature(hidden)[self.counted]
+        change = change - change.mean(axis=0)
+        white = (self._whiten[self.counted] @ change[..., None])[..., 0]
+        return float(np.sqrt(np.mean(white * white)))
+
+    def sized(self, hidden: HiddenEffect, size: float) -> HiddenEffect:
+        """Return the effect with the magnitude that has a size.
+
+        Parameters
+        ----------
+        hidden : HiddenEffect
+            Its magnitude is where the search begins.
+        size : float
+            Wanted.
+
+        Returns
+        -------
+        HiddenEffect
+            Of that size within `SIZE_TOLERANCE`.
+
+        Raises
+        ------
+        InputError
+            If no magnitude up to the catalogue's limit has this size.
+        """
+        limit = ALL[hidden.effect].limit
+        magnitude = magnitude_for(
+            lambda m: self.size(replace(hidden, magnitude=m)), hidden.magnitude, size, limit
+        )
+        if magnitude is None:
+            largest = self.size(replace(hidden, magnitude=limit))
+            raise InputError(
+                f"{hidden.effect}@{hidden.component}: size {size:g} is out of reach, at the limit "
+                f"of {limit:g} {ALL[hidden.effect].unit} it is {largest:.3g}"
+            )
+        return replace(hidden, magnitude=magnitude)
+
+
+def magnitude_for(
+    measure: Callable[[float], float], start: float, size: float, limit: float
+) -> float | None:
+    """Return the magnitude up to `limit` at which `measure` is `size`, None if there is none.
+
+    Secant steps between logarithms inside a bracket: most effects are nearly proportional.
+    """
+    low, high = 0.0, np.inf
+    magnitude = min(start, limit)
+    power = 1.0
+    last: tuple[float, float] | None = None
+    for _ in range(MAX_TRIALS):
+        found = measure(magnitude)
+        if abs(found - size) <= SIZE_TOLERANCE * size:
+            return magnitude
+        if found < size:
+            low = max(low, magnitude)
+            if magnitude >= limit:
+                return None
+        else:
+            high = min(high, magnitude)
+        if last is not None and found > 0.0 and last[1] > 0.0 and magnitude != last[0]:
+            slope = np.log(found / last[1]) / np.log(magnitude / last[0])
+            power = float(np.clip(slope, 0.2, 4.0))
+        last = magnitude, found
+        step = (size / found) ** (1.0 / power) if found > 0.0 else 10.0
+        following = min(magnitude * float(np.clip(step, 1e-3, 1e3)), limit)
+        if not low < following < high and not following == limit > low:
+            following = 0.5 * (low + high)
+        magnitude = following
+    return None

@@ -1,0 +1,113 @@
+"""Strangers that come with motion: a platform that rings, a pin that floats up on its oil."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import cross, dot
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.equilibrium import Equilibrium
+from wrist_stiffness.simulation.laws.joint_friction import BODIES_JOINED
+from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.seat import Seat
+
+
+class Resonance(Law):
+    """The tool lags behind fast moves and rings after them, as a weakly damped oscillator does.
+
+    Parameters
+    ----------
+    share : float
+        How much of the oscillator's motion reaches the target [-].
+    place : (3,) float
+        Centre of gravity of what swings, in U [m].
+    frequency_hz, damping : float
+        Natural frequency and damping ratio.
+    """
+
+    def __init__(self, share: float, place: Array, frequency_hz: float, damping: float) -> None:
+        self._share, self._place = share, place
+        w = 2.0 * np.pi * frequency_hz
+        # State: lag and its rate; driven by where the body is, with a linear input in each step.
+        self._system = np.array([[0.0, 1.0], [-w * w, -2.0 * damping * w]])
+        self._force = np.array([0.0, w * w])
+        self._state: tuple[float, Array, Array] | None = None
+        self._steps: dict[float, tuple[Array, Array, Array]] = {}
+
+    def twist(self, block: Block, state: Equilibrium) -> Array:
+        """Shift and tilt the platform by the lag of its centre of gravity."""
+        at = block.configuration.platform @ self._place
+        before, past, z = (block.time_s[0], at[0], np.stack([at[0], np.zeros(3)]))
+        if self._state is not None:
+            before, past, z = self._state
+        lag = np.empty_like(at)
+        for i, now in enumerate(block.time_s):
+            if now > before:
+                free, old, new = self._step(round(float(now - before), 9))
+                z = free @ z + np.outer(old, past) + np.outer(new, at[i])
+            lag[i] = z[0] - at[i]
+            before, past = now, at[i]
+        self._state = before, past, z
+        shift = self._share * lag
+        lever = cross(at, shift) / dot(at, at)[:, None]
+        return np.concatenate([shift, lever], axis=-1)
+
+    def _step(self, dt: float) -> tuple[Array, Array, Array]:
+        if dt not in self._steps:
+            # The augmented exponential gives the integrals of constant and linear inputs.
+            system = np.zeros((4, 4))
+            system[:2, :2], system[:2, 2], system[2, 3] = self._system, self._force, 1.0
+            grown = expm(system * dt)
+            constant, linear = grown[:2, 2], grown[:2, 3] / dt
+            self._steps = {dt: (grown[:2, :2], constant - linear, linear)}
+        return self._steps[dt]
+
+
+class OilFilm(Law):
+    """A turning pin floats up on its lubricant, sideways to the force that presses it down.
+
+    Parameters
+    ----------
+    joint : str
+        Passive joint.
+    seat : Seat
+        Of its bushing.
+    lift : float
+        Greatest lift [m].
+    speed : float
+        Turning speed at which three quarters of it are there [rad/s].
+    """
+
+    def __init__(self, joint: str, seat: Seat, lift: float, speed: float) -> None:
+        self._joint = joint
+        self._seat, self._lift, self._speed = seat, lift, speed
+        self._state: tuple[float, Array] | None = None
+
+    @property
+    def flows(self) -> str:
+        """The joint."""
+        return self._joint
+
+    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+        """Lift by the speed of the joint's turn."""
+        joint = self._joint
+        inner, outer = BODIES_JOINED[joint]
+        bodies = block.configuration.rotations
+        relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
+        trace = np.einsum("nii->n", relative)
+        turn = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+        before, past = (block.time_s[0], turn[0]) if self._state is None else self._state
+        steps = np.diff(block.time_s, prepend=before)
+        moved = np.diff(turn, prepend=past)
+        rate = np.divide(moved, steps, out=np.zeros_like(moved), where=steps > 0.0)
+        to_origin = self._seat.to_origin(block.rotation(joint))
+        push = np.einsum("nji,nj->ni", to_origin, wrench)[:, :3]
+        size = np.sqrt(dot(push, push) + 1e-4)[:, None]
+        side = cross(np.broadcast_to(self._seat.axis, push.shape), push) / size
+        lift = self._lift * np.tanh(np.abs(rate) / self._speed)[:, None]
+        screw = np.concatenate([lift * side, np.zeros_like(side)], axis=-1)
+        if remember:
+            self._state = float(block.time_s[-1]), turn[-1]
+        return np.einsum("nij,nj->ni", to_origin, screw)
