@@ -7,10 +7,13 @@ import pytest
 
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table_file import load_table
-from wrist_stiffness.mechanism.energy import component_wrenches, strain_energies
+from wrist_stiffness.mechanism.energy import component_screws, component_wrenches, strain_energies
+from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.statics import (
     component_shares,
     contact_operators,
+    platform_twist,
+    slides,
     turned_flexibilities,
 )
 from wrist_stiffness.shipped import shipped_file
@@ -69,3 +72,20 @@ def test_platform_twist_by_castigliano(table, case):
     )
     assert np.allclose((up - down) / (2.0 * step), np.einsum("ni,ni->n", twist, probe), rtol=1e-7)
     assert through.shape == flexibility.shape[:-1]
+
+
+def test_screws_carried_by_influence_are_the_platform_twist(table, case):
+    """sum G_k delta_k = C W + B lambda, and the slides are those that closed the gaps."""
+    configuration, wrench = case
+    operators = contact_operators(configuration, table.components, np.zeros(3))
+    response = respond(operators, wrench)
+    screws = component_screws(configuration, table.components, wrench, response.force)
+    projectors = influence(configuration)
+    twist = platform_twist(projectors, screws)
+    assert np.allclose(twist, response.twist, rtol=1e-9, atol=1e-9 * np.abs(response.twist).max())
+    opening = operators.gap + np.einsum("nim,ni->nm", operators.force_twist, wrench)
+    opening += np.einsum("nij,nj->ni", operators.approach, response.force)
+    sectors = table.components.sectors
+    local = slides(projectors, screws) @ sectors.slide.T
+    assert np.all(opening[response.active] < 1e-12)
+    assert local.shape == opening.shape

@@ -19,8 +19,13 @@ With --rebuild the whole sweep runs again from the geometry in the table and all
 compared. The exit code is 1 if a check fails."""
 
 SHOW = """\
-Say what a table holds and draw its maps: displacement and orientation error of the platform under
-the rated load over both motor angles, with the border of the operative workspace."""
+Say what a table holds and draw what a load does: maps of the platform's displacement and
+orientation error over both motor angles with the border of the operative workspace, the error
+budget (whose share is it?) and the bent wrist. The default is the rated load, 1 N downward."""
+
+SHOW_EPILOG = """\
+example, 2 N along y at a point of the platform's plate:
+  wrist-stiffness table show -o maps --load 0 2 0 --at 20 0 -18"""
 
 
 def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
@@ -53,10 +58,31 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     _add_json(check)
     check.set_defaults(run=_check)
 
-    show = actions.add_parser("show", help="draw its maps", description=SHOW)
+    show = actions.add_parser(
+        "show",
+        help="draw its maps and error budget",
+        description=SHOW,
+        epilog=SHOW_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     show.add_argument("table", nargs="?", help="table file (default: the shipped one)")
     show.add_argument(
         "-o", "--output", default=".", metavar="FOLDER", help="for the PNG files (default: here)"
+    )
+    show.add_argument(
+        "--load",
+        nargs="+",
+        type=float,
+        metavar="N",
+        help="force [N], or force [N] and moment [N m], in wrist_base (default: the rated load)",
+    )
+    show.add_argument(
+        "--at",
+        nargs=3,
+        type=float,
+        default=(0.0, 0.0, 0.0),
+        metavar="MM",
+        help="where --load acts, in wrist_platform [mm] (default: O)",
     )
     _add_json(show)
     show.set_defaults(run=_show)
@@ -110,14 +136,20 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows import table
+    from wrist_stiffness.workflows.budget import Push
     from wrist_stiffness.workflows.json_file import write_json
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
-    shown = load_table(path)
-    pictures = table.draw_maps(shown, arguments.output)
+    shown, push = load_table(path), None
+    if arguments.load is not None:
+        if len(arguments.load) not in (3, 6):
+            raise InputError(f"--load takes 3 or 6 numbers, not {len(arguments.load)}")
+        push = Push.of_millimetres(arguments.load, arguments.at)
+    pictures = table.draw_maps(shown, arguments.output, push)
     _print_facts(shown)
     summary = table.summarise(shown)
     print("1 N downward, own weight left out, operative workspace:")

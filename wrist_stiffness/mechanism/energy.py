@@ -45,6 +45,33 @@ def component_wrenches(
     return through
 
 
+def component_screws(
+    configuration: Configuration, components: ElasticComponents, wrench: Array, force: Array
+) -> Array:
+    """Return the elastic screw of each component under a platform load and contact forces.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of shape (...).
+    components : ElasticComponents
+        Condensed parts.
+    wrench : (..., 6) float
+        On the platform at O in F [N, N m].
+    force : (..., m) float
+        Contact force of each sector [N].
+
+    Returns
+    -------
+    (..., 8, 6) float
+        C_k W_k, plus what pressed flanges add to their bushing; at O in F [m, rad].
+    """
+    through = component_wrenches(configuration, components, wrench, force)
+    flexibility = turned_flexibilities(configuration, components)
+    bent = (flexibility @ through[..., None])[..., 0]
+    return bent + _pressed(_flange_screws(configuration, components, force), components)
+
+
 def strain_energies(
     configuration: Configuration, components: ElasticComponents, wrench: Array, force: Array
 ) -> Array:
@@ -73,9 +100,24 @@ def strain_energies(
     flexibility = turned_flexibilities(configuration, components)
     energy: Array = 0.5 * np.einsum("...ki,...kij,...kj->...k", through, flexibility, through)
     sectors = components.sectors
-    turn = block_diagonal(component_rotations(configuration).take(sectors.component, axis=-3))
-    bent = np.einsum("...mij,mj,...m->...mi", turn, sectors.screw, force)
+    bent = _flange_screws(configuration, components, force)
     own = np.einsum("...mi,...mi->...m", through.take(sectors.component, axis=-2), bent)
     own += 0.5 * force * (force @ sectors.approach)
-    belongs = sectors.component[:, None] == np.arange(len(ELASTIC))
-    return energy + own @ belongs
+    return energy + _pressed(own[..., None], components)[..., 0]
+
+
+def _flange_screws(
+    configuration: Configuration, components: ElasticComponents, force: Array
+) -> Array:
+    """Screw of the bushing by each sector's contact force, (..., m, 6)."""
+    sectors = components.sectors
+    turn = block_diagonal(component_rotations(configuration).take(sectors.component, axis=-3))
+    bent: Array = np.einsum("...mij,mj,...m->...mi", turn, sectors.screw, force)
+    return bent
+
+
+def _pressed(by_sector: Array, components: ElasticComponents) -> Array:
+    """Sum over the sectors (..., m, d) of each component, (..., 8, d)."""
+    belongs = (components.sectors.component == np.arange(len(ELASTIC))[:, None]).astype(float)
+    summed: Array = belongs @ by_sector
+    return summed

@@ -87,10 +87,17 @@ class Workspace:
         (n, 2) float
             Motor angles [rad].
         """
+        poses = self.rectangle_grid(per_axis)
+        return poses[self.domain(poses)]
+
+    def rectangle_grid(self, per_axis: int) -> Array:
+        """Return an equally spaced grid over the whole rectangle, (n, n, 2) [rad].
+
+        The first motor angle runs along the first axis.
+        """
         lower, upper = self.rectangle
         axes = [np.linspace(lower[i], upper[i], per_axis) for i in range(2)]
-        poses = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        return poses[self.domain(poses)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
     def configuration(self, theta: Array) -> Configuration:
         """Forward kinematics of one pose that must lie in the map domain.

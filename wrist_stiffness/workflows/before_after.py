@@ -131,7 +131,10 @@ def _read(
     int,
 ]:
     motors = MotorNames()
-    commands, poses, residuals, switched_ns = [], [], {}, None
+    commands: list[tuple[int, Array]] = []
+    poses: list[tuple[int, tuple[float, ...], tuple[float, ...]]] = []
+    residuals: dict[int, Array] = {}
+    switched_ns: int | None = None
     source = open_recording(recording)
     for topic, _, message in source.messages([MOTOR_COMMANDS, TRUE_POSE, CORRECTED, RESIDUAL]):
         if isinstance(message, JointState):

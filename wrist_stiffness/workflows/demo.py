@@ -22,7 +22,7 @@ from wrist_stiffness.workflows.table import draw_maps
 Progress = Callable[[int, int], None]
 
 LIVE, REPLAYED = "live", "replayed"
-OURS = (LIVE, REPLAYED, "map_s.png", "map_phi.png", "before_after.png")
+PICTURES = ("map_s.png", "map_phi.png", "budget.png", "bent.png", "before_after.png")
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def run_demo(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
-    for name in OURS:
+    for name in (LIVE, REPLAYED, *PICTURES):
         left = folder / name
         if left.is_dir():
             shutil.rmtree(left)
@@ -93,7 +93,7 @@ def run_demo(
     run_cell(Path(model), seconds, folder / LIVE, progress=progress("live nodes"))
     replayed = replay(folder / LIVE, model, folder / REPLAYED, progress=progress("replay"))
     before, after = before_and_after(folder / LIVE, table)
-    picture = folder / "before_after.png"
+    picture = folder / PICTURES[-1]
     draw_before_after(before, after, picture)
     return DemoResult(
         table=table,

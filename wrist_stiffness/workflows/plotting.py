@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.before_after import Pass
 
 DPI = 130
-FINE = 161
 
 
 def new_figure(width_in: float, height_in: float) -> Any:
@@ -21,55 +21,45 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
-def draw_map(table: Table, column: int, scale: float, label: str, path: Path) -> None:
-    """Draw one quantity of the rated load over the joint space.
-
-    The operative workspace is bordered by a black line, the grid's poses are dots: the paper's
-    Figs. 5 and 6.
+def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, path: Path) -> None:
+    """Draw one quantity over the joint space, with the operative workspace bordered.
 
     Parameters
     ----------
     table : Table
         The lookup.
-    column : int
-        Column of `MAP_COLUMNS`.
-    scale : float
-        From SI to the unit of the label.
-    label : str
-        Quantity and unit.
+    poses : (n, n, 2) float
+        Motor angles on a grid, the first one along the first axis [rad].
+    values : (n, n) float
+        The quantity in the unit of the label; NaN outside the map domain.
+    label, load : str
+        What is shown, and under which load.
     path : Path
         PNG to write.
     """
     from matplotlib.colors import BoundaryNorm
 
     workspace = table.workspace
-    lower, upper = workspace.rectangle
-    axes = [np.linspace(lower[i], upper[i], FINE) for i in range(2)]
-    poses = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    values = scale * table.map_spline(poses)[..., column]
-    values[~workspace.domain(poses)] = np.nan
     operative = values[workspace.operative(poses)]
-
     figure = new_figure(7.0, 5.6)
     plot = figure.subplots()
-    theta = [np.degrees(axis) for axis in axes]
+    theta_1, theta_2 = np.degrees(poses[:, 0, 0]), np.degrees(poses[0, :, 1])
     # Equal counts per colour: the border's steep maximum would hide the operative workspace else.
     levels = np.unique(np.nanquantile(values, np.linspace(0.0, 1.0, 25)))
     filled = plot.contourf(
-        theta[0], theta[1], values.T, levels=levels, norm=BoundaryNorm(levels, 256), cmap="viridis"
+        theta_1, theta_2, values.T, levels=levels, norm=BoundaryNorm(levels, 256), cmap="viridis"
     )
     lines = plot.contour(
-        theta[0], theta[1], values.T, levels=levels[::3], colors="white", linewidths=0.5
+        theta_1, theta_2, values.T, levels=levels[::3], colors="white", linewidths=0.5
     )
     plot.clabel(lines, fontsize=7, fmt="%.3g")
     border = np.degrees(workspace.operative_border)
     plot.plot(*border.T, color="black", linewidth=2.0, label="operative workspace")
-    plot.plot(*np.degrees(table.nodes).T, ".", color="black", markersize=2.0, label="grid poses")
     plot.set_xlabel("motor 1 angle θ₁ [deg]")
     plot.set_ylabel("motor 2 angle θ₂ [deg]")
     plot.set_aspect("equal")
     plot.set_title(
-        f"{table.geometry.name}: {label}\n1 N downward; operative workspace "
+        f"{table.geometry.name}: {label}\n{load}; operative workspace "
         f"{operative.min():.3g} to {operative.max():.3g}, mean {operative.mean():.3g}; "
         f"map up to {np.nanmax(values):.3g}",
         fontsize=9,

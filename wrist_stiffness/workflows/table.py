@@ -14,11 +14,16 @@ from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import load_table, save_table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry_file import load_geometry
+from wrist_stiffness.workflows.budget import PER_AXIS, Push, budget
 
 Progress = Callable[[int, int], None]
 
 REBUILT_TOLERANCE = 1e-6
 """Relative difference of a rebuilt table that counts as the same: other BLAS, same mesh."""
+
+FINE = 161
+
+PICTURED_POSE = np.radians([25.0, -20.0])
 
 MICRO = 1e6
 CENTIDEGREES = 100.0 * 180.0 / np.pi
@@ -257,8 +262,8 @@ def summarise(table: Table, poses: Array | None = None) -> MapSummary:
     return MapSummary(operative, domain)
 
 
-def draw_maps(table: Table, folder: str | Path) -> list[Path]:
-    """Draw displacement and orientation error over the joint space (the paper's Figs. 5 and 6).
+def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> list[Path]:
+    """Draw what a load does: two maps, the error budget, and the bent wrist.
 
     Parameters
     ----------
@@ -266,31 +271,49 @@ def draw_maps(table: Table, folder: str | Path) -> list[Path]:
         The lookup.
     folder : path
         Where the PNG files go; made if missing.
+    push : Push, optional
+        The load; the rated one if None, for which the maps are the table's splines of s and phi
+        (the paper's Figs. 5 and 6), else the closed form.
 
     Returns
     -------
     list of Path
-        `map_s.png` and `map_phi.png`.
+        `map_s.png`, `map_phi.png`, `budget.png` and `bent.png`.
 
     Raises
     ------
     InputError
         If the folder cannot be made.
+    LoadRangeError
+        If the load is outside the table's range.
     """
+    from wrist_stiffness.workflows.budget_picture import draw_budget
     from wrist_stiffness.workflows.plotting import draw_map
+    from wrist_stiffness.workflows.wrist_picture import draw_bent_wrist
 
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
-    pictures = []
-    for name, column, scale, label in (
-        ("map_s.png", 3, MICRO, "displacement error s of the platform's centre [µm]"),
-        ("map_phi.png", 4, CENTIDEGREES, "orientation error φ of the platform [10⁻² deg]"),
-    ):
-        draw_map(table, column, scale, label, folder / name)
-        pictures.append(folder / name)
+    load = push or Push.rated(table)
+    found = budget(table, load)
+    poses = table.workspace.rectangle_grid(FINE if push is None else PER_AXIS)
+    inside = table.workspace.domain(poses)
+    values = np.full((*poses.shape[:-1], 2), np.nan)
+    if push is None:
+        values[inside] = table.map_spline(poses[inside])[:, 3:]
+    else:
+        halves = found.twist.reshape(-1, 2, 3)
+        values[inside] = np.linalg.norm(halves, axis=-1)
+    pictures = [folder / name for name in ("map_s.png", "map_phi.png", "budget.png", "bent.png")]
+    s, phi = MICRO * values[..., 0], CENTIDEGREES * values[..., 1]
+    label = "displacement error s of the platform's centre [µm]"
+    draw_map(table, poses, s, label, load.text, pictures[0])
+    label = "orientation error φ of the platform [10⁻² deg]"
+    draw_map(table, poses, phi, label, load.text, pictures[1])
+    draw_budget(table, found, load.text, pictures[2])
+    draw_bent_wrist(table, PICTURED_POSE, load, pictures[3])
     return pictures
 
 

@@ -1,0 +1,127 @@
+"""Whose share is it?  The error budget of a load by component, over the workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.lookup.rated_load import RATED_FORCE
+from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.energy import strain_energies
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.mechanism.vectors import cross
+
+PER_AXIS = 41
+
+
+@dataclass(frozen=True)
+class Push:
+    """A load in fixed axes of F at a point of the platform.
+
+    Parameters
+    ----------
+    force, moment : (3,) float
+        In F [N, N m].
+    point : (3,) float
+        Where the force acts, in U [m].
+    """
+
+    force: Array
+    moment: Array
+    point: Array
+
+    @classmethod
+    def rated(cls, table: Table) -> Push:
+        """Return the rated load of the maps."""
+        return cls(RATED_FORCE, np.zeros(3), table.geometry.load_point)
+
+    @classmethod
+    def of_millimetres(cls, load: Sequence[float], point_mm: Sequence[float]) -> Push:
+        """Return a load from 3 or 6 numbers [N, N m] and its point in U [mm]."""
+        whole = np.concatenate([np.array(load, dtype=float), np.zeros(6 - len(load))])
+        return cls(whole[:3], whole[3:], 1e-3 * np.array(point_mm, dtype=float))
+
+    @property
+    def text(self) -> str:
+        """The load in words, for titles."""
+        force = ", ".join(f"{value:.3g}" for value in self.force)
+        point = ", ".join(f"{1e3 * value:.3g}" for value in self.point)
+        words = f"({force}) N at ({point}) mm"
+        if np.any(self.moment):
+            words += f", ({', '.join(f'{value:.3g}' for value in self.moment)}) N m"
+        return words
+
+    def wrench(self, platform: Array) -> Array:
+        """Return the wrench at O in F, (..., 6), for rotations U -> F (..., 3, 3)."""
+        force = np.broadcast_to(self.force, (*platform.shape[:-2], 3))
+        moment = self.moment + cross(platform @ self.point, force)
+        return np.concatenate([force, moment], axis=-1)
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a load alone does at poses on a grid over the map domain.
+
+    Parameters
+    ----------
+    theta : (n, 2) float
+        Motor angles [rad].
+    operative : (n,) bool
+        Poses in the operative workspace.
+    twist : (n, 6) float
+        Of the platform, own weight left out [m, rad].
+    shares : (n, 8) float
+        Part of the strain energy by component, in the order of `ELASTIC`; rows add up to 1.
+    touching : (n,) int
+        Flange sectors in contact.
+    """
+
+    theta: Array
+    operative: NDArray[np.bool_]
+    twist: Array
+    shares: Array
+    touching: NDArray[np.intp]
+
+
+def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
+    """Compute twist and energy shares of a load over the workspace.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup; evaluated in closed form, because only that knows the components.
+    push : Push
+        The load.
+    per_axis : int
+        Grid points along each motor angle.
+
+    Returns
+    -------
+    Budget
+        On the grid.
+
+    Raises
+    ------
+    LoadRangeError
+        If the load at O is outside the table's range.
+    """
+    theta = table.workspace.grid(per_axis)
+    configuration = table.mechanism.forward(theta)
+    wrench = push.wrench(configuration.platform)
+    table.check_load(wrench)
+    operators = contact_operators(configuration, table.components, np.zeros(3))
+    response = respond(operators, wrench)
+    energy = strain_energies(configuration, table.components, wrench, response.force)
+    total = energy.sum(axis=-1, keepdims=True)
+    return Budget(
+        theta=theta,
+        operative=table.workspace.operative(theta),
+        twist=response.twist,
+        shares=energy / np.where(total > 0.0, total, 1.0),
+        touching=np.count_nonzero(response.active, axis=-1),
+    )
