@@ -10,10 +10,11 @@ from importlib.metadata import version
 import numpy as np
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.fem.parts import Part, Solid, assemble_body, wrist_parts
+from wrist_stiffness.fem.condensed_store import PACKAGES, CondensedSolid, condense_solid
+from wrist_stiffness.fem.parts import Part, Solid, wrist_parts
 from wrist_stiffness.fem.revolve import SECTORS
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
-from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement, condense
+from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
 from wrist_stiffness.mechanism.components import (
     PASSIVE_JOINTS,
     Array,
@@ -28,8 +29,8 @@ SHIPPED_SIZES = MeshSettings(
 )
 """Element sizes of the shipped tables; `convergence.py` states their error."""
 
-PACKAGES = ("netgen-mesher", "scikit-fem", "scipy", "numpy", "pymetis")
-"""Packages whose versions may change the numbers."""
+Condenser = Callable[[Solid, MeshSettings, Interface], CondensedSolid]
+"""Makes the superelement of a solid."""
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of parts done, the number of all parts, and what comes next."""
@@ -66,6 +67,7 @@ def elastic_components(
     sizes: MeshSettings = SHIPPED_SIZES,
     interface: Interface = "rigid",
     progress: Progress | None = None,
+    condenser: Condenser = condense_solid,
 ) -> tuple[ElasticComponents, Provenance]:
     """Condense every elastic part of a wrist.
 
@@ -79,6 +81,8 @@ def elastic_components(
         How walls follow their frames.
     progress : callable, optional
         See `Progress`.
+    condenser : callable
+        `condense_solid`, or a `CondensedStore` that remembers.
 
     Returns
     -------
@@ -98,26 +102,24 @@ def elastic_components(
         raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
     start = time.perf_counter()
     parts = wrist_parts(geometry)
-    condensed: dict[Solid, Superelement] = {}
-    counts: dict[Solid, tuple[int, int]] = {}
+    condensed: dict[Solid, CondensedSolid] = {}
     for done, part in enumerate(parts):
         if progress is not None:
             progress(done, len(parts), part.name)
         if part.solid not in condensed:
-            body = assemble_body(part.solid, sizes)
-            condensed[part.solid] = condense(body, interface)
-            counts[part.solid] = (len(body.mesh.nodes), len(body.mesh.elements))
+            condensed[part.solid] = condenser(part.solid, sizes, interface)
     if progress is not None:
         progress(len(parts), len(parts), "done")
     provenance = Provenance(
         interface=interface,
         sizes=sizes,
-        nodes={part.name: counts[part.solid][0] for part in parts},
-        elements={part.name: counts[part.solid][1] for part in parts},
+        nodes={part.name: condensed[part.solid].nodes for part in parts},
+        elements={part.name: condensed[part.solid].elements for part in parts},
         seconds=time.perf_counter() - start,
         packages={package: version(package) for package in PACKAGES},
     )
-    return place_components(geometry, parts, condensed), provenance
+    elements = {solid: kept.element for solid, kept in condensed.items()}
+    return place_components(geometry, parts, elements), provenance
 
 
 def place_components(

@@ -14,7 +14,8 @@ import numpy as np
 
 from wrist_stiffness import __version__
 from wrist_stiffness.errors import TableError
-from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
+from wrist_stiffness.fem.components import SHIPPED_SIZES, Condenser, elastic_components
+from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.biharmonic import Kernel
@@ -74,7 +75,10 @@ class BuildSettings:
 
 
 def build_table(
-    values: Mapping[str, Any], settings: BuildSettings, progress: Progress = lambda done, of: None
+    values: Mapping[str, Any],
+    settings: BuildSettings,
+    progress: Progress = lambda done, of: None,
+    condenser: Condenser = condense_solid,
 ) -> Table:
     """Run the sweep.
 
@@ -86,6 +90,8 @@ def build_table(
         Mesh, interface, grid.
     progress : callable
         Called with steps done and in all.
+    condenser : callable
+        `condense_solid`, or a `CondensedStore` for a build that can be resumed.
 
     Returns
     -------
@@ -106,11 +112,11 @@ def build_table(
         progress(parts_done + done, 2 * of + 1)
 
     components, provenance = elastic_components(
-        geometry, settings.sizes, settings.interface, part_done
+        geometry, settings.sizes, settings.interface, part_done, condenser
     )
     parts_done = len(provenance.nodes)
     coarse_sizes = MeshSettings(**{k: COARSENING * v for k, v in asdict(settings.sizes).items()})
-    coarse, _ = elastic_components(geometry, coarse_sizes, settings.interface, part_done)
+    coarse, _ = elastic_components(geometry, coarse_sizes, settings.interface, part_done, condenser)
     mesh_error = _mesh_error(geometry, components, coarse)
 
     header = TableHeader(

@@ -38,7 +38,9 @@ def build(
     per_axis: int | None = None,
     progress: Progress = lambda done, of: None,
 ) -> Table:
-    """Run the offline sweep and write its table.
+    """Run the offline sweep and write its table; an interrupted build goes on where it was.
+
+    Condensed parts are kept beside the table until it is written.
 
     Parameters
     ----------
@@ -67,6 +69,7 @@ def build(
     WristError
         If the geometry is wrong, the tolerance is not met or the file cannot be written.
     """
+    from wrist_stiffness.fem.condensed_store import CondensedStore
     from wrist_stiffness.fem.sweep import BuildSettings, build_table
 
     output = Path(output)
@@ -85,7 +88,10 @@ def build(
         tolerance=tolerance,
         per_axis=per_axis,
     )
-    return save_table(build_table(values, settings, progress), output)
+    store = CondensedStore(output.with_name(f".{output.stem}.parts"))
+    table = save_table(build_table(values, settings, progress, store), output)
+    store.remove()
+    return table
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,136 @@
+"""The offline sweep: stated errors that hold, builds that resume, tables that can be rebuilt."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from wrist_stiffness.errors import TableError
+from wrist_stiffness.fem import sweep
+from wrist_stiffness.fem.condensed_store import CondensedStore, condense_solid
+from wrist_stiffness.fem.solids import MeshSettings
+from wrist_stiffness.fem.sweep import BuildSettings, build_table
+from wrist_stiffness.lookup.table_file import load_table, save_table
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.table import check
+
+COARSE = BuildSettings(
+    sizes=MeshSettings(
+        link=4e-3, bore=2.4e-3, bushing=1.0e-3, bushing_corner=0.4e-3, bushing_arc=2.8e-3
+    ),
+    tolerance=0.03,
+    per_axis=9,
+)
+
+
+@pytest.fixture(scope="module")
+def values():
+    return yaml.safe_load(shipped_file("config/palmieri2015.yaml").read_text())
+
+
+class Counting:
+    """Condenses and counts; stops the build like a user does after some solids."""
+
+    def __init__(self, inner, stop_after=None):
+        self.inner, self.stop_after, self.calls = inner, stop_after, 0
+
+    def __call__(self, *arguments):
+        if self.calls == self.stop_after:
+            raise KeyboardInterrupt
+        self.calls += 1
+        return self.inner(*arguments)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory, values):
+    return CondensedStore(tmp_path_factory.mktemp("parts"))
+
+
+@pytest.fixture(scope="module")
+def table(values, store):
+    return build_table(values, COARSE, condenser=store)
+
+
+@pytest.mark.slow
+def test_an_interrupted_build_goes_on_where_it_was(values, tmp_path, monkeypatch, table):
+    solids = []
+    monkeypatch.setattr(
+        "wrist_stiffness.fem.condensed_store.condense_solid",
+        lambda *a: (solids.append(a), condense_solid(*a))[1],
+    )
+    with pytest.raises(KeyboardInterrupt):
+        build_table(values, COARSE, condenser=Counting(CondensedStore(tmp_path / "p"), 3))
+    assert len(solids) == 3
+    (tmp_path / "p" / "cut.npz").write_bytes(b"PK half a part")
+    again = build_table(values, COARSE, condenser=CondensedStore(tmp_path / "p"))
+    distinct = len(set(map(repr, solids)))
+    assert distinct == len(solids), "a part was condensed twice"
+    assert np.array_equal(again.operators, table.operators)
+    CondensedStore(tmp_path / "p").remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_cut_part_is_condensed_again(values, table, store):
+    victim = sorted(store.folder.glob("*.npz"))[0]
+    victim.write_bytes(victim.read_bytes()[:100])
+    again = build_table(values, COARSE, condenser=store)
+    assert np.array_equal(again.map_values, table.map_values)
+
+
+@pytest.mark.slow
+def test_rebuild_gives_the_same_numbers(table, tmp_path):
+    path = tmp_path / "t.npz"
+    save_table(table, path)
+    findings = check(path, rebuild=True)
+    assert all(finding.passed for finding in findings), findings
+    assert {"rebuilt operators", "rebuilt map_values"} <= {finding.name for finding in findings}
+    other = replace(table, operators=table.operators * (1.0 + 1e-5))
+    save_table(other, path)
+    failed = {finding.name for finding in check(path, rebuild=True) if not finding.passed}
+    assert "rebuilt operators" in failed
+
+
+def test_stated_errors_too_good_to_be_true_are_found(table, tmp_path):
+    errors = table.header.errors
+    worse = {**errors, "predicted": {**errors["predicted"]}}
+    worse["predicted"]["operative"] = {"s": 1e-9, "phi": 1e-9}
+    save_table(replace(table, header=replace(table.header, errors=worse)), tmp_path / "t.npz")
+    failed = {finding.name for finding in check(tmp_path / "t.npz") if not finding.passed}
+    assert failed == {"spline s operative", "spline phi operative"}
+
+
+def test_check_knows_another_geometry(table, tmp_path, values):
+    save_table(table, tmp_path / "t.npz")
+    other = {**values, "name": "another wrist"}
+    (tmp_path / "g.yaml").write_text(yaml.safe_dump(other))
+    findings = check(tmp_path / "t.npz", tmp_path / "g.yaml")
+    assert [finding.name for finding in findings if not finding.passed] == ["geometry"]
+
+
+def test_grid_is_refined_until_the_tolerance_is_met(values, store, table):
+    settings = replace(COARSE, per_axis=None)
+    refined = build_table(values, settings, condenser=store)
+    worst = refined.header.errors["predicted"]
+    assert max(worst["operative"].values()) <= 0.03
+    assert max(worst["domain"].values()) <= 0.12
+    first = replace(settings, per_axis=sweep.GRIDS[0])
+    coarsest = build_table(values, first, condenser=store)
+    fine, coarse = worst["operative"], coarsest.header.errors["predicted"]["operative"]
+    assert fine["phi"] < coarse["phi"]
+
+
+def test_a_tolerance_that_no_grid_meets(values, store, table, monkeypatch):
+    monkeypatch.setattr(sweep, "GRIDS", (5, 9))
+    with pytest.raises(TableError, match="no grid up to 9 x 9 meets the tolerance 1e-12"):
+        build_table(values, replace(COARSE, per_axis=None, tolerance=1e-12), condenser=store)
+
+
+def test_header_says_where_it_comes_from(table, tmp_path):
+    save_table(table, tmp_path / "t.npz")
+    header = load_table(tmp_path / "t.npz").header
+    assert header.mesh["sizes_mm"]["link"] == pytest.approx(4.0)
+    assert {"netgen-mesher", "scikit-fem", "numpy", "wrist_stiffness"} <= set(header.versions)
+    assert header.interface == "rigid"
+    assert 0.0 < header.errors["mesh_relative"] < 0.5

@@ -1,0 +1,124 @@
+"""Condensed solids on disk, so that an interrupted build goes on where it was.
+
+A build keeps each part as soon as it is condensed.  The name of a file is the checksum of all that
+decides its numbers: dimensions, element sizes, interface model and solver versions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import zipfile
+from dataclasses import asdict, dataclass, fields
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.errors import TableError
+from wrist_stiffness.fem.parts import Solid, assemble_body
+from wrist_stiffness.fem.solids import MeshSettings
+from wrist_stiffness.fem.superelement import Interface, Superelement, condense
+
+PACKAGES = ("netgen-mesher", "scikit-fem", "scipy", "numpy", "pymetis")
+"""Packages whose versions may change the numbers."""
+
+
+@dataclass(frozen=True)
+class CondensedSolid:
+    """One solid, condensed.
+
+    Parameters
+    ----------
+    element : Superelement
+        As its frames see it.
+    nodes, elements : int
+        Size of its mesh.
+    """
+
+    element: Superelement
+    nodes: int
+    elements: int
+
+
+def condense_solid(solid: Solid, sizes: MeshSettings, interface: Interface) -> CondensedSolid:
+    """Mesh, assemble and condense one solid.
+
+    Parameters
+    ----------
+    solid : Solid
+        Its shape and walls.
+    sizes : MeshSettings
+        Element sizes [m].
+    interface : {"rigid", "distributing"}
+        How walls follow their frames.
+
+    Returns
+    -------
+    CondensedSolid
+        Superelement and mesh size.
+    """
+    body = assemble_body(solid, sizes)
+    return CondensedSolid(condense(body, interface), len(body.mesh.nodes), len(body.mesh.elements))
+
+
+class CondensedStore:
+    """Condenses a solid once and keeps it in a folder; called as `condense_solid`.
+
+    Parameters
+    ----------
+    folder : path
+        Made if missing; `remove` takes it away when the build is done.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+
+    def __call__(self, solid: Solid, sizes: MeshSettings, interface: Interface) -> CondensedSolid:
+        """Return the condensed solid, from the folder where it is there already.
+
+        Raises
+        ------
+        TableError
+            If the folder cannot be written.
+        """
+        path = self.folder / f"{_key(solid, sizes, interface)}.npz"
+        kept = _load(path)
+        if kept is not None:
+            return kept
+        condensed = condense_solid(solid, sizes, interface)
+        try:
+            self.folder.mkdir(exist_ok=True)
+            partial = path.with_suffix(f".{os.getpid()}.part")
+            with partial.open("wb") as stream:
+                np.savez(
+                    stream,
+                    nodes=condensed.nodes,
+                    elements=condensed.elements,
+                    **asdict(condensed.element),
+                )
+            os.replace(partial, path)
+        except OSError as error:
+            raise TableError(f"{self.folder}: cannot be written: {error.strerror}") from error
+        return condensed
+
+    def remove(self) -> None:
+        """Take the folder away."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _key(solid: Solid, sizes: MeshSettings, interface: Interface) -> str:
+    versions = [version(package) for package in PACKAGES]
+    said = repr((solid, sizes, interface, versions))
+    return hashlib.sha256(said.encode()).hexdigest()[:32]
+
+
+def _load(path: Path) -> CondensedSolid | None:
+    """Return what the file holds; None where it is missing or was cut."""
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+            element = Superelement(**{f.name: archive[f.name] for f in fields(Superelement)})
+            return CondensedSolid(element, int(archive["nodes"]), int(archive["elements"]))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
