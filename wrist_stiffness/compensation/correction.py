@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,6 +84,30 @@ def correct(model: ErrorModel, command: Array, load: Load, objective: Objective)
         f"correction: no fixed point after {MAX_ITERATIONS} steps, last step "
         f"{np.degrees(np.max(np.abs(step))):.2e} deg"
     )
+
+
+def as_applied(model: ErrorModel, correction: Correction, delta: Array) -> Correction:
+    """Return what a correction leaves where only another one near it is applied.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        The one that made the correction.
+    correction : Correction
+        At its fixed point.
+    delta : (2,) float
+        What is applied instead [rad].
+
+    Returns
+    -------
+    Correction
+        With the residual moved by the rigid Jacobian; the error's own change between the two poses
+        is smaller than that by the ratio of error to pose, 1e-3.
+    """
+    jacobian = model.table.mechanism.jacobian(correction.prediction.configuration)
+    after = correction.after.copy()
+    after[3:] += jacobian @ (delta - correction.delta)
+    return replace(correction, delta=delta, after=after)
 
 
 def residual_twist(prediction: Prediction, desired: Array) -> Array:

@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.intake import Frames, MotorNames
 from wrist_stiffness.compensation.objective import ObjectiveName
+from wrist_stiffness.compensation.safety import SafetySettings
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,12 @@ class StreamSettings:
     objective : str
         What the correction makes right.
     correction_limit : float
-        Largest correction of a motor angle [rad].
+        Largest correction of a motor angle; where more would be needed the model is not believed
+        and there is none [rad].
+    safety : SafetySettings
+        How the correction may change and where it fades.
+    contact : ContactSettings
+        What is done with a load that depends on the motion.
     """
 
     motors: MotorNames = field(default_factory=MotorNames)
@@ -33,3 +40,5 @@ class StreamSettings:
     load_age_limit_s: float = 0.5
     objective: ObjectiveName = "pointing"
     correction_limit: float = float(np.radians(0.5))
+    safety: SafetySettings = field(default_factory=SafetySettings)
+    contact: ContactSettings = field(default_factory=ContactSettings)

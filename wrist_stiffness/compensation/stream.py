@@ -10,14 +10,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.compensation.correction import Correction, correct
+from wrist_stiffness.compensation.contact_policy import ContactGuard
+from wrist_stiffness.compensation.correction import Correction, as_applied, correct
 from wrist_stiffness.compensation.intake import CORRECTED_FRAME
 from wrist_stiffness.compensation.load_history import LoadIntake
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.safety import (
+    AppliedCorrection,
+    guard_weight,
+    within_joint_limits,
+)
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
+
+TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
 
 
 class _Stream:
@@ -36,6 +44,10 @@ class _Stream:
         self._settings = settings
         self.loads.frames = settings.frames
         self.loads.history.age_limit_s = settings.load_age_limit_s
+
+    def tare(self) -> Load:
+        """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
+        return self.loads.tare()
 
     def _loaded_model(self) -> ErrorModel:
         if self.model is None:
@@ -105,23 +117,20 @@ class CorrectedCommand:
     Parameters
     ----------
     frame_id : str
-        For the header: `wrist_corrected` where correction is on.
+        For the header: `wrist_corrected` where correction is on or still fades out.
     positions : (n,) float
         All joints of the command, the motors corrected [rad].
     theta : (2,) float
         Corrected motor angles [rad].
-    delta : (2,) float
-        What was added [rad].
     correction : Correction or None
-        None where the command passes unchanged.
+        As it is applied, with the residual that remains; None while none can be had.
     fault : WristError or None
-        Why it passes unchanged although correction is on.
+        Why none can be had although correction is on; what was applied before fades out.
     """
 
     frame_id: str
     positions: Array
     theta: Array
-    delta: Array
     correction: Correction | None
     fault: WristError | None
 
@@ -156,11 +165,34 @@ class CorrectionStream(_Stream):
         Names, frames, objective, limits.
     enabled : bool
         Whether commands are corrected; else they pass unchanged.
+
+    Attributes
+    ----------
+    contact : ContactGuard
+        Whether the load says that there is contact.
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings, enabled: bool) -> None:
         super().__init__(model, settings)
-        self.enabled = enabled
+        self.contact = ContactGuard()
+        self._applied = AppliedCorrection()
+        self._enabled = enabled
+
+    @property
+    def enabled(self) -> bool:
+        """Whether commands are corrected; switching it on takes the present load as payload."""
+        return self._enabled
+
+    @enabled.setter
+    def enabled(self, enabled: bool) -> None:
+        self._enabled = enabled
+        self.contact.forget()
+
+    def tare(self) -> Load:
+        """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
+        zero = super().tare()
+        self.contact.forget()
+        return zero
 
     def on_command(
         self, stamp_ns: int, frame_id: str, names: Sequence[str], positions: Sequence[float]
@@ -179,7 +211,7 @@ class CorrectionStream(_Stream):
         Returns
         -------
         CorrectedCommand
-            Unchanged, with the fault, wherever a correction cannot be had safely.
+            With the fault, and on the way to no correction, wherever one cannot be had safely.
 
         Raises
         ------
@@ -188,16 +220,24 @@ class CorrectionStream(_Stream):
         """
         theta = self._motor_angles(names, positions)
         sent = np.array(positions, dtype=float)
-        if not self.enabled:
-            return CorrectedCommand(frame_id, sent, theta, np.zeros(2), None, None)
-        try:
-            correction = self._correction(self._load(stamp_ns, frame_id), theta)
-        except WristError as error:
-            return CorrectedCommand(CORRECTED_FRAME, sent, theta, np.zeros(2), None, error)
-        corrected = theta + correction.delta
-        sent[list(self.settings.motors.places(names))] = corrected
+        if frame_id == CORRECTED_FRAME:
+            self._applied.reset()
+            twice = InputError(TWICE) if self.enabled else None
+            return CorrectedCommand(frame_id, sent, theta, None, twice)
+        correction: Correction | None = None
+        fault: WristError | None = None
+        if self.enabled:
+            try:
+                correction = self._correction(self._load(stamp_ns), theta)
+            except WristError as error:
+                fault = error
+        delta = self._advance(stamp_ns, theta, correction)
+        if correction is not None:
+            correction = as_applied(self._loaded_model(), correction, delta)
+        sent[list(self.settings.motors.places(names))] = theta + delta
+        marked = self.enabled or bool(np.any(delta))
         return CorrectedCommand(
-            CORRECTED_FRAME, sent, corrected, correction.delta, correction, None
+            CORRECTED_FRAME if marked else frame_id, sent, theta + delta, correction, fault
         )
 
     def on_trajectory(
@@ -208,6 +248,8 @@ class CorrectionStream(_Stream):
         points: Sequence[Sequence[float]],
     ) -> CorrectedTrajectory:
         """Correct every point of a trajectory under the load at its start.
+
+        A trajectory is a plan: it is neither slewed nor held by the hysteresis.
 
         Parameters
         ----------
@@ -235,11 +277,13 @@ class CorrectionStream(_Stream):
         if not self.enabled:
             return CorrectedTrajectory(frame_id, sent, None)
         try:
-            load = self._load(stamp_ns, frame_id)
-            deltas = [self._correction(load, theta).delta for theta in angles]
+            if frame_id == CORRECTED_FRAME:
+                raise InputError(TWICE)
+            load = self._load(stamp_ns)
+            corrected = [self._within_limits(load, theta) for theta in angles]
         except WristError as error:
             return CorrectedTrajectory(CORRECTED_FRAME, sent, error)
-        sent[:, list(self.settings.motors.places(names))] += np.reshape(deltas, (-1, 2))
+        sent[:, list(self.settings.motors.places(names))] = np.reshape(corrected, (-1, 2))
         return CorrectedTrajectory(CORRECTED_FRAME, sent, None)
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
@@ -248,12 +292,12 @@ class CorrectionStream(_Stream):
             raise InputError(f"command: position {list(positions)} is not finite")
         return theta
 
-    def _load(self, stamp_ns: int, frame_id: str) -> Load:
-        if frame_id == CORRECTED_FRAME:
-            raise InputError("command is marked 'wrist_corrected': passed on unchanged, not twice")
-        return self.loads.at(stamp_ns)[1]
+    def _load(self, stamp_ns: int) -> Load:
+        _, measured = self.loads.at(stamp_ns)
+        return self.contact.load(stamp_ns, measured, self.settings.contact)
 
     def _correction(self, load: Load, theta: Array) -> Correction:
+        """Return the correction that is wanted: faded by the guards, refused beyond the limit."""
         model = self._loaded_model()
         platform = model.table.geometry.platform
         objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
@@ -264,4 +308,18 @@ class CorrectionStream(_Stream):
                 f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
                 f"{np.degrees(self.settings.correction_limit):g} deg"
             )
-        return correction
+        weight = guard_weight(
+            model.table.workspace, correction.prediction.configuration, self.settings.safety
+        )
+        return as_applied(model, correction, weight * correction.delta)
+
+    def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
+        if self.model is None:
+            return np.zeros(2)
+        wanted = np.zeros(2) if correction is None else correction.delta
+        limits = self.model.table.geometry.limits
+        return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
+
+    def _within_limits(self, load: Load, theta: Array) -> Array:
+        limits = self._loaded_model().table.geometry.limits
+        return within_joint_limits(theta, self._correction(load, theta).delta, limits)

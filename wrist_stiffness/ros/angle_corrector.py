@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -18,7 +19,7 @@ from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run
-from wrist_stiffness.ros.settings import CORRECTION
+from wrist_stiffness.ros.settings import CORRECTION, correction_settings
 from wrist_stiffness.ros.wrist_node import WristNode
 
 
@@ -39,9 +40,22 @@ class AngleCorrector(WristNode):
         """Return the correction stream."""
         return CorrectionStream(None, settings, self.get_parameter("enabled_on_start").value)
 
+    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
+        """Check parameters and return the settings that they stand for."""
+        return correction_settings(values)
+
     def facts(self) -> dict[str, str]:
         """Return whether commands are corrected."""
-        return {"enabled": str(self.stream.enabled).lower()}
+        return {
+            "enabled": str(self.stream.enabled).lower(),
+            "in contact": str(self.stream.contact.in_contact).lower(),
+        }
+
+    def restriction(self) -> str:
+        """Return what keeps the node from correcting in full."""
+        if self.stream.enabled and self.stream.contact.in_contact:
+            return f"in contact: {self.stream.settings.contact.policy}"
+        return ""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the outputs and load the model."""

@@ -40,7 +40,7 @@ class Health:
         self._faults[type(error).__name__] += 1
         self._last = str(error)
 
-    def report(self, facts: Mapping[str, str], missing: str = "") -> DiagnosticStatus:
+    def report(self, facts: Mapping[str, str], missing: str, restriction: str) -> DiagnosticStatus:
         """Return the state since the last report.
 
         Parameters
@@ -49,11 +49,14 @@ class Health:
             What else to say.
         missing : str
             What the node cannot work without, where that is missing: an error.
+        restriction : str
+            What keeps it from its full work, a warning; empty for nothing.
 
         Returns
         -------
         DiagnosticStatus
-            ERROR where something is missing, WARN where samples were refused, STALE where none
+            ERROR where something is missing, WARN where samples were refused or work is
+            restricted, STALE where none
             came, else OK.
         """
         good = self._good - self._good_before
@@ -63,6 +66,8 @@ class Health:
             level, message = DiagnosticStatus.ERROR, missing
         elif faults:
             level, message = DiagnosticStatus.WARN, f"{faults} refused: {self._last}"
+        elif restriction:
+            level, message = DiagnosticStatus.WARN, restriction
         elif not good:
             level, message = DiagnosticStatus.STALE, "no input"
         else:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from math import radians
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
 from wrist_stiffness.compensation.intake import MotorNames
 from wrist_stiffness.compensation.objective import OBJECTIVES
+from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.ros.parameters import ParameterEntry
@@ -49,18 +51,97 @@ CORRECTION = (
     ParameterEntry("enabled_on_start", False, "correct from the start", fixed=True),
     ParameterEntry("objective", "pointing", "what the motors make right", choices=OBJECTIVES),
     ParameterEntry(
-        "correction_limit_deg", 0.5, "largest correction of a motor [deg]", lower=0.0, upper=5.0
+        "correction_limit_deg",
+        0.5,
+        "where a motor would need more than this there is no correction [deg]",
+        lower=0.0,
+        upper=5.0,
+    ),
+    ParameterEntry(
+        "slew_deg_s", 0.5, "fastest change of a correction [deg/s]", lower=0.001, upper=1000.0
+    ),
+    ParameterEntry(
+        "deadband_steps",
+        0.15,
+        "half width of the correction's hysteresis [encoder steps]",
+        lower=0.0,
+        upper=10.0,
+    ),
+    ParameterEntry(
+        "domain_fade_deg",
+        2.0,
+        "the correction fades within this distance from the border of the domain [deg]",
+        lower=0.001,
+        upper=45.0,
+    ),
+    ParameterEntry(
+        "singularity_fade",
+        0.05,
+        "the correction fades within this distance of |D| from its limit [-]",
+        lower=0.001,
+        upper=0.5,
+    ),
+    ParameterEntry(
+        "contact_policy",
+        "freeze_in_contact",
+        "what is corrected for in contact: the payload alone, a part of the contact force, or the "
+        "slow part of that",
+        choices=POLICIES,
+    ),
+    ParameterEntry(
+        "contact_force_N",
+        0.2,
+        "a force that departs by more from that at enabling is a contact [N]",
+        lower=0.0,
+        upper=1000.0,
+    ),
+    ParameterEntry(
+        "contact_gain", 0.1, "part of the contact force corrected for [-]", lower=0.0, upper=1.0
+    ),
+    ParameterEntry(
+        "contact_lowpass_s",
+        2.0,
+        "time constant of the policy load_lowpass [s]",
+        lower=0.001,
+        upper=1000.0,
     ),
 )
 
 
 def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
-    """Return the settings of the sample path.
+    """Return the settings of the sample path of a node that does not correct.
 
     Parameters
     ----------
     values : mapping
-        Parameters by name; those of `CORRECTION` may be absent.
+        Parameters of `COMMON` by name.
+
+    Returns
+    -------
+    StreamSettings
+        In SI units, its corrections' part at the defaults.
+
+    Raises
+    ------
+    InputError
+        If both motors have the same name or the frames cannot be read.
+    """
+    if values["motor_1_joint"] == values["motor_2_joint"]:
+        raise InputError(f"motor_1_joint, motor_2_joint: both are {values['motor_1_joint']!r}")
+    return StreamSettings(
+        motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
+        frames=frames_from_yaml(values["frames"]),
+        load_age_limit_s=values["load_age_limit_s"],
+    )
+
+
+def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
+    """Return the settings of the sample path of a node that corrects.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters of `COMMON` and `CORRECTION` by name.
 
     Returns
     -------
@@ -70,21 +151,29 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     Raises
     ------
     InputError
-        If a text is not among its choices or the frames cannot be read.
+        As `stream_settings`, and if a text is not among its choices.
     """
-    default = StreamSettings()
-    objective = values.get("objective", default.objective)
-    if objective not in OBJECTIVES:
-        raise InputError(f"objective: {objective!r} is not one of {', '.join(OBJECTIVES)}")
-    if values["motor_1_joint"] == values["motor_2_joint"]:
-        raise InputError(f"motor_1_joint, motor_2_joint: both are {values['motor_1_joint']!r}")
-    limit_deg = values.get("correction_limit_deg", np.degrees(default.correction_limit))
-    return StreamSettings(
-        motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
-        frames=frames_from_yaml(values["frames"]),
-        load_age_limit_s=values["load_age_limit_s"],
-        objective=objective,
-        correction_limit=float(np.radians(limit_deg)),
+    for entry in CORRECTION:
+        if entry.choices and values[entry.name] not in entry.choices:
+            raise InputError(
+                f"{entry.name}: {values[entry.name]!r} is not one of {', '.join(entry.choices)}"
+            )
+    return replace(
+        stream_settings(values),
+        objective=values["objective"],
+        correction_limit=radians(values["correction_limit_deg"]),
+        safety=SafetySettings(
+            slew=radians(values["slew_deg_s"]),
+            deadband_steps=values["deadband_steps"],
+            domain_fade=radians(values["domain_fade_deg"]),
+            singularity_fade=values["singularity_fade"],
+        ),
+        contact=ContactSettings(
+            policy=values["contact_policy"],
+            force=values["contact_force_N"],
+            gain=values["contact_gain"],
+            lowpass_s=values["contact_lowpass_s"],
+        ),
     )
 
 

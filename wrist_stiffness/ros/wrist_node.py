@@ -85,6 +85,10 @@ class WristNode(LifecycleNode):
         """Return what the node adds to its diagnostics."""
         return {}
 
+    def restriction(self) -> str:
+        """Return what keeps the node from its full work although all is well; a warning."""
+        return ""
+
     def autostart(self) -> None:
         """Configure and activate, unless the parameter `autostart` says no."""
         if self.get_parameter("autostart").value:
@@ -162,7 +166,7 @@ class WristNode(LifecycleNode):
 
     def _on_tare(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            load = self.stream.loads.tare()
+            load = self.stream.tare()
         except WristError as error:
             self.warn(error)
             response.success, response.message = False, str(error)
@@ -212,7 +216,9 @@ class WristNode(LifecycleNode):
             "loads that came late": str(self.stream.loads.history.late),
             **self.facts(),
         }
-        message = DiagnosticArray(status=[self.health.report(facts, self._model_fault)])
+        message = DiagnosticArray(
+            status=[self.health.report(facts, self._model_fault, self.restriction())]
+        )
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 

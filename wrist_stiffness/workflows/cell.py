@@ -17,6 +17,7 @@ from wrist_stiffness.workflows.node_list import (
     SIMULATOR_NODE,
     WRIST_NODES,
     NodeEntry,
+    ParameterValue,
 )
 
 LOOK_EVERY_S = 0.1
@@ -26,6 +27,11 @@ PATIENCE_S = 60.0
 
 END_PATIENCE_S = 15.0
 """How long a node may take to end once it is told to."""
+
+CELL_PARAMETERS: dict[str, dict[str, ParameterValue]] = {
+    "angle_corrector": {"contact_policy": "gain", "contact_gain": 1.0}
+}
+"""The virtual cell's loads are weights: they do not depend on the motion, so there is no loop."""
 
 DOMAINS = 90
 """ROS domains 1 to 90; those above 101 clash with ports that Linux hands out."""
@@ -71,16 +77,16 @@ def run_cell(
         raise InputError("cell: ROS 2 (rclpy) is not installed; pip install 'wrist_stiffness[ros]'")
     if seconds is not None and not seconds > 0.0:
         raise InputError(f"seconds: {seconds:g} is not positive")
-    chosen = {}
+    chosen: dict[str, ParameterValue] = {}
     if model is not None:
         load_model(model)
         chosen["model_file"] = str(Path(model).resolve())
-    nodes = [node.having(chosen) for node in WRIST_NODES]
+    nodes = [node.having({**chosen, **CELL_PARAMETERS.get(node.name, {})}) for node in WRIST_NODES]
     if record is not None:
         heard = "/pose_error_predicted /motor_commands_corrected"
         output = {"output": str(Path(record).resolve()), "begin_with": heard}
         nodes.append(RECORDER_NODE.having(output))
-    moves: dict[str, float | int | bool] = {"rate_hz": float(rate_hz), "seed": seed}
+    moves: dict[str, ParameterValue] = {"rate_hz": float(rate_hz), "seed": seed}
     # The predictor listens to the joint states, and so does the recorder.
     moves["listeners"] = 1 if record is None else 2
     if seconds is not None:

@@ -1,0 +1,129 @@
+"""How a correction may reach the motors: fading guards, hysteresis, slew and joint limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Limits
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.workspace import Workspace
+
+LONGEST_STEP_S = 0.1
+"""A pause between commands counts as this much for the slew limit."""
+
+
+@dataclass(frozen=True)
+class SafetySettings:
+    """How the correction may change and where it fades.
+
+    Parameters
+    ----------
+    slew : float
+        Largest change of a motor's correction [rad/s].
+    deadband_steps : float
+        Half width of the hysteresis [encoder steps]; at 0.15 the error that it leaves adds at most
+        13 % to the RMS of the rounding to whole steps.
+    domain_fade : float
+        Within this distance from the border of the table's domain the correction fades [rad].
+    singularity_fade : float
+        The same for |D| above its limit [-].
+    """
+
+    slew: float = float(np.radians(0.5))
+    deadband_steps: float = 0.15
+    domain_fade: float = float(np.radians(2.0))
+    singularity_fade: float = 0.05
+
+
+def guard_weight(
+    workspace: Workspace, configuration: Configuration, settings: SafetySettings
+) -> float:
+    """Return how much of the correction is applied at a pose.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        The table's domain.
+    configuration : Configuration
+        One pose inside it.
+    settings : SafetySettings
+        Widths of the fades.
+
+    Returns
+    -------
+    float
+        1 well inside, 0 at the border, with a continuous slope in between.
+    """
+    lower, upper = workspace.rectangle
+    theta = configuration.theta
+    to_border = np.minimum(theta - lower, upper - theta).min() / settings.domain_fade
+    determinant = abs(float(configuration.singularity))
+    to_singular = (determinant - workspace.limits.singularity) / settings.singularity_fade
+    x = min(max(min(to_border, to_singular), 0.0), 1.0)
+    return float(x * x * (3.0 - 2.0 * x))
+
+
+def within_joint_limits(theta: Array, delta: Array, limits: Limits) -> Array:
+    """Return the corrected angles (2,), never driven past a joint limit by the correction.
+
+    A command that is beyond a limit already is not made worse; refusing it is not our affair.
+    """
+    lowest = np.minimum(limits.joint_lower, theta)
+    highest = np.maximum(limits.joint_upper, theta)
+    return np.clip(theta + delta, lowest, highest)
+
+
+class AppliedCorrection:
+    """What is really added to the commands, and how it moves towards what is wanted.
+
+    It begins at zero, so that enabling is a ramp, and ends there at the slew limit.
+    """
+
+    def __init__(self) -> None:
+        self._held = np.zeros(2)
+        self._applied = np.zeros(2)
+        self._stamp_ns: int | None = None
+
+    def reset(self) -> None:
+        """Begin at zero again."""
+        self._held, self._applied = np.zeros(2), np.zeros(2)
+
+    def advance(
+        self, stamp_ns: int, theta: Array, wanted: Array, limits: Limits, settings: SafetySettings
+    ) -> Array:
+        """Return the correction for the command of a stamp.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Of the command; one that is not later than the one before changes nothing [ns].
+        theta : (2,) float
+            Commanded angles [rad].
+        wanted : (2,) float
+            Correction that would meet the objective; zero where there shall be none [rad].
+        limits : Limits
+            Joint limits and encoder step.
+        settings : SafetySettings
+            Slew and hysteresis.
+
+        Returns
+        -------
+        (2,) float
+            To be added to the command [rad].
+        """
+        play = settings.deadband_steps * limits.encoder_step if np.any(wanted) else 0.0
+        self._held = np.clip(self._held, wanted - play, wanted + play)
+        reach = settings.slew * self._seconds_since_last(stamp_ns)
+        self._applied = self._applied + np.clip(self._held - self._applied, -reach, reach)
+        self._applied = within_joint_limits(theta, self._applied, limits) - theta
+        return self._applied
+
+    def _seconds_since_last(self, stamp_ns: int) -> float:
+        last_ns, self._stamp_ns = self._stamp_ns, stamp_ns
+        if last_ns is None:
+            return 0.0
+        return min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)
