@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from wrist_stiffness.cli.main import OneLineParser
+from wrist_stiffness.cli.parser import OneLineParser
 
 DESCRIPTION = """\
 Start pose_error_predictor, angle_corrector and a virtual wrist as ROS 2 nodes on this machine.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from wrist_stiffness.cli.main import EXIT_BAD_INPUT, PROG
+from wrist_stiffness.cli.parser import EXIT_BAD_INPUT, PROG
 from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import WristError
 

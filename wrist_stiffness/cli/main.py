@@ -4,19 +4,18 @@ import argparse
 import os
 import sys
 from collections.abc import Iterable, Sequence
-from typing import NoReturn, Protocol
+from typing import Protocol
 
 from wrist_stiffness import __version__
-from wrist_stiffness.cli import cell, predict, replay, table
+from wrist_stiffness.cli import cell, predict, replay, simulate, table
+from wrist_stiffness.cli.parser import (
+    EXIT_BAD_INPUT,
+    EXIT_INTERRUPTED,
+    EXIT_PIPE_CLOSED,
+    PROG,
+    OneLineParser,
+)
 from wrist_stiffness.errors import WristError
-
-PROG = "wrist-stiffness"
-
-EXIT_DONE = 0
-EXIT_NO = 1
-EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
-EXIT_PIPE_CLOSED = 141
 
 DESCRIPTION = """\
 Predict, correct and explain the pose error of a flexible two-degree-of-freedom wrist."""
@@ -44,15 +43,7 @@ class CommandModule(Protocol):
         """Add this command's parser."""
 
 
-COMMANDS: tuple[CommandModule, ...] = (table, predict, replay, cell)
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line, without the usage text before it."""
-
-    def error(self, message: str) -> NoReturn:
-        """Exit with code 2 and one line on stderr."""
-        self.exit(EXIT_BAD_INPUT, f"{PROG}: error: {message} (see '{self.prog} --help')\n")
+COMMANDS: tuple[CommandModule, ...] = (table, predict, simulate, replay, cell)
 
 
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:

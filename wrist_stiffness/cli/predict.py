@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from wrist_stiffness.cli.main import OneLineParser
+from wrist_stiffness.cli.parser import OneLineParser
 
 DESCRIPTION = """\
 Predict how far the platform is off at given motor angles under a given load, own weight included:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from wrist_stiffness.cli.main import OneLineParser
+from wrist_stiffness.cli.parser import OneLineParser
 
 DESCRIPTION = """\
 Run the very code of the nodes over a recording and write it again with predicted pose errors and

@@ -5,7 +5,7 @@ import json
 import os
 from pathlib import Path
 
-from wrist_stiffness.cli.main import EXIT_DONE, OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.progress import Progress
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from wrist_stiffness.cli.main import OneLineParser
+from wrist_stiffness.cli.parser import OneLineParser
 
 BUILD = """\
 Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
