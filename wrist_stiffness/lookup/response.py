@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.contact import solve_contact
+from wrist_stiffness.mechanism.contact import solve_contact, solve_contacts
 from wrist_stiffness.mechanism.statics import ContactOperators
 
 
@@ -55,7 +55,7 @@ def respond(
     opening : (..., m) float, optional
         Opening of the gaps by the same screws [m].
     active : (m,) bool, optional
-        First guess of the sectors in contact.
+        First guess of the sectors in contact, for a single pose.
 
     Returns
     -------
@@ -68,12 +68,11 @@ def respond(
     gap = operators.gap + np.einsum("...im,...i->...m", operators.force_twist, wrench)
     if opening is not None:
         gap = gap + opening
-    force = np.zeros_like(gap)
-    closed = np.zeros(gap.shape, dtype=bool)
-    guess = active
-    for pose in np.ndindex(gap.shape[:-1]):
-        force[pose], closed[pose] = solve_contact(operators.approach[pose], gap[pose], guess)
-        # Neighbouring poses share most of their contact state.
-        guess = closed[pose]
+    if gap.ndim == 1:
+        force, closed = solve_contact(operators.approach, gap, active)
+    else:
+        m = gap.shape[-1]
+        force, closed = solve_contacts(operators.approach.reshape(-1, m, m), gap.reshape(-1, m))
+        force, closed = force.reshape(gap.shape), closed.reshape(gap.shape)
     moved = free + np.einsum("...im,...m->...i", operators.force_twist, force)
     return Response(moved, force, closed)
