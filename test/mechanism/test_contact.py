@@ -168,5 +168,5 @@ def test_bad_poses_among_many_are_refused():
     bad[1] = np.nan
     with pytest.raises(InputError, match="not finite"):
         solve_contacts(np.array([approach, approach]), np.array([gap, bad]))
-    with pytest.raises(InputError, match="singular"):
+    with pytest.raises(InputError, match="positive definite"):
         solve_contacts(np.zeros((1, 4, 4)), -np.ones((1, 4)))

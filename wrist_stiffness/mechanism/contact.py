@@ -63,7 +63,10 @@ def solve_contact(
     if not np.any(closed) and np.all(gap >= 0.0):
         return force, closed
     length_scale = float(np.max(np.abs(gap)))
-    force_scale = length_scale / float(np.max(np.diagonal(approach)))
+    softest = float(np.max(np.diagonal(approach)))
+    if softest <= 0.0:
+        raise InputError("contact: the flexibility of the flanges is not positive definite")
+    force_scale = length_scale / softest
     fewest, patience = m + 1, PATIENCE
     for _ in range(MAX_PIVOTS):
         force[:] = 0.0
