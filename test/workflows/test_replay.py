@@ -168,14 +168,25 @@ def test_a_bad_sample_is_counted_and_the_rest_goes_on(tmp_path, name):
     ],
     ids=["range", "inf", "frame"],
 )
-def test_a_bad_load_gives_no_prediction(tmp_path, message, text):
+def test_nothing_is_written_where_no_sample_can_be_used(tmp_path, message, text):
     timeline = [
         (0, "/load_estimate", message),
         (1, "/joint_states", joints(MILLISECOND, (1.0, 2.0))),
     ]
+    with pytest.raises(RecordingError, match=f"none of 1 joint states .*{text}"):
+        replay(write(tmp_path / "in", timeline), MODEL, tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
+def test_reasons_that_differ_in_numbers_are_one_and_names_keep_theirs(tmp_path):
+    timeline = [(0, "/load_estimate", load(0, (0.0, 0.0, -1.0)))]
+    timeline += [(0, "/joint_states", joints(0, (1.0, 2.0)))]
+    timeline += [(i, "/joint_states", joints(i * MILLISECOND, (80.0 + i, 0.0))) for i in range(5)]
+    for name in MOTORS:
+        timeline += [(9, "/joint_states", joints(9 * MILLISECOND, (1.0, 2.0), (name, "x")))]
     summary = replay(write(tmp_path / "in", timeline), MODEL, tmp_path / "out")
-    assert summary.predictions == 0
-    assert any(text in reason for reason in summary.refused)
+    assert sorted(summary.refused.values()) == [1, 1, 5]
+    assert any("(80.000, 0.000) deg outside" in reason for reason in summary.refused)
 
 
 def test_truncated_recording_gives_what_is_there(tmp_path):
@@ -204,6 +215,9 @@ def test_recordings_that_cannot_be_used(tmp_path, capsys):
     only_loads = write(tmp_path / "loads", [(0, "/load_estimate", load(0, (0.0, 0.0, -1.0)))])
     with pytest.raises(RecordingError, match="no topic /joint_states"):
         replay(only_loads, MODEL, tmp_path / "out")
+    whole = write(tmp_path / "whole", TIMELINE)
+    with pytest.raises(RecordingError, match="no topic /cmd .*--topic /motor_commands:=ACTUAL"):
+        replay(whole, MODEL, tmp_path / "out", topics={"/motor_commands": "/cmd"})
     assert not (tmp_path / "out").exists()
     assert main(["replay", str(tmp_path / "none"), "-o", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err

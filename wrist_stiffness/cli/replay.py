@@ -83,7 +83,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if summary.replaced:
         print(f"{summary.replaced} outputs of an earlier run in the input left out")
     for reason, count in summary.refused.most_common():
-        print(f"  {count} x {reason}")
+        print(f"{count} refused, the first: {reason}")
     print(f"written: {arguments.output}")
     if arguments.json:
         write_json(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -49,6 +50,9 @@ LOOKAHEAD_NS = 1_000_000_000
 
 PROGRESS_EVERY = 500
 
+NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
+"""A value in a message; not the digits of a name such as motor_1_joint."""
+
 Progress = Callable[[int, int], None]
 
 
@@ -63,7 +67,8 @@ class ReplaySummary:
     commands, corrections : int
         Commands read, commands that were changed.
     refused : Counter
-        Samples without a result, by reason.
+        Samples without a result. Reasons that differ only in their numbers are one, told by the
+        first of them.
     replaced : int
         Outputs of an earlier run in the input, left out.
     shift_norm_um, phi_mdeg : list of float
@@ -81,6 +86,12 @@ class ReplaySummary:
     shift_norm_um: list[float] = field(default_factory=list)
     phi_mdeg: list[float] = field(default_factory=list)
     damage: str = ""
+    _first_of_kind: dict[str, str] = field(default_factory=dict, repr=False)
+
+    def refuse(self, topic: str, reason: object) -> None:
+        """Count a message of a topic that gave no result."""
+        text = f"{topic}: {reason}"
+        self.refused[self._first_of_kind.setdefault(NUMBER.sub("#", text), text)] += 1
 
 
 def replay(
@@ -119,7 +130,8 @@ def replay(
     Raises
     ------
     WristError
-        If the model or the recording cannot be used at all.
+        If the model or the recording cannot be used, or no joint state at all can be predicted;
+        then nothing is written.
     """
     settings = settings or StreamSettings()
     error_model = load_model(model)
@@ -152,7 +164,13 @@ def replay(
                 for name, message in answer(state, predicting, correcting, summary):
                     writer.write(name, message, raw.log_time_ns)
             except WristError as error:
-                summary.refused[f"{topic}: {error}"] += 1
+                summary.refuse(topic, error)
+        if not summary.predictions:
+            reason = next(iter(summary.refused), "there is none")
+            raise RecordingError(
+                f"{source.path}: none of {summary.joint_states} joint states could be predicted; "
+                f"the first reason: {reason}"
+            )
     progress(total, total)
     summary.damage = source.damage
     return summary
@@ -160,9 +178,15 @@ def replay(
 
 def _require_topics(source: Recording, names: Mapping[str, str]) -> None:
     present = {topic.name: topic for topic in source.topics}
-    for standard, wanted in ((JOINT_STATES, JointState), (LOAD_ESTIMATE, WrenchStamped)):
+    for standard, wanted in (
+        (JOINT_STATES, JointState),
+        (LOAD_ESTIMATE, WrenchStamped),
+        (MOTOR_COMMANDS, JointState),
+    ):
         topic = present.get(names[standard])
         if topic is None:
+            if names[standard] == MOTOR_COMMANDS:
+                continue
             found = ", ".join(present) or "none"
             raise RecordingError(
                 f"{source.path}: no topic {names[standard]} (it has {found}); "
@@ -195,7 +219,7 @@ class _LoadsAhead:
             topic, _, message = self._next
             self._next = next(self._messages, None)
             if not isinstance(message, WrenchStamped):
-                self._summary.refused[f"{topic}: {message.ros_type} is no WrenchStamped"] += 1
+                self._summary.refuse(topic, f"{message.ros_type} is no WrenchStamped")
                 continue
             force, torque = message.wrench.force, message.wrench.torque
             try:
@@ -207,7 +231,7 @@ class _LoadsAhead:
                         (torque.x, torque.y, torque.z),
                     )
             except WristError as error:
-                self._summary.refused[f"{topic}: {error}"] += 1
+                self._summary.refuse(topic, error)
 
 
 def _predict(
@@ -231,7 +255,7 @@ def _correct(
         state.header.stamp_ns, state.header.frame_id, state.name, state.position
     )
     if corrected.fault is not None:
-        summary.refused[f"{MOTOR_COMMANDS}: {corrected.fault}"] += 1
+        summary.refuse(MOTOR_COMMANDS, corrected.fault)
     summary.corrections += corrected.correction is not None
     header = Header(state.header.stamp_ns, CORRECTED_FRAME)
     yield (
