@@ -31,6 +31,10 @@ Three commands to begin with (each uses the shipped wrist where none is named):
 Exit codes: 0 done, 1 the answer is no, 2 wrong use or bad input."""
 
 
+EXTRA_OF = {"netgen": "fem", "skfem": "fem", "pymetis": "fem", "matplotlib": "plot"}
+"""The extra that installs a library which a robot does without."""
+
+
 class CommandModule(Protocol):
     """What a module of this folder offers to become a command.
 
@@ -98,6 +102,13 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
         sys.stdout.flush()
     except WristError as error:
         print(f"{PROG}: error: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except ModuleNotFoundError as error:
+        library = str(error.name).partition(".")[0]
+        if library not in EXTRA_OF:
+            raise
+        advice = f"pip install 'wrist_stiffness[{EXTRA_OF[library]}]'"
+        print(f"{PROG}: error: {library} is not installed; {advice}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED

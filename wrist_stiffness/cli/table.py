@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.parser import OneLineParser
 
+if TYPE_CHECKING:
+    from wrist_stiffness.lookup.table import Table
+
 BUILD = """\
 Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
-joint space. The grid is refined until poses that it never saw agree to the tolerance."""
+joint space. The grid is refined until poses that it never saw agree to the tolerance. Takes one to
+three minutes."""
+
+BUILD_EPILOG = """\
+example, a wrist of one's own:
+  wrist-stiffness table build my_wrist.yaml -o my_wrist.npz"""
 
 CHECK = """\
 Verify a table: complete and undamaged, compliance positive definite, splines as good as stated.
 With --rebuild the whole sweep runs again from the geometry in the table and all numbers are
 compared. The exit code is 1 if a check fails."""
+
+CHECK_EPILOG = """\
+example, is this still the table of that geometry?
+  wrist-stiffness table check my_wrist.npz --geometry my_wrist.yaml"""
 
 SHOW = """\
 Say what a table holds and draw what a load does: maps of the platform's displacement and
@@ -31,7 +44,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser = commands.add_parser("table", help="build, check or show a lookup table")
     actions = parser.add_subparsers(metavar="ACTION", required=True)
 
-    build = actions.add_parser("build", help="run the finite-element sweep", description=BUILD)
+    build = _add(actions, "build", "run the finite-element sweep", BUILD, BUILD_EPILOG)
     build.add_argument("geometry", nargs="?", help="geometry file (default: the shipped wrist's)")
     build.add_argument("-o", "--output", required=True, metavar="TABLE", help="ends in .npz")
     build.add_argument(
@@ -44,25 +57,29 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     build.add_argument(
         "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
     )
-    build.add_argument("--interface", choices=("rigid", "distributing"), default="rigid")
-    build.add_argument("--evaluation", choices=("closed_form", "spline"), default="closed_form")
+    build.add_argument(
+        "--interface",
+        choices=("rigid", "distributing"),
+        default="rigid",
+        help="how a pin or hub holds a wall: every point, or in the mean (default: rigid)",
+    )
+    build.add_argument(
+        "--evaluation",
+        choices=("closed_form", "spline"),
+        default="closed_form",
+        help="what the nodes use (default: closed_form)",
+    )
     _add_json(build)
     build.set_defaults(run=_build)
 
-    check = actions.add_parser("check", help="verify a table", description=CHECK)
+    check = _add(actions, "check", "verify a table", CHECK, CHECK_EPILOG)
     check.add_argument("table", nargs="?", help="table file (default: the shipped one)")
     check.add_argument("--geometry", metavar="FILE", help="must be the geometry of the table")
     check.add_argument("--rebuild", action="store_true", help="compute it again and compare")
     _add_json(check)
     check.set_defaults(run=_check)
 
-    show = actions.add_parser(
-        "show",
-        help="draw its maps and error budget",
-        description=SHOW,
-        epilog=SHOW_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    show = _add(actions, "show", "draw its maps and error budget", SHOW, SHOW_EPILOG)
     show.add_argument("table", nargs="?", help="table file (default: the shipped one)")
     show.add_argument(
         "-o", "--output", default=".", metavar="FOLDER", help="for the PNG files (default: here)"
@@ -84,6 +101,22 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     _add_json(show)
     show.set_defaults(run=_show)
+
+
+def _add(
+    actions: argparse._SubParsersAction[OneLineParser],
+    name: str,
+    what: str,
+    description: str,
+    epilog: str,
+) -> OneLineParser:
+    return actions.add_parser(
+        name,
+        help=what,
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
 
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
@@ -166,10 +199,8 @@ def _show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _print_facts(shown: object) -> None:
-    from wrist_stiffness.lookup.table import Table
+def _print_facts(shown: Table) -> None:
     from wrist_stiffness.workflows import table
 
-    assert isinstance(shown, Table)
     for name, text in table.facts(shown):
         print(f"{name + ':':26} {text}")

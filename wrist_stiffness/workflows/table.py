@@ -25,6 +25,8 @@ FINE = 161
 
 PICTURED_POSE = np.radians([25.0, -20.0])
 
+MIN_PER_AXIS = 2
+
 MICRO = 1e6
 CENTIDEGREES = 100.0 * 180.0 / np.pi
 
@@ -77,6 +79,10 @@ def build(
         raise InputError(f"{output}: a table's name ends in .npz")
     if not output.parent.is_dir():
         raise InputError(f"{output.parent}: no such folder")
+    if not tolerance > 0.0:
+        raise InputError(f"tolerance {tolerance:g} is not above 0")
+    if per_axis is not None and per_axis < MIN_PER_AXIS:
+        raise InputError(f"a grid of {per_axis} x {per_axis} carries no spline, at least 2 x 2")
     load_geometry(geometry)
     try:
         values = yaml.safe_load(Path(geometry).read_text(encoding="utf-8"))
