@@ -1,0 +1,141 @@
+"""Solving the whole-wrist model at a pose: load, own weight, misfit, heat, flange contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import nnls
+
+from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
+from wrist_stiffness.fem.wrist_model import SCREWS, PlacedBody, WristAtPose
+from wrist_stiffness.mechanism.components import Array
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What acts on the wrist besides the platform's load.
+
+    Parameters
+    ----------
+    gravity : (3,) float
+        Acceleration field in F [m/s^2].
+    screws : mapping of str to (6,) float
+        Displacement of a component's motor-side wall against its frame, at O in F [m, rad].
+    warming : mapping of str to float
+        Uniform temperature rise of a link together with the pins in its bores [K].
+    """
+
+    gravity: Array = field(default_factory=lambda: np.zeros(3))
+    screws: Mapping[str, Array] = field(default_factory=dict)
+    warming: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PoseSolution:
+    """Solved displacements and contact.
+
+    Parameters
+    ----------
+    twist : (6,) float
+        Of the platform at O in F [m, rad].
+    forces : (m,) float
+        Contact force of each flange sector [N].
+    openings : (m,) float
+        Gap of each sector [m].
+    displacements : list of (3 n,) float
+        Of each part's nodes in F [m].
+    screws : (SCREWS,) float
+        Of the rigid frames, then slide and turn of each passive joint.
+    """
+
+    twist: Array
+    forces: Array
+    openings: Array
+    displacements: list[Array]
+    screws: Array
+
+
+def solve_pose(
+    model: WristAtPose, wrench: Array, disturbance: Disturbance | None = None
+) -> PoseSolution:
+    """Solve a pose for a platform load, with one-sided frictionless flange contact.
+
+    Parameters
+    ----------
+    model : WristAtPose
+        The factored pose.
+    wrench : (6,) float
+        On the platform at O in F [N, N m].
+    disturbance : Disturbance, optional
+        What else acts.
+
+    Returns
+    -------
+    PoseSolution
+        Displacements and contact forces.
+    """
+    disturbance = disturbance or Disturbance()
+    imposed = [_imposed(model, part, disturbance) for part in model.placed]
+    load = np.zeros(model.openings.shape[1])
+    load[model.platform_columns] += wrench + _platform_weight(model, disturbance.gravity)
+    for part, follow, displacement in zip(model.placed, model.follow, imposed, strict=True):
+        nodal = _nodal_loads(part, disturbance) - part.stiffness @ displacement
+        load += follow.T @ nodal
+    free = model.factor.solve(load)
+    forces = _contact_forces(model, model.gaps + model.openings @ free)
+    unknowns = free + model.by_force @ forces if np.any(forces) else free
+    return PoseSolution(
+        twist=unknowns[model.platform_columns],
+        forces=forces,
+        openings=model.gaps + model.openings @ unknowns,
+        displacements=[
+            t @ unknowns + displacement
+            for t, displacement in zip(model.follow, imposed, strict=True)
+        ],
+        screws=unknowns[-SCREWS:],
+    )
+
+
+def _contact_forces(model: WristAtPose, gaps: Array) -> Array:
+    """Complementarity as non-negative least squares: min f'A f / 2 + gap'f over f >= 0."""
+    if np.all(gaps >= 0.0):
+        return np.zeros(len(gaps))
+    root = np.linalg.cholesky(model.openings @ model.by_force)
+    return np.asarray(nnls(root.T, -np.linalg.solve(root, gaps))[0])
+
+
+def _imposed(model: WristAtPose, part: PlacedBody, disturbance: Disturbance) -> Array:
+    """Return the displacements of walls that do not come from the unknowns (3 n,)."""
+    displacement = np.zeros(part.stiffness.shape[0])
+    if part.name in disturbance.screws:
+        motion = rigid_motion(part.nodes)[part.motor_wall]
+        displacement[part.motor_wall] += motion @ disturbance.screws[part.name]
+    if part.name in disturbance.warming:
+        link = model.wrist.geometry.links[part.name]
+        strain = link.material.expansion * disturbance.warming[part.name]
+        rotation = model.configuration.rotations[part.name]
+        ends = model.wrist.geometry.link_ends(part.name)
+        for wall, end in zip((part.motor_wall, part.platform_wall), ends, strict=True):
+            # A pin grows about the point where its axis crosses the bar's centre line.
+            centre = link.arc_radius * rotation @ end
+            on_wall = part.nodes.ravel()[wall].reshape(-1, 3)
+            displacement[wall] += (strain * (on_wall - centre)).ravel()
+    return displacement
+
+
+def _nodal_loads(part: PlacedBody, disturbance: Disturbance) -> Array:
+    in_part = part.turn[:3, :3].T @ disturbance.gravity
+    load = part.body.weight @ in_part
+    if part.name in disturbance.warming:
+        rise = disturbance.warming[part.name]
+        load = load + rise * thermal_load(part.body.mesh, part.body.solid.material)
+    return np.asarray(part.turn @ load)
+
+
+def _platform_weight(model: WristAtPose, gravity: Array) -> Array:
+    platform = model.wrist.geometry.platform
+    place = model.configuration.rotations["platform"] @ platform.centre_of_gravity
+    force = platform.mass * gravity
+    return np.concatenate([force, np.cross(place, force)])
