@@ -104,7 +104,8 @@ def test_poses_are_approached_from_all_sides(ran):
     cell, *_ = ran(1.0, program_seconds=200.0)
     angles = cell.program.angles.values
     moves = np.diff(angles, axis=0)
-    signs = {tuple(np.sign(move)) for move in moves if np.any(move != 0.0)}
+    small = np.abs(moves).max(axis=1) < np.radians(5.0)
+    signs = {tuple(np.sign(move)) for move in moves[small] if np.any(move != 0.0)}
     assert {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)} <= signs
 
 

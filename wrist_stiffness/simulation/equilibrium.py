@@ -57,8 +57,8 @@ class Equilibrium:
         Of the platform at O in F [m, rad].
     through : (n, 8, 6) float
         Wrench through each component at O in F [N, N m].
-    slides : (n, 3) float
-        Of joint_2 to joint_4 [m].
+    slips : (n, 3, 2) float
+        Slide [m] and small turn [rad] of joint_2 to joint_4 besides the rigid motion.
     force : (n, m) float
         Of each flange sector [N].
     closed : (n, m) bool
@@ -67,7 +67,7 @@ class Equilibrium:
 
     twist: Array
     through: Array
-    slides: Array
+    slips: Array
     force: Array
     closed: NDArray[np.bool_]
 
@@ -167,8 +167,10 @@ class Pose:
         ]
         belongs = np.eye(elastic.shape[1])[self._own]
         own = np.einsum("nmi,nm,mk->nki", self._sector_screw, force, belongs)
-        slides = np.einsum("nkji,nki->nj", self.rows, (total + elastic + own)[..., :3])
-        return Equilibrium(twist, through, slides, force, closed)
+        whole = total + elastic + own
+        halves = whole.reshape(*whole.shape[:2], 2, 3)
+        slips = np.einsum("nkji,nkhi->njh", self.rows, halves)
+        return Equilibrium(twist, through, slips, force, closed)
 
     def _contact(
         self, gap: Array, free: Array, bends: Sequence[tuple[int, Bend]]

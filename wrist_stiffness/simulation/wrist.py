@@ -16,8 +16,11 @@ from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
 from wrist_stiffness.simulation.heat import HeatNetwork
 from wrist_stiffness.simulation.laws.law import Law, no_screws
 
-SWEEPS = 4
+MAX_SWEEPS = 60
 """Passes in which histories (creep, friction) and equilibrium find each other."""
+
+SWEEP_TOLERANCE = 1e-13
+"""Largest change of the platform's twist in the last pass [m, rad]."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +84,29 @@ class TrueWrist:
             Of the block.
         """
         angles = shaft + sum((law.turn(time_s, shaft) for law in self._laws), np.zeros_like(shaft))
+        return self.at(time_s, angles, load, self._heat.run(time_s, angles, room))
+
+    def at(self, time_s: Array, angles: Array, load: Array, kelvin: Array) -> TrueState:
+        """Advance through a block whose true angles and temperatures are known.
+
+        Parameters
+        ----------
+        time_s : (n,) float
+            Increasing times [s].
+        angles : (n, 2) float
+            True angles of the driven links [rad].
+        load : (n, 6) float
+            Wrench on the platform at O in F [N, N m].
+        kelvin : (n, 7) float
+            Temperatures of `heat.HEATED` above the reference [K].
+
+        Returns
+        -------
+        TrueState
+            Of the block.
+        """
         configuration = self._mechanism.forward(angles)
         pose = Pose(configuration, self.parts, self.gravity)
-        kelvin = self._heat.run(time_s, angles, room)
         block = Block(time_s, configuration, load, pose.flexibility, kelvin)
         state = self._equilibrium(block, pose)
         twist = state.twist + sum((law.twist(block, state) for law in self._laws), np.zeros(6))
@@ -98,21 +121,42 @@ class TrueWrist:
             for law in self._laws
             if law.bends is not None
         ]
-        flowing = [law for law in self._laws if law.flows is not None]
-        rubbing = [law for law in self._laws if law.rubs is not None]
         state = pose.solve(load, screws, bends)
-        if not flowing and not rubbing:
+        rubbing = [law for law in self._laws if law.rubs is not None]
+        if not rubbing and all(law.flows is None for law in self._laws):
             return state
         acting = np.zeros((len(rubbing), len(block.time_s), 2))
-        for sweep in range(SWEEPS):
-            last = sweep == SWEEPS - 1
-            moved = screws.copy()
-            for law in flowing:
-                k = ELASTIC.index(law.flows or "")
-                moved[:, k] += law.flow(block, state.through[:, k], last)
-            friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
-            for i, law in enumerate(rubbing):
-                acting[i] = law.rub(block, pose, state, acting[i], last)
-                friction[:, PASSIVE_JOINTS.index(law.rubs or "")] += acting[i]
+        for _ in range(MAX_SWEEPS):
+            before = state
+            moved, friction = self._histories(block, pose, state, screws, acting, False)
             state = pose.solve(load, moved, bends, pose.friction_wrench(friction))
+            if np.max(np.abs(state.twist - before.twist)) <= SWEEP_TOLERANCE:
+                break
+        self._histories(block, pose, state, screws, acting, True)
         return state
+
+    def _histories(
+        self,
+        block: Block,
+        pose: Pose,
+        state: Equilibrium,
+        screws: Array,
+        acting: Array,
+        remember: bool,
+    ) -> tuple[Array, Array]:
+        """Return screws (n, 8, 6) and friction (n, 3, 2) after the history that led to `state`.
+
+        `acting` (laws, n, 2) is the friction under which the state was found; it is replaced.
+        """
+        moved = screws.copy()
+        friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
+        rubs = 0
+        for law in self._laws:
+            if law.flows is not None:
+                k = ELASTIC.index(law.flows)
+                moved[:, k] += law.flow(block, state.through[:, k], remember)
+            if law.rubs is not None:
+                acting[rubs] = law.rub(block, pose, state, acting[rubs], remember)
+                friction[:, PASSIVE_JOINTS.index(law.rubs)] += acting[rubs]
+                rubs += 1
+        return moved, friction

@@ -19,6 +19,9 @@ BODIES_JOINED = {
 """Inner and outer body of each passive joint."""
 
 
+SLIP_PASSES = 6
+
+
 class JointFriction(Law):
     """Elasto-plastic friction of a cylindrical joint with one budget for slide and turn.
 
@@ -56,8 +59,8 @@ class JointFriction(Law):
         stribeck: float,
     ) -> None:
         self._joint = joint
-        self._seat, self._mu, self._preload = seat, mu, preload
-        self._stiffness, self._stribeck = stiffness, stribeck
+        self.seat, self._mu, self._preload = seat, mu, preload
+        self.stiffness, self._stribeck = stiffness, stribeck
         self._state: tuple[float, Array, Array] | None = None
 
     @property
@@ -70,53 +73,67 @@ class JointFriction(Law):
     ) -> Array:
         """Return the friction of each sample by an implicit step from the one before."""
         joint = self._joint
-        j, arm = PASSIVE_JOINTS.index(joint), self._seat.radius
+        j, arm = PASSIVE_JOINTS.index(joint), self.seat.radius
         to_slip = np.array([1.0, arm])
-        path = np.stack([state.slides[:, j], self._turn(block)], axis=-1) * to_slip
+        path = state.slips[:, j] * to_slip
+        path[:, 1] += arm * self.turn_of(block)
         give = self._give(pose, j) * to_slip[:, None] * to_slip
         free = path - (give @ (acting / to_slip)[..., None])[..., 0]
-        budget = self._preload + self._mu * self._reaction(block, state)
+        budget = self.budget(self.reaction(block, state.through[:, ELASTIC.index(joint)]))
         if self._state is None:
             before, past, bristle = block.time_s[0], path[0], np.zeros(2)
         else:
             before, past, bristle = self._state
         out = np.empty_like(path)
         for i, now in enumerate(block.time_s):
-            pull = self._stiffness * (bristle + free[i] - past)
-            stuck = -np.linalg.solve(np.eye(2) + self._stiffness * give[i], pull)
-            moved = free[i] + give[i] @ stuck - past
+            pull = bristle + free[i] - past
+            force = _implicit(self.stiffness, give[i], pull)
+            moved = free[i] + give[i] @ force - past
             speed = np.hypot(*moved) / max(now - before, 1e-9)
             most = budget[i] * (1.0 + self._stribeck * np.exp(-speed / self.STRIBECK_SPEED))
-            size = np.hypot(*stuck)
-            out[i] = stuck if size <= most else most / size * stuck
-            bristle = -out[i] / self._stiffness
+            if np.hypot(*force) > most:
+                for _ in range(SLIP_PASSES):
+                    # Dragged along, the bristles lie in the direction of slip, which depends on
+                    # the friction itself; the secant stiffness finds it.
+                    dragged = pull + give[i] @ force
+                    force = _implicit(most / np.hypot(*dragged), give[i], pull)
+                force *= most / np.hypot(*force)
+            out[i] = force
+            bristle = -out[i] / self.stiffness
             before, past = now, free[i] + give[i] @ out[i]
         if remember:
             self._state = float(before), past, bristle
         return out * to_slip
 
-    def _turn(self, block: Block) -> Array:
+    def turn_of(self, block: Block) -> Array:
         """Turn of the joint from home, (n,) [rad]."""
         inner, outer = BODIES_JOINED[self._joint]
         bodies = block.configuration.rotations
         relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
-        axis = self._seat.axis
+        axis = self.seat.axis
         across = np.linalg.svd(axis[None])[2][1]
         turned = relative @ across
         return np.arctan2(turned @ np.cross(axis, across), turned @ across)
 
-    def _reaction(self, block: Block, state: Equilibrium) -> Array:
-        """Sum of the radial forces at both ends of the bushing, (n,) [N]."""
-        joint = self._joint
-        to_origin = self._seat.to_origin(block.rotation(joint))
-        through = state.through[:, ELASTIC.index(joint)]
+    def budget(self, reaction: Array) -> Array:
+        """Friction in motion for a reaction (...) [N]."""
+        return self._preload + self._mu * reaction
+
+    def reaction(self, block: Block, through: Array) -> Array:
+        """Sum of the radial forces at both ends of the bushing, (n,) [N], for its wrench (n, 6)."""
+        to_origin = self.seat.to_origin(block.rotation(self._joint))
         local = np.einsum("nji,nj->ni", to_origin, through)
-        push = np.einsum("rij,nj->nri", self._seat.rings, local)
-        return np.sqrt(dot(push, push)).sum(axis=-1)
+        push = np.einsum("rij,nj->nri", self.seat.rings, local)
+        return np.asarray(np.sqrt(dot(push, push)).sum(axis=-1))
 
     def _give(self, pose: Pose, j: int) -> Array:
         """Slide and turn that unit friction makes with open flanges, (n, 2, 2)."""
         rows = pose.rows[:, :, j]
         on = np.zeros((*rows.shape[:2], 2, 6))
         on[:, :, 0, :3] = on[:, :, 1, 3:] = rows
-        return (on @ pose.flexibility @ np.swapaxes(on, -1, -2)).sum(axis=1)
+        return np.asarray((on @ pose.flexibility @ np.swapaxes(on, -1, -2)).sum(axis=1))
+
+
+def _implicit(stiffness: float, give: Array, pull: Array) -> Array:
+    """Return the force (2,) of bristles on joint surfaces that themselves give way (2, 2)."""
+    return np.asarray(-np.linalg.solve(np.eye(2) + stiffness * give, stiffness * pull))
