@@ -39,6 +39,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument(
         "--on-platform", action="store_true", help="the load's axes turn with the platform"
     )
+    parser.add_argument(
+        "--both", action="store_true", help="by the table's closed form and by its spline"
+    )
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
     parser.set_defaults(run=_run)
 
@@ -55,16 +58,15 @@ def _run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--load takes 3 or 6 numbers, not {len(arguments.load)}")
     load = [*arguments.load, *[0.0] * (6 - len(arguments.load))]
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
-    values = predict(
-        model, np.radians(arguments.angles).tolist(), load, arguments.on_platform
-    ).as_values()
+    theta = np.radians(arguments.angles).tolist()
+    values = predict(model, theta, load, arguments.on_platform, arguments.both).as_values()
     x, y, z = values["shift_um"]
     print(f"s    {values['s_um']:8.3f} um    ({x:.3f}, {y:.3f}, {z:.3f})")
     x, y, z = values["rotation_mdeg"]
     print(f"phi  {values['phi_mdeg']:8.3f} mdeg  ({x:.3f}, {y:.3f}, {z:.3f})")
-    other = values["other_evaluation"]
-    way = "spline" if values["evaluation"] == "closed_form" else "closed form"
-    print(f"by the table's {way}: s {other['s_um']:.3f} um, phi {other['phi_mdeg']:.3f} mdeg")
+    if other := values["other_evaluation"]:
+        way = "spline" if values["evaluation"] == "closed_form" else "closed form"
+        print(f"by the table's {way}: s {other['s_um']:.3f} um, phi {other['phi_mdeg']:.3f} mdeg")
     inside = "inside" if values["in_operative_workspace"] else "outside"
     print(
         f"tilt {values['tilt_deg']:.2f} deg, {inside} the operative workspace, "

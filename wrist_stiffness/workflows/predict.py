@@ -17,7 +17,7 @@ from wrist_stiffness.model.model_file import load_model
 
 @dataclass(frozen=True)
 class PosePrediction:
-    """Prediction at one pose, by both evaluations of the table.
+    """Prediction at one pose, and what is worth knowing about it.
 
     Parameters
     ----------
@@ -25,8 +25,8 @@ class PosePrediction:
         As the nodes would give it.
     evaluation : str
         How the nodes evaluate the table.
-    other : Prediction
-        By the other evaluation.
+    other : Prediction or None
+        By the other evaluation, where it was asked for.
     energy_shares : dict of str to float
         Part of the load's strain energy in each component with free slides; they add up to 1.
     tilt : float
@@ -39,7 +39,7 @@ class PosePrediction:
 
     prediction: Prediction
     evaluation: Evaluation
-    other: Prediction
+    other: Prediction | None
     energy_shares: dict[str, float]
     tilt: float
     singularity: float
@@ -50,7 +50,7 @@ class PosePrediction:
         return {
             **_values(self.prediction),
             "evaluation": self.evaluation,
-            "other_evaluation": _values(self.other),
+            "other_evaluation": None if self.other is None else _values(self.other),
             "energy_share": self.energy_shares,
             "tilt_deg": float(np.degrees(self.tilt)),
             "singularity_D": self.singularity,
@@ -60,7 +60,11 @@ class PosePrediction:
 
 
 def predict(
-    model: str | Path, angles: Sequence[float], load: Sequence[float], on_platform: bool
+    model: str | Path,
+    angles: Sequence[float],
+    load: Sequence[float],
+    on_platform: bool,
+    both: bool = False,
 ) -> PosePrediction:
     """Predict the pose error at one pose under one load.
 
@@ -74,6 +78,8 @@ def predict(
         Wrench on the platform at O [N, N m].
     on_platform : bool
         Whether the wrench is given in `wrist_platform` instead of `wrist_base`.
+    both : bool
+        Also evaluate the table in the way that the nodes do not use.
 
     Returns
     -------
@@ -88,13 +94,16 @@ def predict(
     error_model = load_model(model)
     theta, wrench = np.array(angles, dtype=float), Load(np.array(load, dtype=float), on_platform)
     prediction = error_model.predict(theta, wrench)
-    other: Evaluation = "spline" if error_model.evaluation == "closed_form" else "closed_form"
+    other = None
+    if both:
+        way: Evaluation = "spline" if error_model.evaluation == "closed_form" else "closed_form"
+        other = error_model.with_evaluation(way).predict(theta, wrench)
     table = error_model.table
     configuration = prediction.configuration
     return PosePrediction(
         prediction=prediction,
         evaluation=error_model.evaluation,
-        other=error_model.with_evaluation(other).predict(theta, wrench),
+        other=other,
         energy_shares=_shares(table.shares(configuration), wrench.in_base(configuration)),
         tilt=float(table.mechanism.tilt(theta)),
         singularity=float(configuration.singularity),

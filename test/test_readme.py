@@ -1,0 +1,219 @@
+"""Every command that the documents teach is run, and prints what they show.
+
+`python test/test_readme.py` writes the real outputs into the documents; do that after the shipped
+table was built anew.
+"""
+
+import importlib.metadata
+import math
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENTS = ("README.md", "docs/commands.md")
+OUR_PROGRAM = {
+    "wrist-stiffness": [sys.executable, "-m", "wrist_stiffness"],
+    "python": [sys.executable],
+}
+TIMEOUT_S = 300.0
+
+FENCE = re.compile(r"^```(sh|console)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+CHECKSUM = re.compile(r"\b[0-9a-f]{12}\b")
+RELATIVE, ABSOLUTE = 0.02, 0.02
+"""Numbers differ in the last digit from machine to machine; an outdated table differs by more."""
+
+
+@dataclass
+class Command:
+    """A command of a document; `shown` is its output there, None where none is shown."""
+
+    line: str
+    shown: str | None = None
+
+
+def commands_of(text):
+    """Return the commands in the fenced `sh` and `console` blocks of a document."""
+    commands = []
+    for kind, block in FENCE.findall(text):
+        for line in block.replace("\\\n", " ").splitlines():
+            if kind == "console" and not line.startswith("$ "):
+                commands[-1].shown += line + "\n"
+            elif words(line.removeprefix("$ ")):
+                shown = "" if kind == "console" else None
+                commands.append(Command(line.removeprefix("$ "), shown))
+    return commands
+
+
+def words(line):
+    return shlex.split(line, comments=True)
+
+
+def fault_of(command, folder):
+    """Run a command in a folder, or look up what it names; return what is wrong, or nothing."""
+    name, *arguments = words(command.line)
+    if name in OUR_PROGRAM:
+        ran = run(command, folder)
+        if ran.returncode != 0:
+            return f"exit code {ran.returncode}: {ran.stderr[-2000:]}"
+        return "" if command.shown is None else difference(command.shown, ran.stdout)
+    if name not in LOOKED_UP:
+        return "no rule says how to try this command"
+    missing = LOOKED_UP[name](arguments)
+    return f"there is no {', no '.join(missing)}" if missing else ""
+
+
+def run(command, folder):
+    name, *arguments = words(command.line)
+    return subprocess.run(
+        [*OUR_PROGRAM[name], *arguments],
+        cwd=folder,
+        env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+        check=False,
+    )
+
+
+def difference(shown, printed):
+    """Compare outputs: texts equal but for blanks, numbers within the tolerance."""
+    shown, printed = plain(shown), plain(printed)
+    if NUMBER.sub("#", shown) != NUMBER.sub("#", printed):
+        return f"it prints\n{printed}\nand not\n{shown}"
+    for old, new in zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=True):
+        if not math.isclose(float(old), float(new), rel_tol=RELATIVE, abs_tol=ABSOLUTE):
+            return f"it prints {new} and not {old} (python test/test_readme.py writes it anew)"
+    return ""
+
+
+def plain(output):
+    output = CHECKSUM.sub("CHECKSUM", output.replace(str(ROOT), "..."))
+    return "\n".join(" ".join(line.split()) for line in output.strip().splitlines())
+
+
+def missing_targets(arguments):
+    makefile = (ROOT / "Makefile").read_text()
+    targets = [word for word in arguments if "=" not in word]
+    return [f"target {t}" for t in targets if not re.search(rf"^{t}:", makefile, re.MULTILINE)]
+
+
+def missing_extras(arguments):
+    known = importlib.metadata.metadata("wrist_stiffness").get_all("Provides-Extra")
+    wanted = [extra for a in arguments for extra in "".join(re.findall(r"\[(.*)\]", a)).split(",")]
+    return [f"extra {extra}" for extra in wanted if extra and extra not in known]
+
+
+def missing_packages(arguments):
+    named = arguments[arguments.index("--packages-select") + 1 :]
+    package = (ROOT / "package.xml").read_text()
+    return [f"package {name}" for name in named if f"<name>{name}</name>" not in package]
+
+
+def missing_of_ros(arguments):
+    verb, *named = arguments
+    if verb == "launch":
+        _, file, *settings = named
+        path = ROOT / "launch" / file
+        text = path.read_text() if path.is_file() else ""
+        wanted = [f'DeclareLaunchArgument(\n                "{s.split(":=")[0]}"' for s in settings]
+        return [] if text and all(part in text for part in wanted) else [f"launch {named}"]
+    if verb == "run":
+        scripts = importlib.metadata.entry_points(group="console_scripts")
+        return [] if named[1] in scripts.names else [f"executable {named[1]}"]
+    _, what, *_ = named
+    node, _, service = what.strip("/").rpartition("/")
+    sources = "".join(path.read_text() for path in (ROOT / "wrist_stiffness/ros").glob("*.py"))
+    found = f'"~/{service}"' in sources and f'"{node}"' in sources
+    return [] if found or f'"{what}"' in sources else [f"{verb} {what}"]
+
+
+LOOKED_UP = {
+    "make": missing_targets,
+    "pip": missing_extras,
+    "colcon": missing_packages,
+    "ros2": missing_of_ros,
+    # They prepare a shell.
+    "source": lambda arguments: [],
+    ".": lambda arguments: [],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_commands_of_the_document_run_and_print_what_it_shows(document, tmp_path):
+    pytest.importorskip("rclpy", reason="the documents start live nodes")
+    commands = commands_of((ROOT / document).read_text())
+    assert len(commands) > 5
+    for command in commands:
+        fault = fault_of(command, tmp_path)
+        assert not fault, f"{document}: {command.line}\n{fault}"
+
+
+@pytest.mark.parametrize(
+    ("block", "fault"),
+    [
+        ("```sh\nmake demo test\n```\n", ""),
+        ("```sh\nmake coffee\n```\n", "target coffee"),
+        ("```sh\npip install -e '.[ros,fem]'\n```\n", ""),
+        ("```sh\npip install '.[ros,tea]'\n```\n", "extra tea"),
+        ("```sh\ncolcon build --packages-select wrist\n```\n", "package wrist"),
+        ("```sh\nros2 launch wrist_stiffness wrist.launch.py cell:=true\n```\n", ""),
+        ("```sh\nros2 launch wrist_stiffness wrist.launch.py cat:=true\n```\n", "cat:=true"),
+        ("```sh\nros2 run wrist_stiffness pose_error_predictor\n```\n", ""),
+        ("```sh\nros2 run wrist_stiffness coffee\n```\n", "executable coffee"),
+        ("```sh\nros2 service call /angle_corrector/enable T V\n```\n", ""),
+        ("```sh\nros2 service call /angle_corrector/disable T V\n```\n", "disable"),
+        ("```sh\nrm -rf x\n```\n", "no rule"),
+        ("```sh\nwrist-stiffness --version  # the version\n```\n", ""),
+        ("```sh\nwrist-stiffness brew\n```\n", "exit code 2"),
+        ("```console\n$ python -c 'print(\"s  8.73 um\")'\ns 8.74 um\n```\n", ""),
+        ("```console\n$ python -c 'print(\"s 8.73 um\")'\ns 9.73 um\n```\n", "8.73 and not 9.73"),
+        ("```console\n$ python -c 'print(\"s 8.73 um\")'\ns 8.73 mm\n```\n", "and not"),
+        ("```console\n$ python -c 'print(\"s 8.73 um\")'\n```\n", "and not"),
+    ],
+)
+def test_a_wrong_document_is_found(block, fault, tmp_path):
+    (command,) = commands_of(block)
+    found = fault_of(command, tmp_path)
+    assert (fault in found) if fault else found == ""
+
+
+PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
+
+
+@pytest.mark.parametrize("document", PAGES)
+def test_links_lead_somewhere(document):
+    path = ROOT / document
+    links = re.findall(r"\]\((?!https?:)([^)#]+)", path.read_text())
+    assert [link for link in links if not (path.parent / link).exists()] == []
+
+
+def write_outputs(document):
+    """Put the real outputs into the `console` blocks of a document."""
+    with tempfile.TemporaryDirectory() as folder:
+
+        def filled(match):
+            kind, block = match.groups()
+            lines = []
+            for command in commands_of(match.group(0)):
+                is_ours = words(command.line)[0] in OUR_PROGRAM
+                output = run(command, folder).stdout if is_ours else ""
+                lines += [f"$ {command.line}", *output.replace(str(ROOT), "...").splitlines()]
+            return match.group(0) if kind == "sh" else "\n".join(["```console", *lines, "```"])
+
+        path = ROOT / document
+        path.write_text(FENCE.sub(filled, path.read_text()))
+
+
+if __name__ == "__main__":
+    for name in DOCUMENTS:
+        write_outputs(name)
