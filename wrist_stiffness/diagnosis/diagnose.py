@@ -1,0 +1,285 @@
+"""Which physical effect is missing?  All steps of a diagnosis in their order."""
+
+import numpy as np
+
+from wrist_stiffness.diagnosis.candidates import Candidate
+from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
+from wrist_stiffness.diagnosis.estimates import estimate, joint_fit
+from wrist_stiffness.diagnosis.hypotheses import (
+    Evidence,
+    Hypothesis,
+    all_hypotheses,
+    make_evidence,
+)
+from wrist_stiffness.diagnosis.identifiability import excited
+from wrist_stiffness.diagnosis.noise import estimate_noise
+from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
+from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.outliers import lost_units
+from wrist_stiffness.diagnosis.resampling import BlockGrams, stability, time_blocks
+from wrist_stiffness.diagnosis.result import Diagnosis, Finding, NotExcited, Unexplained
+from wrist_stiffness.diagnosis.rivals import indistinguishable
+from wrist_stiffness.diagnosis.sealed import HeldOut, bought, held_out, refuted, sealed_units
+from wrist_stiffness.diagnosis.selection import (
+    Entered,
+    Selection,
+    base_with,
+    rivals_of,
+    select,
+)
+from wrist_stiffness.diagnosis.settings import Settings
+from wrist_stiffness.diagnosis.structure import (
+    Excess,
+    background,
+    effective_dimension,
+    lack_of_fit,
+)
+from wrist_stiffness.errors import InputError
+
+OMNIBUS_REARRANGEMENTS = 399
+
+FEWEST_UNITS = 12
+"""Fewer units cannot be split into a part to learn from and a part to be judged by."""
+
+
+def diagnose(
+    observations: Observations,
+    candidates: tuple[Candidate, ...],
+    nuisances: tuple[Nuisance, ...],
+    rng: np.random.Generator,
+    settings: Settings | None = None,
+) -> Diagnosis:
+    """Find the effects that a model misses.
+
+    Parameters
+    ----------
+    observations : Observations
+        Measured minus predicted, with the conditions; one row per dwell or sample.
+    candidates : tuple of Candidate
+        The catalogue.
+    nuisances : tuple of Nuisance
+        What is refitted first.
+    rng : numpy.random.Generator
+        Source of chance for permutations and resamples.
+    settings : Settings, optional
+        Thresholds.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict, findings and what remains open.
+
+    Raises
+    ------
+    InputError
+        If there are too few units, two candidates of one name, or unusable columns.
+    """
+    settings = settings or Settings()
+    _refuse_unusable(observations, candidates)
+    aside = sealed_units(observations, settings.sealed_share)
+    training, n_lost = _cleaned(observations.take(~aside), candidates, nuisances, settings)
+    evidence = _gather(training, candidates, nuisances)
+    testable, silent = excited(evidence.base, all_hypotheses(evidence, candidates))
+    dimension = effective_dimension(evidence.base, testable)
+    chosen = select(evidence, testable, dimension, settings, rng)
+
+    sealed, n_lost_aside = _cleaned(observations.take(aside), candidates, nuisances, settings)
+    kept, stages, broken = _opened(evidence, chosen.entered, sealed, nuisances)
+    base = base_with(evidence.base, kept)
+    blocks = time_blocks(training.sessions, settings.blocks)
+    excess = lack_of_fit(base.energy, base.freedom, evidence.noise.dof)
+    flexible = find_discrepancy(evidence, base, blocks, OMNIBUS_REARRANGEMENTS, settings.alpha, rng)
+    unexplained = _unexplained(evidence, base.energy, excess, flexible, broken)
+    findings = tuple(
+        _finding(
+            evidence, testable, chosen, kept, which, stages, blocks, unexplained, settings, rng
+        )
+        for which in range(len(kept))
+    )
+    verdict = "effect" if findings else "none"
+    if unexplained.energy_share >= settings.unexplained_share or broken:
+        verdict = "unknown"
+    return Diagnosis(
+        verdict,
+        "sample" if observations.samples is None else "dwell",
+        _floor(evidence),
+        {q.key: stages[0].rmse(q) for q in observations.quantities},
+        {q.key: stages[-1].rmse(q) for q in observations.quantities},
+        _absorbed(evidence, kept),
+        findings,
+        unexplained,
+        tuple(NotExcited(c.effect, c.component, c.needs) for c in candidates if c.name in silent),
+        n_lost + n_lost_aside,
+        "another session" if len(np.unique(observations.sessions)) > 1 else "this session only",
+    )
+
+
+def _refuse_unusable(observations: Observations, candidates: tuple[Candidate, ...]) -> None:
+    names = [candidate.name for candidate in candidates]
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise InputError(f"candidate {sorted(twice)[0]} is listed twice")
+    if observations.n_units < FEWEST_UNITS:
+        raise InputError(
+            f"{observations.n_units} units are too few for a diagnosis, it needs {FEWEST_UNITS}"
+        )
+
+
+def _structure(observations: Observations, candidates: tuple[Candidate, ...]) -> Array:
+    """Columns of the whole catalogue on all its grids, (n, m, q)."""
+    columns = [np.empty((*observations.values.shape, 0))]
+    columns += [c.evaluate(observations, shape) for c in candidates for shape in c.shapes]
+    return np.concatenate(columns, axis=2)
+
+
+def _cleaned(
+    observations: Observations,
+    candidates: tuple[Candidate, ...],
+    nuisances: tuple[Nuisance, ...],
+    settings: Settings,
+) -> tuple[Observations, int]:
+    """Observations without lost units, and how many were lost."""
+    everything = np.concatenate(
+        [
+            nuisance_columns(observations, nuisances).columns,
+            _structure(observations, candidates),
+        ],
+        axis=2,
+    )
+    lost = lost_units(observations, everything, settings.outlier_limit)
+    return observations.take(~lost), int(lost.sum())
+
+
+def _gather(
+    training: Observations, candidates: tuple[Candidate, ...], nuisances: tuple[Nuisance, ...]
+) -> Evidence:
+    nuisance = nuisance_columns(training, nuisances)
+    noise = estimate_noise(training, nuisance.columns, _structure(training, candidates))
+    return make_evidence(training, noise, nuisance)
+
+
+def _opened(
+    evidence: Evidence,
+    entered: tuple[Entered, ...],
+    sealed: Observations,
+    nuisances: tuple[Nuisance, ...],
+) -> tuple[tuple[Entered, ...], list[HeldOut], list[str]]:
+    """Judge each effect, in the order of entry, on the sealed part."""
+    kept: list[Entered] = []
+    stages = [held_out(evidence, [], sealed, nuisances)]
+    broken = []
+    for each in entered:
+        trial = [other.hypothesis for other in kept] + [each.hypothesis]
+        stage = held_out(evidence, trial, sealed, nuisances)
+        if refuted(stages[-1], stage):
+            broken.append(each.name)
+        else:
+            kept.append(each)
+            stages.append(stage)
+    return tuple(kept), stages, broken
+
+
+def _unexplained(
+    evidence: Evidence,
+    energy: float,
+    excess: Excess,
+    flexible: Discrepancy,
+    broken: list[str],
+) -> Unexplained:
+    remaining = max(excess.energy, flexible.energy)
+    explained = evidence.base.energy - energy
+    share = remaining / (remaining + explained) if remaining > 0 else 0.0
+    sentences = []
+    if excess.energy > 0:
+        sentences.append(
+            f"residual above the noise floor ({evidence.noise.source}, p = {excess.p_value:.1g})"
+        )
+    if flexible.energy > 0:
+        sentences.append(f"the conditions predict it on unseen blocks (p = {flexible.p_value:.1g})")
+    sentences += [f"{name} fitted here makes the sealed part worse" for name in broken]
+    return Unexplained(flexible.depends_on, float(share), "; ".join(sentences))
+
+
+def _finding(
+    evidence: Evidence,
+    testable: list[Hypothesis],
+    chosen: Selection,
+    kept: tuple[Entered, ...],
+    which: int,
+    stages: list[HeldOut],
+    blocks: Array,
+    unexplained: Unexplained,
+    settings: Settings,
+    rng: np.random.Generator,
+) -> Finding:
+    entered = kept[which]
+    others = base_with(evidence.base, kept[:which] + kept[which + 1 :])
+    ranked = rivals_of(evidence, testable, kept, which, chosen.dimension)
+    ranked = [
+        each
+        for each in ranked
+        if each.name != entered.name or each.hypothesis is entered.hypothesis
+    ]
+    own = next((e for e in ranked if e.hypothesis is entered.hypothesis), ranked[0])
+    best_first = [own, *(each for each in ranked if each is not own)]
+    members = indistinguishable(others, best_first, chosen.dimension, settings)
+    scale = float(background(own.remaining, chosen.dimension))
+    fitted = estimate(evidence, others, own.hypothesis, scale)
+    names = [p.name for p in own.hypothesis.candidate.parameters]
+    names += [p.name for p in own.hypothesis.candidate.shape]
+
+    one_each: dict[str, Hypothesis] = {}
+    for each in best_first:
+        one_each.setdefault(each.name, each.hypothesis)
+    grams = BlockGrams(evidence, others, list(one_each.values()), blocks)
+    price = np.log(others.freedom) * scale
+    prices = price * np.array([h.candidate.freedom for h in one_each.values()])
+    inside = np.isin(list(one_each), [m.name for m in members])
+    before, after = stages[which], stages[which + 1]
+    candidate = own.hypothesis.candidate
+    misfit = own.remaining / (own.remaining + own.gain)
+    told = candidate.evidence or f"{candidate.effect} at {candidate.component}"
+    told += f": explains {100 * (1 - misfit):.1f} % of what the rest of the model leaves"
+    if misfit > 0:
+        told += f"; its law misfits by {100 * np.sqrt(misfit):.0f} % of its size"
+    return Finding(
+        tuple((m.hypothesis.candidate.effect, m.hypothesis.candidate.component) for m in members),
+        {
+            name: (float(value), float(error))
+            for name, value, error in zip(names, fitted.values, fitted.uncertainty, strict=True)
+        },
+        float(np.linalg.norm(after.white) / np.linalg.norm(before.white)),
+        float(own.gain / scale - candidate.freedom * np.log(others.freedom)),
+        entered.p_value,
+        stability(grams, inside, prices, rng),
+        {q.key: bought(before, after, q) for q in evidence.observations.quantities},
+        candidate.compensable,
+        told,
+        candidate.check,
+    )
+
+
+def _floor(evidence: Evidence) -> dict[str, float]:
+    inverse = np.linalg.inv(evidence.noise.factors(evidence.observations))
+    variance = np.einsum("nij,nij->ni", inverse, inverse).mean(axis=0)
+    return {
+        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
+        for q in evidence.observations.quantities
+    }
+
+
+def _absorbed(evidence: Evidence, kept: tuple[Entered, ...]) -> tuple[str, ...]:
+    """What each nuisance group took up, as root mean square of each quantity."""
+    nuisance = evidence.nuisance
+    parameters, _ = joint_fit(evidence, [each.hypothesis for each in kept])
+    sentences = []
+    for group in dict.fromkeys(name for name, _, _ in nuisance.keys):
+        own = np.array([name == group for name, _, _ in nuisance.keys])
+        taken = nuisance.columns[:, :, own] @ parameters[own]
+        sizes = [
+            f"{np.sqrt(np.mean(np.sum(taken[:, list(q.components)] ** 2, axis=1))) * q.per_si:.3g}"
+            f" {q.unit} of {q.name}"
+            for q in evidence.observations.quantities
+        ]
+        sentences.append(f"{group}: {', '.join(sizes)}")
+    return tuple(sentences)

@@ -1,0 +1,116 @@
+"""Joint estimate of everything in a model, with honest standard uncertainties."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
+from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.projection import Base
+
+SHAPE_STEP = 0.02
+"""Step of the difference quotient, as a share of the range of a shape parameter."""
+
+BOUND_MARGIN = 2.0
+"""Standard uncertainties by which an estimate may lie outside what is possible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters of one effect.
+
+    Parameters
+    ----------
+    values, uncertainty : (k + j,) arrays
+        Linear parameters, then shape parameters; one standard uncertainty.
+    """
+
+    values: Array
+    uncertainty: Array
+
+
+def estimate(
+    evidence: Evidence, base: Base, hypothesis: Hypothesis, inflation: float = 1.0
+) -> Estimate:
+    """Parameters of an effect with everything else in the base refitted.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Table and noise.
+    base : Base
+        All the rest of the model.
+    hypothesis : Hypothesis
+        The effect, not in the base.
+    inflation : float, optional
+        Factor of the variances where structure remains.
+    """
+    columns = base.beyond(hypothesis.columns)
+    linear = _solve(columns, base.residual)[0]
+    slopes = [_slope(evidence, hypothesis, axis, linear) for axis in range(len(hypothesis.shape))]
+    if slopes:
+        columns = np.hstack([columns, base.beyond(np.column_stack(slopes))])
+    variance = inflation * np.diag(_solve(columns, base.residual)[1])
+    return Estimate(np.concatenate([linear, hypothesis.shape]), np.sqrt(np.maximum(variance, 0)))
+
+
+def _solve(columns: Array, target: Array) -> tuple[Array, Array]:
+    norm = np.linalg.norm(columns, axis=0)
+    norm = np.where(norm > 0, norm, 1.0)
+    inverse = np.linalg.pinv(columns / norm, rcond=1e-10)
+    return inverse @ target / norm, (inverse @ inverse.T) / np.outer(norm, norm)
+
+
+def _slope(evidence: Evidence, hypothesis: Hypothesis, axis: int, linear: Array) -> Array:
+    """Change of the prediction per unit of one shape parameter, (N,)."""
+    grid = hypothesis.candidate.shape[axis].grid
+    step = SHAPE_STEP * (grid[-1] - grid[0])
+    ends = []
+    for at in (
+        max(hypothesis.shape[axis] - step, grid[0]),
+        min(hypothesis.shape[axis] + step, grid[-1]),
+    ):
+        shape = (*hypothesis.shape[:axis], at, *hypothesis.shape[axis + 1 :])
+        ends.append((at, evidence.hypothesis(hypothesis.candidate, shape).columns @ linear))
+    return (ends[1][1] - ends[0][1]) / (ends[1][0] - ends[0][0])
+
+
+def possible(base: Base, hypothesis: Hypothesis, inflation: float) -> bool:
+    """Whether the linear estimates respect their bounds within their uncertainty."""
+    columns = base.beyond(hypothesis.columns)
+    values, covariance = _solve(columns, base.residual)
+    margin = BOUND_MARGIN * np.sqrt(inflation * np.maximum(np.diag(covariance), 0))
+    lower = np.array([p.lower for p in hypothesis.candidate.parameters])
+    upper = np.array([p.upper for p in hypothesis.candidate.parameters])
+    return bool(((values + margin >= lower) & (values - margin <= upper)).all())
+
+
+def joint_fit(evidence: Evidence, hypotheses: list[Hypothesis]) -> tuple[Array, list[Array]]:
+    """Base and effects fitted together.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Table, noise and nuisance columns.
+    hypotheses : list of Hypothesis
+        Effects at their shapes.
+
+    Returns
+    -------
+    (p,) array
+        Parameters of the nuisance columns.
+    list of (k,) arrays
+        Linear parameters of each effect.
+    """
+    nuisance = evidence.nuisance
+    proper = np.isfinite(nuisance.prior_std)
+    p = len(proper)
+    raw = evidence.noise.whiten(
+        evidence.observations,
+        np.concatenate([nuisance.columns, evidence.observations.values[:, :, None]], axis=2),
+    )
+    priors = np.diag(1 / nuisance.prior_std)[proper]
+    columns = np.hstack([np.vstack([raw[:, :-1], priors]), *(h.columns for h in hypotheses)])
+    parameters = _solve(columns, np.concatenate([raw[:, -1], np.zeros(len(priors))]))[0]
+    ends = np.cumsum([p] + [h.columns.shape[1] for h in hypotheses])
+    return parameters[:p], [parameters[a:b] for a, b in zip(ends, ends[1:], strict=False)]

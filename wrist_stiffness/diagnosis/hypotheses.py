@@ -1,0 +1,135 @@
+"""Candidates at definite shapes, whitened and ready to be asked about."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.diagnosis.candidates import Candidate
+from wrist_stiffness.diagnosis.nuisance import NuisanceColumns
+from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.projection import Base, make_base
+from wrist_stiffness.diagnosis.whitening import NoiseModel
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One candidate at one shape.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        The effect.
+    shape : tuple of float
+        Values of its non-linear parameters.
+    columns : (N, k) array
+        Whitened columns, zero in the rows of the priors.
+    """
+
+    candidate: Candidate
+    shape: tuple[float, ...]
+    columns: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """A table with its noise and its base: all that a hypothesis needs to be tested.
+
+    Parameters
+    ----------
+    observations : Observations
+        Cleaned table.
+    noise : NoiseModel
+        Scatter of its units.
+    nuisance : NuisanceColumns
+        Columns of the base and their priors, not whitened.
+    base : Base
+        The base refitted without any effect.
+    """
+
+    observations: Observations
+    noise: NoiseModel
+    nuisance: NuisanceColumns
+    base: Base
+
+    def whiten(self, columns: Array) -> Array:
+        """Whitened columns above the (empty) rows of the priors, (N, k)."""
+        white = self.noise.whiten(self.observations, columns)
+        n_priors = self.base.residual.size - white.shape[0]
+        return np.vstack([white, np.zeros((n_priors, white.shape[1]))])
+
+    def hypothesis(self, candidate: Candidate, shape: tuple[float, ...]) -> Hypothesis:
+        """Evaluate and whiten one candidate at one shape."""
+        columns = candidate.evaluate(self.observations, shape)
+        return Hypothesis(candidate, shape, self.whiten(columns))
+
+    @property
+    def unit_of_row(self) -> Array:
+        """Unit of each row, (N,); -1 for the priors."""
+        n, m = self.observations.values.shape
+        unit = np.full(self.base.residual.size, -1)
+        unit[: n * m] = np.repeat(np.arange(n), m)
+        return unit
+
+
+def make_evidence(
+    observations: Observations, noise: NoiseModel, nuisance: NuisanceColumns
+) -> Evidence:
+    """Whiten the table and refit the base."""
+    white = noise.whiten(
+        observations, np.concatenate([nuisance.columns, observations.values[:, :, None]], axis=2)
+    )
+    base = make_base(
+        white[:, :-1], nuisance.prior_std, white[:, -1], int(observations.measured.sum())
+    )
+    return Evidence(observations, noise, nuisance, base)
+
+
+def all_hypotheses(evidence: Evidence, candidates: tuple[Candidate, ...]) -> list[Hypothesis]:
+    """Every candidate at every point of its grid."""
+    return [
+        evidence.hypothesis(candidate, shape)
+        for candidate in candidates
+        for shape in candidate.shapes
+    ]
+
+
+def refined(evidence: Evidence, hypothesis: Hypothesis, base: Base) -> Hypothesis:
+    """Shape that explains most beyond the base, by golden section along each shape parameter.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Table and noise.
+    hypothesis : Hypothesis
+        Best point of the grid.
+    base : Base
+        What is refitted besides, other effects included.
+    """
+    candidate, shape = hypothesis.candidate, list(hypothesis.shape)
+    best, best_gain = hypothesis, gain(base, hypothesis)
+    for axis, parameter in enumerate(candidate.shape):
+        grid = parameter.grid
+        at = int(np.argmin(np.abs(np.array(grid) - shape[axis])))
+        low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
+        for _ in range(SECTIONS):
+            left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+            trials = []
+            for value in (left, right):
+                point = (*shape[:axis], value, *shape[axis + 1 :])
+                trial = evidence.hypothesis(candidate, point)
+                trials.append(gain(base, trial))
+                if trials[-1] > best_gain:
+                    best, best_gain = trial, trials[-1]
+            low, high = (low, right) if trials[0] >= trials[1] else (left, high)
+        shape[axis] = best.shape[axis]
+    return best
+
+
+GOLDEN = (5**0.5 - 1) / 2
+SECTIONS = 8
+
+
+def gain(base: Base, hypothesis: Hypothesis) -> float:
+    """Sum of squares that the hypothesis explains beyond the base."""
+    directions = base.directions(hypothesis.columns)
+    return float(np.sum((directions.T @ base.residual) ** 2))

@@ -1,0 +1,197 @@
+"""How much of the residual is scatter: its size, its coupling between components, its colour.
+
+The size comes from replicates where there are enough, else from what the observer states, else
+from what a model with every candidate in it leaves.  The colour comes from that rich model too,
+by restricted likelihood, so that slow effects in the catalogue are not taken for wander.
+"""
+
+import numpy as np
+from scipy.linalg import qr
+
+from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.projection import orthonormal
+from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors, innovations
+
+FEWEST_REPLICATE_DOF = 12
+"""Below this the scatter of the replicates is itself too uncertain to be a floor."""
+
+COLOUR_SHARES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97)
+COLOUR_TIMES_IN_STEPS = (1.5, 4.0, 10.0, 30.0)
+
+COLOUR_EVIDENCE = 3.0
+"""Gain of log likelihood that the two numbers of the wander must bring."""
+
+RICH_SHARE = 0.3
+"""The rich model may use up at most this share of the numbers."""
+
+
+def replicate_variance(residual: Array, observations: Observations) -> tuple[Array, float]:
+    """Pooled variance inside the groups of replicates.
+
+    Parameters
+    ----------
+    residual : (n, m) array
+        NaN = not measured.
+    observations : Observations
+        With `replicate` labels; groups never span sessions.
+
+    Returns
+    -------
+    (m,) array
+        Variance of one unit, NaN where there are no replicates.
+    float
+        Fewest degrees of freedom over the components.
+    """
+    m = observations.n_components
+    if observations.replicate is None:
+        return np.full(m, np.nan), 0.0
+    total, freedom = np.zeros(m), np.zeros(m)
+    labels = np.stack([observations.replicate, observations.sessions], axis=1)
+    repeated = labels[:, 0] >= 0
+    _, group = np.unique(labels[repeated], axis=0, return_inverse=True)
+    rows = residual[repeated]
+    for number in range(group.max() + 1 if len(group) else 0):
+        members = rows[group == number]
+        good = np.isfinite(members)
+        count = good.sum(axis=0)
+        centre = np.where(good, members, 0.0).sum(axis=0) / np.maximum(count, 1)
+        total += np.where(good, (members - centre) ** 2, 0.0).sum(axis=0)
+        freedom += np.maximum(count - 1, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return total / freedom, float(freedom.min())
+
+
+def rich_basis(columns: Array, n_measured: int) -> Array:
+    """Orthonormal basis of everything that could be structure, leading directions first."""
+    basis = orthonormal(columns)
+    most = int(RICH_SHARE * n_measured)
+    if basis.shape[1] <= most:
+        return basis
+    norm = np.linalg.norm(columns, axis=0)
+    left, _, _ = np.linalg.svd(columns / np.where(norm > 0, norm, 1.0), full_matrices=False)
+    return left[:, :most]
+
+
+def estimate_noise(observations: Observations, base: Array, structure: Array) -> NoiseModel:
+    """Scatter of each unit.
+
+    Parameters
+    ----------
+    observations : Observations
+        Table, cleaned of outliers.
+    base : (n, m, p) array
+        Nuisance columns.
+    structure : (n, m, q) array
+        Columns of all candidates.
+    """
+    n, m = observations.values.shape
+    measured = observations.measured
+    values = np.where(measured, observations.values, 0.0)
+    variance = np.array([np.var(values[measured[:, c], c]) for c in range(m)])
+    reference = np.diag(np.where(variance > 0, variance, 1.0))
+    stated = reference if observations.covariance is None else observations.covariance
+    factor = component_factors(np.broadcast_to(stated, (n, m, m)), measured)
+
+    everything = factor @ np.where(
+        measured[:, :, None], np.concatenate([base, structure, values[:, :, None]], axis=2), 0.0
+    )
+    basis = rich_basis(everything[:, :, :-1].reshape(n * m, -1), int(measured.sum()))
+    target = everything[:, :, -1].reshape(-1)
+    left = np.where(measured, (target - basis @ (basis.T @ target)).reshape(n, m), np.nan)
+
+    loss = 1 - basis.shape[1] / measured.sum()
+    coupled = residual_covariance(left, loss)
+    size = np.sqrt(np.diag(coupled))
+    share, time_constant = colour(
+        everything / size[:, None], measured, observations, basis.shape[1]
+    )
+    repeated, freedom = replicate_variance(left, observations)
+    if freedom >= FEWEST_REPLICATE_DOF:
+        # 1/s^2 of a scatter s^2 with few degrees of freedom is too large on average.
+        scatter = np.diag(repeated * freedom / (freedom - 2))
+        return NoiseModel(reference, scatter, share, time_constant, freedom * m, "replicates")
+    if observations.covariance is not None:
+        # What was stated is the white part; the wander comes on top of it.
+        return NoiseModel(reference, np.eye(m) / (1 - share), share, time_constant, np.inf, "given")
+    dof = float(measured.sum() * loss)
+    return NoiseModel(reference, coupled, share, time_constant, dof, "residual")
+
+
+def residual_covariance(left: Array, loss: float) -> Array:
+    """Covariance of the components of a residual, shrunk towards no coupling, (m, m).
+
+    Parameters
+    ----------
+    left : (n, m) array
+        Residual; NaN = not measured.
+    loss : float
+        Share of the degrees of freedom that the fit left.
+    """
+    good = np.isfinite(left)
+    filled = np.where(good, left, 0.0)
+    pairs = good.T.astype(float) @ good.astype(float)
+    covariance = filled.T @ filled / (loss * np.maximum(pairs, 1))
+    variance = np.diag(covariance)
+    own = np.diag(np.where(variance > 0, variance, 1.0))
+    shrink = len(own) / (len(own) + pairs.min())
+    return (1 - shrink) * covariance + shrink * own
+
+
+def colour(
+    everything: Array, measured: Array, observations: Observations, n_rich: int
+) -> tuple[float, float]:
+    """Share and correlation time of the slow wander, by restricted likelihood on a grid.
+
+    Parameters
+    ----------
+    everything : (n, m, q + 1) array
+        Base and candidates in components of equal scatter; the observations are the last column.
+    measured : (n, m) array of bool
+        Entries that take part.
+    observations : Observations
+        Times and sessions.
+    n_rich : int
+        Rank of base and candidates together.
+
+    Returns
+    -------
+    float, float
+        Share in [0, 1) and time, share 0 if white noise does as well.
+    """
+    times = observations.times
+    steps = np.diff(times)[np.diff(observations.sessions) == 0]
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    models = [(0.0, step)] + [
+        (share, factor * step) for share in COLOUR_SHARES[1:] for factor in COLOUR_TIMES_IN_STEPS
+    ]
+    design = everything[:, :, :-1]
+    norm = np.linalg.norm(design.reshape(-1, design.shape[2]), axis=0)
+    flat = (design / np.where(norm > 0, norm, 1.0)).reshape(-1, design.shape[2])
+    _, triangle, order = qr(flat, mode="economic", pivoting=True)
+    independent = np.abs(np.diag(triangle)) > 1e-6 * abs(triangle[0, 0])
+    chosen = order[: min(int(independent.sum()), n_rich)]
+    reduced = np.concatenate(
+        [flat[:, chosen].reshape(*measured.shape, -1), everything[:, :, -1:]], axis=2
+    )
+    n_measured, p = int(measured.sum()), len(chosen)
+    likelihoods = []
+    for share, time_constant in models:
+        white, log_sum = innovations(
+            reduced,
+            measured,
+            times,
+            observations.sessions,
+            np.array([share]),
+            np.array([time_constant]),
+        )
+        rows = white[0].reshape(-1, p + 1)
+        r = np.linalg.qr(rows, mode="r")
+        log_information = 2 * np.log(np.abs(np.diag(r)[:p]) + 1e-300).sum()
+        freedom = n_measured - p
+        likelihoods.append(
+            -0.5 * (log_sum[0] + log_information + freedom * np.log(r[p, p] ** 2 / freedom))
+        )
+    best = int(np.argmax(likelihoods))
+    if likelihoods[best] < likelihoods[0] + COLOUR_EVIDENCE:
+        return 0.0, step
+    return models[best]

@@ -1,0 +1,55 @@
+"""Units that no model explains: lost beams and dropouts, found before anything is fitted."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.diagnosis.observations import Array, Observations
+
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a Gaussian over its median absolute deviation."""
+
+ROUNDS = 15
+
+
+def lost_units(observations: Observations, columns: Array, limit: float) -> NDArray[np.bool_]:
+    """Which units lie far from a model with everything in it.
+
+    Iteratively reweighted least squares with Tukey's biweight on the distance of the whole unit,
+    so that one lost beam of a hundred does not pull the fit.
+
+    Parameters
+    ----------
+    observations : Observations
+        Table.
+    columns : (n, m, p) array
+        Base and candidates.
+    limit : float
+        Robust standard deviations beyond which a unit is lost.
+
+    Returns
+    -------
+    (n,) array of bool
+        True = lost.
+    """
+    n, m = observations.values.shape
+    measured = observations.measured
+    values = np.where(measured, observations.values, 0.0)
+    centre = np.nanmedian(observations.values, axis=0)
+    size = MAD_TO_SIGMA * np.nanmedian(np.abs(observations.values - centre), axis=0)
+    size = np.where(size > 0, size, 1.0)
+    rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
+    norm = np.linalg.norm(rows, axis=0)
+    left, spread, _ = np.linalg.svd(rows / np.where(norm > 0, norm, 1.0), full_matrices=False)
+    rank = min(int((spread > 1e-3 * spread[0]).sum()), int(0.25 * measured.sum()))
+    basis, target = left[:, :rank], (values / size).reshape(-1)
+    weight = np.ones(n)
+    distance = np.zeros(n)
+    for _ in range(ROUNDS):
+        root = np.sqrt(np.repeat(weight, m))[:, None]
+        fit = basis @ np.linalg.lstsq(root * basis, root[:, 0] * target, rcond=None)[0]
+        residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
+        scale = MAD_TO_SIGMA * np.nanmedian(np.abs(residual), axis=0)
+        scaled = residual / np.where(scale > 0, scale, 1.0)
+        distance = np.sqrt(np.nanmean(scaled**2, axis=1))
+        weight = np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
+    return distance > limit

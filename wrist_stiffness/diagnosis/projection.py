@@ -1,0 +1,107 @@
+"""Linear algebra of one question: what do these columns explain beyond the base?
+
+Everything is whitened, so sums of squares are chi-square.  A Gaussian prior on a parameter is a
+row of its own (augmented least squares); projections then honour priors without special cases.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.diagnosis.observations import Array
+
+NEGLIGIBLE = 1e-9
+"""Singular values below this share of the largest are rounding, not information."""
+
+ABSORBED = 1e-5
+"""A column of which the base leaves less than this share of the norm lies inside the base."""
+
+
+def orthonormal(columns: Array, original_norm: Array | None = None) -> Array:
+    """Orthonormal basis of the columns, (N, r), blind to their scales.
+
+    Parameters
+    ----------
+    columns : (N, k) array
+        Columns, possibly dependent.
+    original_norm : (k,) array, optional
+        Norms before a projection; a column that lost nearly all of it is left out.
+    """
+    norm = np.linalg.norm(columns, axis=0)
+    reference = norm if original_norm is None else original_norm
+    keep = (norm > ABSORBED * reference) & (norm > 0)
+    if not keep.any():
+        return np.empty((columns.shape[0], 0))
+    left, size, _ = np.linalg.svd(columns[:, keep] / norm[keep], full_matrices=False)
+    return left[:, size > NEGLIGIBLE * size[0] * max(columns.shape)]
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """Everything that is refitted before a question is asked.
+
+    Parameters
+    ----------
+    basis : (N, r) array
+        Orthonormal basis of the refitted columns, data rows first, prior rows below.
+    residual : (N,) array
+        What the base leaves of the observations.
+    n_rows : int
+        Measured numbers plus proper priors.
+    """
+
+    basis: Array
+    residual: Array
+    n_rows: int
+
+    @property
+    def energy(self) -> float:
+        """Sum of squares that is left."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom that are left."""
+        return self.n_rows - self.basis.shape[1]
+
+    def beyond(self, columns: Array) -> Array:
+        """Part of the columns that the base cannot imitate, (N, k)."""
+        return columns - self.basis @ (self.basis.T @ columns)
+
+    def directions(self, columns: Array) -> Array:
+        """Orthonormal basis of what the columns add to the base, (N, r)."""
+        return orthonormal(self.beyond(columns), np.linalg.norm(columns, axis=0))
+
+    def extended(self, columns: Array) -> "Base":
+        """Return this base with more columns in it."""
+        more = self.directions(columns)
+        return Base(
+            np.hstack([self.basis, more]),
+            self.residual - more @ (more.T @ self.residual),
+            self.n_rows,
+        )
+
+
+def make_base(columns: Array, prior_std: Array, values: Array, n_measured: int) -> Base:
+    """Put data and priors together and refit.
+
+    Parameters
+    ----------
+    columns : (n, p) array
+        Whitened nuisance columns.
+    prior_std : (p,) array
+        Infinite for free parameters.
+    values : (n,) array
+        Whitened observations.
+    n_measured : int
+        How many of them were measured.
+    """
+    proper = np.isfinite(prior_std)
+    basis = orthonormal(with_prior_rows(columns, np.diag(1 / prior_std)[proper]))
+    padded = np.concatenate([values, np.zeros(proper.sum())])
+    return Base(basis, padded - basis @ (basis.T @ padded), n_measured + int(proper.sum()))
+
+
+def with_prior_rows(columns: Array, rows: Array) -> Array:
+    """Columns of data above rows of priors."""
+    return np.vstack([columns, rows])

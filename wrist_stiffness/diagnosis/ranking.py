@@ -1,0 +1,118 @@
+"""Which candidate explains most beyond the base, for what it costs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from wrist_stiffness.diagnosis.estimates import possible
+from wrist_stiffness.diagnosis.hypotheses import Hypothesis
+from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.permutation import rearranged
+from wrist_stiffness.diagnosis.projection import Base
+from wrist_stiffness.diagnosis.structure import background, lack_of_fit
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """One hypothesis against one base.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        The effect.
+    directions : (N, r) array
+        What it adds to the base.
+    gain : float
+        Sum of squares that it explains.
+    remaining : float
+        Excess over the noise floor with it in the model.
+    score : float
+        Bayesian information criterion against the base, in units of the background: larger is
+        better.
+    """
+
+    hypothesis: Hypothesis
+    directions: Array
+    gain: float
+    remaining: float
+    score: float
+
+    @property
+    def name(self) -> str:
+        """Effect and place."""
+        return self.hypothesis.candidate.name
+
+
+def rank(
+    base: Base,
+    hypotheses: list[Hypothesis],
+    dimension: float,
+    noise_dof: float,
+) -> list[Ranked]:
+    """Score every hypothesis that adds something; physically possible ones, best first.
+
+    Parameters
+    ----------
+    base : Base
+        What is refitted first.
+    hypotheses : list of Hypothesis
+        The catalogue.
+    dimension : float
+        Independent chances of structure.
+    noise_dof : float
+        Degrees of freedom of the noise floor.
+    """
+    found = []
+    for hypothesis in hypotheses:
+        directions = base.directions(hypothesis.columns)
+        if directions.shape[1]:
+            gain = float(np.sum((directions.T @ base.residual) ** 2))
+            freedom = base.freedom - directions.shape[1]
+            remaining = lack_of_fit(base.energy - gain, freedom, noise_dof).energy
+            found.append((hypothesis, directions, gain, remaining))
+    if not found:
+        return []
+    scale = float(background(min(entry[3] for entry in found), dimension))
+    price = np.log(base.freedom)
+    ranked = [
+        Ranked(*entry, entry[2] / scale - entry[0].candidate.freedom * price) for entry in found
+    ]
+    ranked.sort(key=lambda each: -each.score)
+    return [each for each in ranked if possible(base, each.hypothesis, scale)]
+
+
+def chance_of_best(
+    base: Base, ranked: list[Ranked], n_components: int, order: Array, sign: Array
+) -> float:
+    """Probability that the best of all candidates looks this good by chance (max-statistic).
+
+    Parameters
+    ----------
+    base : Base
+        What is refitted first.
+    ranked : list of Ranked
+        The catalogue against this base, the one in question first.
+    n_components : int
+        Numbers per unit.
+    order, sign : arrays
+        From `rearrangements`.
+    """
+    directions = np.hstack([each.directions for each in ranked])
+    sizes = np.array([each.directions.shape[1] for each in ranked])
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    moved = rearranged(base.residual, n_components, order, sign)
+    moved -= base.basis @ (base.basis.T @ moved)
+    gains = np.add.reduceat((directions.T @ moved) ** 2, starts, axis=0)
+    energy = np.sum(moved**2, axis=0)
+    by_chance = _surprise(gains, energy, base.freedom, sizes[:, None]).max(axis=0)
+    own = _surprise(
+        np.array([[ranked[0].gain]]), np.array([base.energy]), base.freedom, sizes[:1, None]
+    )[0, 0]
+    return float((1 + np.sum(by_chance >= own)) / (1 + len(by_chance)))
+
+
+def _surprise(gain: Array, energy: Array, freedom: int, size: Array) -> Array:
+    """Minus log tail probability of a gain against the residual variance that it leaves."""
+    variance = np.maximum(energy - gain, 1e-12 * energy) / np.maximum(freedom - size, 1)
+    return -chi2.logsf(gain / variance, size)

@@ -1,0 +1,135 @@
+"""Blocks of neighbouring units: cross-validation and stability of a choice.
+
+All sums of squares come from one Gram matrix per block, so leaving blocks out or drawing them
+again costs nothing in the number of units.
+"""
+
+import numpy as np
+
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
+from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.projection import Base
+
+RIDGE = 1e-9
+"""Keeps a resample solvable in which a parameter is not seen."""
+
+
+def time_blocks(sessions: Array, wanted: int) -> Array:
+    """Cut the units into blocks of neighbours that never span two sessions, (n,)."""
+    blocks = np.empty(len(sessions), dtype=np.int64)
+    names = np.unique(sessions)
+    number = 0
+    for session in names:
+        places = np.flatnonzero(sessions == session)
+        share = max(1, round(wanted * len(places) / len(sessions)))
+        for piece in np.array_split(places, min(share, len(places))):
+            blocks[piece] = number
+            number += 1
+    return blocks
+
+
+class BlockGrams:
+    """Gram matrices per block of a base, some hypotheses and the observations.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Table and noise.
+    base : Base
+        What is refitted in every resample.
+    hypotheses : list of Hypothesis
+        Candidates for one more effect.
+    blocks : (n,) array
+        Block of each unit.
+    """
+
+    def __init__(
+        self, evidence: Evidence, base: Base, hypotheses: list[Hypothesis], blocks: Array
+    ) -> None:
+        beyond = [base.beyond(each.columns) for each in hypotheses]
+        stacked = np.hstack([base.basis, *beyond, base.residual[:, None]])
+        norm = np.linalg.norm(stacked, axis=0)
+        stacked = stacked / np.where(norm > 0, norm, 1.0)
+        unit = evidence.unit_of_row
+        self._grams = np.array(
+            [
+                stacked[np.isin(unit, np.flatnonzero(blocks == block))].T
+                @ stacked[np.isin(unit, np.flatnonzero(blocks == block))]
+                for block in np.unique(blocks)
+            ]
+        )
+        self._priors = stacked[unit < 0].T @ stacked[unit < 0]
+        sizes = [each.shape[1] for each in beyond]
+        starts = base.basis.shape[1] + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(int)
+        self._members = [np.arange(a, a + k) for a, k in zip(starts, sizes, strict=True)]
+        self._base = np.arange(base.basis.shape[1])
+        self._scale = float(norm[-1] ** 2)
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks."""
+        return len(self._grams)
+
+    def gains(self, weights: Array) -> Array:
+        """What each hypothesis explains beyond the base when blocks count so often, (h,).
+
+        Parameters
+        ----------
+        weights : (b,) array
+            How often each block was drawn.
+        """
+        gram = np.tensordot(weights, self._grams, axes=1) + self._priors
+        return np.array(
+            [
+                self._energy(gram, self._base) - self._energy(gram, self._with(member))
+                for member in self._members
+            ]
+        )
+
+    def heldout_gains(self) -> Array:
+        """What each hypothesis gains on every block when fitted to the others, (h, b)."""
+        total = self._grams.sum(axis=0) + self._priors
+        gains = np.empty((len(self._members), self.n_blocks))
+        for number, own in enumerate(self._grams):
+            plain = self._loss(total - own, own, self._base)
+            for which, member in enumerate(self._members):
+                gains[which, number] = plain - self._loss(total - own, own, self._with(member))
+        return gains
+
+    def _with(self, member: Array) -> Array:
+        return np.concatenate([self._base, member])
+
+    def _weights(self, gram: Array, columns: Array) -> Array:
+        system = gram[np.ix_(columns, columns)] + RIDGE * np.eye(len(columns))
+        return np.linalg.solve(system, gram[columns, -1])
+
+    def _energy(self, gram: Array, columns: Array) -> float:
+        return self._scale * float(gram[-1, -1] - gram[columns, -1] @ self._weights(gram, columns))
+
+    def _loss(self, training: Array, own: Array, columns: Array) -> float:
+        weights = self._weights(training, columns)
+        fit = own[np.ix_(columns, columns)] @ weights
+        loss = own[-1, -1] - 2 * weights @ own[columns, -1] + weights @ fit
+        return self._scale * float(loss)
+
+
+def stability(grams: BlockGrams, inside: Array, prices: Array, rng: np.random.Generator) -> float:
+    """Share of block resamples whose best candidate is one of a class.
+
+    Parameters
+    ----------
+    grams : BlockGrams
+        Blocks with all rivals.
+    inside : (h,) array of bool
+        Which hypotheses belong to the class.
+    prices : (h,) array
+        What each hypothesis costs, in sums of squares.
+    rng : numpy.random.Generator
+        Draws the blocks.
+    """
+    draws = rng.multinomial(grams.n_blocks, np.full(grams.n_blocks, 1 / grams.n_blocks), RESAMPLES)
+    chosen = [int(np.argmax(grams.gains(draw.astype(float)) - prices)) for draw in draws]
+    return float(np.mean(inside[chosen]))
+
+
+RESAMPLES = 50

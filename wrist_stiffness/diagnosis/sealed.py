@@ -1,0 +1,138 @@
+"""The sealed part: put aside before looking, opened once, after the last decision.
+
+Held out means another session where there is one: inside a session a badly excited parameter
+improves every cross-validation and fails the day after.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.diagnosis.estimates import joint_fit
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
+from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
+from wrist_stiffness.diagnosis.observations import Array, Observations, Quantity
+from wrist_stiffness.diagnosis.resampling import time_blocks
+
+JUDGES = 8
+"""Blocks of the sealed part from which the uncertainty of a gain is taken."""
+
+
+def sealed_units(observations: Observations, share: float) -> NDArray[np.bool_]:
+    """Which units are put aside: the last session, or the end of the only one, (n,)."""
+    sessions = observations.sessions
+    names = np.unique(sessions)
+    if len(names) > 1:
+        return sessions == names[-1]
+    n = observations.n_units
+    return np.arange(n) >= n - max(1, round(share * n))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Residuals of a model on units that it has not seen.
+
+    Parameters
+    ----------
+    residual : (n, m) array
+        In the units of the table; NaN = not measured.
+    white : (n m,) array
+        Whitened.
+    """
+
+    residual: Array
+    white: Array
+
+    def rmse(self, quantity: Quantity) -> float:
+        """Root mean square of the vector norm of a quantity."""
+        return float(np.sqrt(np.nanmean(self.squares(quantity)))) * quantity.per_si
+
+    def squares(self, quantity: Quantity) -> Array:
+        """Squared vector norm of each unit, (n,); NaN where a component was not measured."""
+        return np.sum(self.residual[:, list(quantity.components)] ** 2, axis=1)
+
+
+def held_out(
+    training: Evidence,
+    effects: list[Hypothesis],
+    sealed: Observations,
+    nuisances: tuple[Nuisance, ...],
+) -> HeldOut:
+    """Predict sealed units by a model fitted to the others.
+
+    What is set up anew in a session that the training has not seen (a registration) is refitted
+    there; everything else keeps its fitted value.
+
+    Parameters
+    ----------
+    training : Evidence
+        The units that the model was fitted to.
+    effects : list of Hypothesis
+        Effects in the model, evaluated on the training units.
+    sealed : Observations
+        Units put aside.
+    nuisances : tuple of Nuisance
+        The base.
+    """
+    base_parameters, effect_parameters = joint_fit(training, effects)
+    known = dict(zip(training.nuisance.keys, base_parameters, strict=True))
+    columns = nuisance_columns(sealed, nuisances)
+    prediction = np.zeros(sealed.values.shape)
+    for effect, parameters in zip(effects, effect_parameters, strict=True):
+        prediction += effect.candidate.evaluate(sealed, effect.shape) @ parameters
+    fresh = np.array([key not in known for key in columns.keys], dtype=bool)
+    carried = np.array([known.get(key, 0.0) for key in columns.keys])
+    prediction += columns.columns @ carried
+    residual = sealed.values - prediction
+    if fresh.any():
+        residual = residual - columns.columns[:, :, fresh] @ _refitted(
+            training, sealed, residual, columns.columns[:, :, fresh], columns.prior_std[fresh]
+        )
+    white = training.noise.whiten(sealed, residual[:, :, None])[:, 0]
+    return HeldOut(residual, white)
+
+
+def _refitted(
+    training: Evidence, sealed: Observations, residual: Array, columns: Array, prior_std: Array
+) -> Array:
+    white = training.noise.whiten(sealed, np.concatenate([columns, residual[:, :, None]], axis=2))
+    proper = np.isfinite(prior_std)
+    rows = np.vstack([white[:, :-1], np.diag(1 / prior_std)[proper]])
+    target = np.concatenate([white[:, -1], np.zeros(proper.sum())])
+    norm = np.linalg.norm(rows, axis=0)
+    norm = np.where(norm > 0, norm, 1.0)
+    return np.linalg.lstsq(rows / norm, target, rcond=1e-10)[0] / norm
+
+
+def refuted(before: HeldOut, after: HeldOut) -> bool:
+    """Whether an effect makes sealed units worse by more than chance explains.
+
+    The change f of the prediction gains 2 r f - f^2; with a right f its standard deviation is
+    2 |f|, so a loss beyond twice that is none of a right effect.
+    """
+    change = float(np.linalg.norm(before.white - after.white))
+    gain = float(before.white @ before.white - after.white @ after.white)
+    return gain < -4 * change
+
+
+def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, float]:
+    """Fall of the held-out error of a quantity and its standard uncertainty.
+
+    Parameters
+    ----------
+    before, after : HeldOut
+        Without and with the effect.
+    quantity : Quantity
+        What is told.
+    """
+    fall = before.squares(quantity) - after.squares(quantity)
+    measured = np.isfinite(fall)
+    if not measured.any():
+        return 0.0, 0.0
+    blocks = time_blocks(np.zeros(int(measured.sum()), dtype=np.int64), JUDGES)
+    means = np.array([fall[measured][blocks == block].mean() for block in np.unique(blocks)])
+    error = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
+    level = before.rmse(quantity) + after.rmse(quantity)
+    slope = quantity.per_si**2 / level if level > 0 else 0.0
+    return before.rmse(quantity) - after.rmse(quantity), float(error * slope)

@@ -1,0 +1,197 @@
+"""Which effects enter: forward while chance cannot explain the best, then only what must stay.
+
+Forward steps ask one question, is there anything: the best candidate against what the best of all
+candidates would show by chance.  What stays is decided at the end, with every rival in the model:
+an effect must stand out from the structure that is still unexplained, and a small one next to a
+large one must do more than mop up what the large one's law leaves.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import f
+
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, refined
+from wrist_stiffness.diagnosis.permutation import rearrangements
+from wrist_stiffness.diagnosis.projection import Base
+from wrist_stiffness.diagnosis.ranking import Ranked, chance_of_best, rank
+from wrist_stiffness.diagnosis.settings import Settings
+from wrist_stiffness.diagnosis.structure import lack_of_fit
+
+SWAP_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Entered:
+    """An effect in the model.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Effect and shape.
+    p_value : float
+        Probability that chance would have shown as much, when it entered.
+    """
+
+    hypothesis: Hypothesis
+    p_value: float
+
+    @property
+    def name(self) -> str:
+        """Effect and place."""
+        return self.hypothesis.candidate.name
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The model after the search.
+
+    Parameters
+    ----------
+    entered : tuple of Entered
+        In the order in which they entered.
+    chance : float
+        Probability that the last rejected candidate was chance.
+    dimension : float
+        Independent chances of structure.
+    """
+
+    entered: tuple[Entered, ...]
+    chance: float
+    dimension: float
+
+
+def base_with(base: Base, effects: tuple[Entered, ...]) -> Base:
+    """Return the base with effects in it."""
+    if not effects:
+        return base
+    return base.extended(np.hstack([each.hypothesis.columns for each in effects]))
+
+
+def select(
+    evidence: Evidence,
+    hypotheses: list[Hypothesis],
+    dimension: float,
+    settings: Settings,
+    rng: np.random.Generator,
+) -> Selection:
+    """Search the catalogue.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Table, noise and base.
+    hypotheses : list of Hypothesis
+        The catalogue at the points of its grids.
+    dimension : float
+        From `effective_dimension`.
+    settings : Settings
+        Thresholds.
+    rng : numpy.random.Generator
+        For the permutations.
+    """
+    noise_dof = evidence.noise.dof
+    entered: tuple[Entered, ...] = ()
+    chance = 1.0
+    while len(entered) < settings.most_findings:
+        base = base_with(evidence.base, entered)
+        free = _others(hypotheses, entered)
+        ranked = rank(base, free, dimension, noise_dof)
+        if not ranked:
+            break
+        order, sign = rearrangements(evidence.observations.sessions, settings.permutations, rng)
+        chance = chance_of_best(base, ranked, evidence.observations.n_components, order, sign)
+        if chance > settings.alpha:
+            break
+        best = refined(evidence, ranked[0].hypothesis, base)
+        entered = (*entered, Entered(best, chance))
+        entered = _swapped(evidence, hypotheses, entered, dimension)
+    return Selection(_pruned(evidence, hypotheses, entered, dimension, settings), chance, dimension)
+
+
+def rivals_of(
+    evidence: Evidence,
+    hypotheses: list[Hypothesis],
+    entered: tuple[Entered, ...],
+    which: int,
+    dimension: float,
+) -> list[Ranked]:
+    """Everything that could stand in the place of one effect, best first, itself included."""
+    others = entered[:which] + entered[which + 1 :]
+    base = base_with(evidence.base, others)
+    free = [*_others(hypotheses, others), entered[which].hypothesis]
+    return rank(base, free, dimension, evidence.noise.dof)
+
+
+def _others(hypotheses: list[Hypothesis], entered: tuple[Entered, ...]) -> list[Hypothesis]:
+    taken = {each.name for each in entered}
+    return [each for each in hypotheses if each.candidate.name not in taken]
+
+
+def _swapped(
+    evidence: Evidence,
+    hypotheses: list[Hypothesis],
+    entered: tuple[Entered, ...],
+    dimension: float,
+) -> tuple[Entered, ...]:
+    """Give every effect's place to the best candidate, now that the others are known."""
+    for _ in range(SWAP_ROUNDS):
+        before = [each.name for each in entered]
+        for which in range(len(entered)):
+            ranked = rivals_of(evidence, hypotheses, entered, which, dimension)
+            if ranked and ranked[0].hypothesis is not entered[which].hypothesis:
+                others = base_with(evidence.base, entered[:which] + entered[which + 1 :])
+                best = refined(evidence, ranked[0].hypothesis, others)
+                entered = (
+                    *entered[:which],
+                    replace(entered[which], hypothesis=best),
+                    *entered[which + 1 :],
+                )
+        if [each.name for each in entered] == before:
+            break
+    return entered
+
+
+def marginal_gains(base: Base, entered: tuple[Entered, ...]) -> list[tuple[float, int]]:
+    """What each effect explains beyond all the others, and with how many directions."""
+    gains = []
+    for which in range(len(entered)):
+        others = base_with(base, entered[:which] + entered[which + 1 :])
+        directions = others.directions(entered[which].hypothesis.columns)
+        gains.append((float(np.sum((directions.T @ others.residual) ** 2)), directions.shape[1]))
+    return gains
+
+
+def _pruned(
+    evidence: Evidence,
+    hypotheses: list[Hypothesis],
+    entered: tuple[Entered, ...],
+    dimension: float,
+    settings: Settings,
+) -> tuple[Entered, ...]:
+    """Drop the weakest effect until each one left has reason to stay."""
+    while entered:
+        full = base_with(evidence.base, entered)
+        remaining = lack_of_fit(full.energy, full.freedom, evidence.noise.dof).energy
+        gains = marginal_gains(evidence.base, entered)
+        explained = evidence.base.energy - full.energy
+        weak = [gain < settings.law_accuracy**2 * explained for gain, _ in gains]
+        weakest = int(np.argmin([gain for gain, _ in gains]))
+        gain, size = gains[weakest]
+        mops_up = weak[weakest] and (remaining > 0 or sum(weak) > 1)
+        if not mops_up and _stands_out(gain, size, remaining, dimension, settings):
+            break
+        entered = entered[:weakest] + entered[weakest + 1 :]
+        entered = _swapped(evidence, hypotheses, entered, dimension)
+    return entered
+
+
+def _stands_out(
+    gain: float, size: int, remaining: float, dimension: float, settings: Settings
+) -> bool:
+    """Whether a gain stands out from the structure that is left."""
+    if remaining == 0:
+        return True
+    spare = max(dimension - size, 2.0)
+    ratio = (gain / max(size, 1)) / (1 + remaining / spare)
+    return bool(f.sf(ratio, size, spare) < settings.alpha)

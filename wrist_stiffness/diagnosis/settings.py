@@ -1,0 +1,38 @@
+"""What a diagnosis decides by; every threshold in one place."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Thresholds.
+
+    Parameters
+    ----------
+    alpha : float
+        Probability with which pure noise may let any one effect of the catalogue in.
+    law_accuracy : float
+        Share of an effect's size by which its law may be wrong.  What is left of a large effect
+        within this share is no evidence for another one, unless that one explains all of it.
+    unexplained_share : float
+        Verdict ``unknown`` from this share of the initial excess over the noise.
+    sealed_share : float
+        Part of the units that is put aside before looking, where there is one session only.
+    blocks : int
+        Parts for cross-validation and resampling, cut along the time.
+    permutations : int
+        Random rearrangements of each permutation test.
+    most_findings : int
+        The search ends after so many effects.
+    outlier_limit : float
+        Distance from the rich model, in robust standard deviations, of a lost beam.
+    """
+
+    alpha: float = 0.005
+    law_accuracy: float = 0.05
+    unexplained_share: float = 0.10
+    sealed_share: float = 0.2
+    blocks: int = 10
+    permutations: int = 999
+    most_findings: int = 8
+    outlier_limit: float = 7.0

@@ -1,0 +1,80 @@
+"""How many independent chances structure has to look like something else.
+
+Above the noise floor the residual is no noise but the shape of a law that is missing or not quite
+right.  Such a shape has far fewer independent numbers than there are measurements, so evidence
+against it is counted in those: a candidate that merely resembles the shape explains a share of
+it, a right one explains it down to the floor.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, f
+
+from wrist_stiffness.diagnosis.hypotheses import Hypothesis
+from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.projection import Base
+
+
+def effective_dimension(base: Base, hypotheses: list[Hypothesis]) -> float:
+    """Participation ratio of the shapes that the catalogue can take beyond the base.
+
+    (sum of eigenvalues)^2 / (sum of their squares) of the Gram matrix of unit columns.
+    """
+    columns = np.hstack([base.directions(each.columns) for each in hypotheses])
+    if columns.shape[1] == 0:
+        return 1.0
+    gram = columns.T @ columns
+    return float(np.trace(gram) ** 2 / np.sum(gram**2))
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Sum of squares above what noise leaves.
+
+    Parameters
+    ----------
+    energy : float
+        Excess over the expected sum of squares; zero unless significant.
+    p_value : float
+        Probability of at least so much from noise alone.
+    """
+
+    energy: float
+    p_value: float
+
+
+LACK_OF_FIT_LEVEL = 0.005
+
+
+def lack_of_fit(energy: float, freedom: int, noise_dof: float) -> Excess:
+    """Compare a residual sum of squares with the noise floor.
+
+    Parameters
+    ----------
+    energy : float
+        Whitened sum of squares.
+    freedom : int
+        Its degrees of freedom.
+    noise_dof : float
+        Degrees of freedom of the floor itself; infinite = known.
+    """
+    if np.isinf(noise_dof):
+        p_value = float(chi2.sf(energy, freedom))
+    else:
+        p_value = float(f.sf(energy / freedom, freedom, noise_dof))
+    significant = p_value < LACK_OF_FIT_LEVEL
+    return Excess(max(0.0, energy - freedom) if significant else 0.0, p_value)
+
+
+def background(remaining: Array | float, dimension: float) -> Array:
+    """Variance against which a gain is judged: noise (1) plus remaining structure per dimension.
+
+    Parameters
+    ----------
+    remaining : (...,) array
+        Excess sum of squares that would be left with the candidate in the model.
+    dimension : float
+        From `effective_dimension`.
+    """
+    return 1 + np.maximum(remaining, 0.0) / dimension
