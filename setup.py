@@ -8,7 +8,7 @@ from setuptools import find_packages, setup
 NAME = "wrist_stiffness"
 HERE = Path(__file__).parent
 VERSION = re.findall(r'__version__ = "(.+)"', (HERE / NAME / "__init__.py").read_text())[0]
-NODES = ("pose_error_predictor", "angle_corrector", "cell_simulator")
+NODES = ("pose_error_predictor", "angle_corrector", "model_monitor", "cell_simulator")
 
 
 def shared(pattern: str) -> tuple[str, list[str]]:

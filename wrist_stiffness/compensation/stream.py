@@ -28,7 +28,17 @@ from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
 
 
-class _Stream:
+class Stream:
+    """What all streams share: a model, the loads and the settings.
+
+    Parameters
+    ----------
+    model : ErrorModel or None
+        May be replaced between samples.
+    settings : StreamSettings
+        Names, frames, limits.
+    """
+
     def __init__(self, model: ErrorModel | None, settings: StreamSettings) -> None:
         self.model = model
         self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)
@@ -72,7 +82,7 @@ class PredictedSample:
     prediction: Prediction
 
 
-class PredictionStream(_Stream):
+class PredictionStream(Stream):
     """Pose error for every joint state.
 
     Parameters
@@ -154,7 +164,7 @@ class CorrectedTrajectory:
     fault: WristError | None
 
 
-class CorrectionStream(_Stream):
+class CorrectionStream(Stream):
     """Corrected motor angles for every command; never worse than no correction.
 
     Parameters

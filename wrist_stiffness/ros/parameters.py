@@ -9,6 +9,8 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.node import Node
 
+from wrist_stiffness.errors import InputError
+
 ParameterValue = bool | int | float | str
 
 
@@ -75,3 +77,18 @@ def declare(node: Node, entries: Sequence[ParameterEntry]) -> None:
 def values_of(node: Node, entries: Sequence[ParameterEntry]) -> Mapping[str, Any]:
     """Return the present values by name."""
     return {entry.name: node.get_parameter(entry.name).value for entry in entries}
+
+
+def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) -> None:
+    """Refuse a text that is not among its choices, which ROS itself cannot check.
+
+    Raises
+    ------
+    InputError
+        With the parameter, its value and the choices.
+    """
+    for entry in entries:
+        if entry.choices and values[entry.name] not in entry.choices:
+            raise InputError(
+                f"{entry.name}: {values[entry.name]!r} is not one of {', '.join(entry.choices)}"
+            )

@@ -13,6 +13,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording import RecordingWriter, topics
 from wrist_stiffness.recording.channel import Channel, channel_of
 from wrist_stiffness.recording.messages import (
+    Bool,
     DiagnosticArray,
     Float64,
     Float64MultiArray,
@@ -59,6 +60,8 @@ TOPICS: dict[str, type[Message]] = {
     "/motor_positions_corrected": Float64MultiArray,
     "/motor_trajectory_corrected": JointTrajectory,
     "/pose_error_residual": PoseWithCovarianceStamped,
+    "/model_residual": PoseWithCovarianceStamped,
+    "/model_alarm": Bool,
     "/diagnostics": DiagnosticArray,
     topics.JOINT_STATES: JointState,
 }

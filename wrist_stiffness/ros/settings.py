@@ -8,14 +8,17 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
 from wrist_stiffness.compensation.intake import MotorNames
+from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.ros.parameters import ParameterEntry
+from wrist_stiffness.ros.parameters import ParameterEntry, check_choices
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED_MODEL = "config/palmieri2015_model.yaml"
@@ -107,6 +110,64 @@ CORRECTION = (
     ),
 )
 
+POSE_TYPES = ("PoseStamped", "PoseWithCovarianceStamped")
+
+MONITOR = (
+    ParameterEntry(
+        "pose_type",
+        POSE_TYPES[0],
+        "message type of /platform_pose_measured",
+        choices=POSE_TYPES,
+        fixed=True,
+    ),
+    ParameterEntry(
+        "noise_s_um",
+        1.0,
+        "standard deviation of a measured coordinate [um]",
+        lower=0.001,
+        upper=1e6,
+        fixed=True,
+    ),
+    ParameterEntry(
+        "noise_phi_mdeg",
+        2.0,
+        "standard deviation of a measured angle [mdeg]",
+        lower=0.001,
+        upper=1e6,
+        fixed=True,
+    ),
+    ParameterEntry(
+        "joint_age_limit_s",
+        0.02,
+        "oldest joint state that is matched with a pose [s]",
+        lower=0.0,
+        upper=10.0,
+        fixed=True,
+    ),
+    ParameterEntry("baseline_samples", 500, "poses from which the baseline is learned", fixed=True),
+    ParameterEntry(
+        "alarm_threshold",
+        15.0,
+        "sum of deviations at which there is an alarm [standard deviations]",
+        lower=1.0,
+        upper=1e6,
+        fixed=True,
+    ),
+)
+
+
+def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
+    """Return what counts as a change, from the parameters `MONITOR` by name.
+
+    Raises
+    ------
+    InputError
+        If a text is not among its choices.
+    """
+    check_choices(MONITOR, values)
+    noise = np.repeat([1e-6 * values["noise_s_um"], radians(1e-3 * values["noise_phi_mdeg"])], 3)
+    return MonitorSettings(noise, values["baseline_samples"], threshold=values["alarm_threshold"])
+
 
 def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     """Return the settings of the sample path of a node that does not correct.
@@ -153,11 +214,7 @@ def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
     InputError
         As `stream_settings`, and if a text is not among its choices.
     """
-    for entry in CORRECTION:
-        if entry.choices and values[entry.name] not in entry.choices:
-            raise InputError(
-                f"{entry.name}: {values[entry.name]!r} is not one of {', '.join(entry.choices)}"
-            )
+    check_choices(CORRECTION, values)
     return replace(
         stream_settings(values),
         objective=values["objective"],

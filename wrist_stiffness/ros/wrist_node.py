@@ -18,7 +18,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
@@ -54,7 +54,7 @@ class WristNode(LifecycleNode):
         If a parameter has another type or is out of range.
     """
 
-    stream: PredictionStream | CorrectionStream
+    stream: Stream
 
     def __init__(self, name: str, entries: Sequence[ParameterEntry], **options: Any) -> None:
         super().__init__(name, **options)
@@ -73,7 +73,7 @@ class WristNode(LifecycleNode):
             REPORT_EVERY_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
-    def make_stream(self, settings: StreamSettings) -> PredictionStream | CorrectionStream:
+    def make_stream(self, settings: StreamSettings) -> Stream:
         """Return the node's stream, without a model."""
         raise NotImplementedError
 

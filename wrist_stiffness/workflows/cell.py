@@ -87,8 +87,8 @@ def run_cell(
         output = {"output": str(Path(record).resolve()), "begin_with": heard}
         nodes.append(RECORDER_NODE.having(output))
     moves: dict[str, ParameterValue] = {"rate_hz": float(rate_hz), "seed": seed}
-    # The predictor listens to the joint states, and so does the recorder.
-    moves["listeners"] = 1 if record is None else 2
+    # Predictor and monitor listen to the joint states, and so does the recorder.
+    moves["listeners"] = 2 if record is None else 3
     if seconds is not None:
         moves |= {"program_s": seconds / 2.0, "programs": 2, "enable_at_repeat": True}
     with _processes([*nodes, SIMULATOR_NODE.having({**chosen, **moves})]) as running:

@@ -47,7 +47,8 @@ class NodeEntry:
 
 
 WRIST_NODES = tuple(
-    NodeEntry(executable=name, name=name) for name in ("pose_error_predictor", "angle_corrector")
+    NodeEntry(executable=name, name=name)
+    for name in ("pose_error_predictor", "angle_corrector", "model_monitor")
 )
 """The nodes beside a real wrist."""
 

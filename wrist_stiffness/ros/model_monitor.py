@@ -1,0 +1,125 @@
+"""Node `model_monitor`: measured against predicted pose, and an alarm when that changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Header
+
+from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED, MonitorStream
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import WristError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.ros.conversions import error_message, nanoseconds
+from wrist_stiffness.ros.parameters import values_of
+from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.settings import MONITOR, POSE_TYPES, monitor_settings
+from wrist_stiffness.ros.wrist_node import WristNode
+
+
+class ModelMonitor(WristNode):
+    """Publishes `/model_residual` and `/model_alarm` for every measured pose."""
+
+    stream: MonitorStream
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("model_monitor", MONITOR, **options)
+        self.autostart()
+
+    def make_stream(self, settings: StreamSettings) -> MonitorStream:
+        """Return the monitor's stream."""
+        values = values_of(self, MONITOR)
+        return MonitorStream(None, settings, monitor_settings(values), values["joint_age_limit_s"])
+
+    def facts(self) -> dict[str, str]:
+        """Return the residuals' statistics."""
+        monitor = self.stream.monitor
+        s_um, phi_mdeg = 1e6 * monitor.rms[:3], 1e3 * np.degrees(monitor.rms[3:])
+        return {
+            "residuals": str(monitor.count),
+            "baseline": "being learned" if monitor.learning else "learned",
+            "rms s [um]": f"{np.linalg.norm(s_um):.3f}",
+            "rms phi [mdeg]": f"{np.linalg.norm(phi_mdeg):.3f}",
+            "rms over expected noise": "" if monitor.learning else f"{monitor.ratio:.3f}",
+            "alarm": str(monitor.alarm).lower(),
+        }
+
+    def restriction(self) -> str:
+        """Return the alarm."""
+        return "the residuals have changed" if self.stream.monitor.alarm else ""
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the outputs and load the model."""
+        self._residual = self.create_lifecycle_publisher(
+            PoseWithCovarianceStamped, "/model_residual", RELIABLE_QOS
+        )
+        self._alarm = self.create_lifecycle_publisher(Bool, "/model_alarm", RELIABLE_QOS)
+        return super().on_configure(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Remove the outputs."""
+        for publisher in (self._residual, self._alarm):
+            self.destroy_lifecycle_publisher(publisher)
+        return super().on_cleanup(state)
+
+    def make_inputs(self) -> list[Subscription]:
+        """Listen to the motors and to the pose sensor; a topic can only have one type."""
+        pose: tuple[type, Callable[[Any], None]] = (PoseStamped, self._on_pose)
+        if self.get_parameter("pose_type").value == POSE_TYPES[1]:
+            pose = (PoseWithCovarianceStamped, self._on_pose_with_covariance)
+        return [
+            self.create_subscription(JointState, "/joint_states", self._on_joints, SENSOR_QOS),
+            self.create_subscription(pose[0], "/platform_pose_measured", pose[1], SENSOR_QOS),
+        ]
+
+    def _on_joints(self, message: JointState) -> None:
+        try:
+            self.stream.on_joint_state(
+                nanoseconds(message.header.stamp), message.name, message.position
+            )
+        except WristError as error:
+            self.warn(error)
+
+    def _on_pose(self, message: PoseStamped) -> None:
+        self._judge(message.header, message.pose, None)
+
+    def _on_pose_with_covariance(self, message: PoseWithCovarianceStamped) -> None:
+        variance = np.reshape(message.pose.covariance, (6, 6)).diagonal()
+        self._judge(message.header, message.pose.pose, variance)
+
+    def _judge(self, header: Header, pose: Pose, variance: Array | None) -> None:
+        stamp_ns = nanoseconds(header.stamp)
+        place, turn = pose.position, pose.orientation
+        try:
+            judged = self.stream.on_pose(
+                stamp_ns,
+                header.frame_id,
+                (place.x, place.y, place.z),
+                (turn.x, turn.y, turn.z, turn.w),
+                variance,
+            )
+        except WristError as error:
+            self.warn(error)
+            return
+        # What is not measured is sent as zero with a huge variance: poses cannot carry a NaN.
+        residual = np.nan_to_num(judged.residual)
+        covariance = judged.covariance + np.diag(NOT_MEASURED * np.isnan(judged.residual))
+        self._residual.publish(error_message(stamp_ns, residual, covariance))
+        self._alarm.publish(Bool(data=self.stream.monitor.alarm))
+        self.health.good()
+
+
+def main() -> int:
+    """Run the node."""
+    return run(ModelMonitor)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
