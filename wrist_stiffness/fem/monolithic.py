@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
-from wrist_stiffness.fem.wrist_model import SCREWS, PlacedBody, WristAtPose
+from wrist_stiffness.fem.wrist_model import SCREWS, PlacedBody, WristAtPose, platform_weight
 from wrist_stiffness.mechanism.components import Array
 
 
@@ -79,7 +79,7 @@ def solve_pose(
     disturbance = disturbance or Disturbance()
     imposed = [_imposed(model, part, disturbance) for part in model.placed]
     load = np.zeros(model.openings.shape[1])
-    load[model.platform_columns] += wrench + _platform_weight(model, disturbance.gravity)
+    load[model.platform_columns] += wrench + platform_weight(model, disturbance.gravity)
     for part, follow, displacement in zip(model.placed, model.follow, imposed, strict=True):
         nodal = _nodal_loads(part, disturbance) - part.stiffness @ displacement
         load += follow.T @ nodal
@@ -132,10 +132,3 @@ def _nodal_loads(part: PlacedBody, disturbance: Disturbance) -> Array:
         rise = disturbance.warming[part.name]
         load = load + rise * thermal_load(part.body.mesh, part.body.solid.material)
     return np.asarray(part.turn @ load)
-
-
-def _platform_weight(model: WristAtPose, gravity: Array) -> Array:
-    platform = model.wrist.geometry.platform
-    place = model.configuration.rotations["platform"] @ platform.centre_of_gravity
-    force = platform.mass * gravity
-    return np.concatenate([force, np.cross(place, force)])

@@ -195,6 +195,14 @@ def factor_pose(wrist: WristBodies, configuration: Configuration) -> WristAtPose
     return WristAtPose(wrist, configuration, placed, follow, factor, openings, gaps)
 
 
+def platform_weight(model: WristAtPose, gravity: Array) -> Array:
+    """Weight of the platform as a wrench at O in F (6,) [N, N m]."""
+    platform = model.wrist.geometry.platform
+    place = model.configuration.rotations["platform"] @ platform.centre_of_gravity
+    force = platform.mass * gravity
+    return np.concatenate([force, np.cross(place, force)])
+
+
 def _frame_screw(frame: str) -> Array:
     screw = np.zeros((6, SCREWS))
     start = 6 * FRAMES.index(frame)

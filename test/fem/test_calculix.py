@@ -1,0 +1,72 @@
+"""The whole wrist against CalculiX, a solver that nobody here wrote."""
+
+import math
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.fem.calculix import run_deck, write_deck
+from wrist_stiffness.fem.monolithic import Disturbance, solve_pose
+from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
+from wrist_stiffness.mechanism.geometry_file import mechanism_of
+
+AGREEMENT = 1e-4
+"""CalculiX prints seven digits; own weight is integrated differently in curved elements."""
+
+LOAD = np.array([1.0, -2.0, 1.5, 0.02, 0.01, -0.03])
+GRAVITY = np.array([3.0, -2.0, -9.0])
+
+needs_ccx = pytest.mark.skipif(
+    shutil.which("ccx") is None, reason="needs CalculiX: apt-get install calculix-ccx"
+)
+
+
+@pytest.fixture(scope="module")
+def model(make_wrist, coarse):
+    wrist = make_wrist(gap=2e-6, skew=0.15)
+    pose = mechanism_of(wrist).forward([0.3, -0.2])
+    return factor_pose(build_wrist(wrist, coarse), pose)
+
+
+@needs_ccx
+@pytest.mark.slow
+@pytest.mark.parametrize("state", ["open", "in contact"])
+def test_calculix_agrees(model, tmp_path, state):
+    if state == "open":
+        model = replace(model, gaps=np.full_like(model.gaps, 1.0))
+    solution = solve_pose(model, LOAD, Disturbance(gravity=GRAVITY))
+    closed = solution.forces > 0.0
+    assert closed.any() == (state == "in contact")
+    deck = tmp_path / "pose.inp"
+    write_deck(model, deck, LOAD, GRAVITY, closed)
+    twist = run_deck(deck)
+    for half in (slice(0, 3), slice(3, 6)):
+        miss = np.linalg.norm(twist[half] - solution.twist[half])
+        assert miss < AGREEMENT * np.linalg.norm(solution.twist[half])
+
+
+@needs_ccx
+def test_a_failing_job_is_one_clear_line(tmp_path):
+    deck = tmp_path / "broken.inp"
+    deck.write_text("*NODE\n1,0.,0.,0.\n*STEP\n*STATIC\n*END STEP\n")
+    with pytest.raises(InputError, match=r"broken\.(inp|dat)"):
+        run_deck(deck)
+
+
+def test_a_missing_solver_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match="calculix-ccx"):
+        run_deck(tmp_path / "pose.inp")
+
+
+def test_no_number_is_longer_than_calculix_reads(model, tmp_path):
+    """CalculiX drops what follows the twentieth character of a number without a word."""
+    deck = tmp_path / "pose.inp"
+    write_deck(model, deck, LOAD, GRAVITY, np.ones(len(model.gaps), dtype=bool))
+    lines = [line for line in deck.read_text().splitlines() if not line.startswith("*")]
+    assert max(len(item) for line in lines for item in line.split(",")) <= 20
+    assert max(map(len, lines)) <= 132
+    assert math.isclose(float(lines[0].split(",")[1]), model.placed[0].nodes[0, 0] * 1e3)

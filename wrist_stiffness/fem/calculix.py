@@ -1,0 +1,251 @@
+"""A pose of the whole wrist as a CalculiX job: a solver that nobody here wrote.
+
+Rigid frames, slides and the contact sectors found closed are linear equations of the deck; own
+weight is CalculiX's own.  Units of the deck: N, mm, t, s.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.fem.elasticity import rigid_motion
+from wrist_stiffness.fem.wrist_model import FRAMES, SCREWS, WristAtPose, platform_weight
+from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
+
+MILLIMETRES = 1e3
+TONNES = 1e-3
+"""Of a kilogram."""
+
+MEGAPASCALS = 1e-6
+
+NEGLIGIBLE = 1e-13
+"""Coefficients of an equation below this are rounding."""
+
+TIME_LIMIT_S = 1800.0
+
+
+def write_deck(
+    model: WristAtPose,
+    path: Path,
+    wrench: Array,
+    gravity: Array,
+    closed: NDArray[np.bool_],
+) -> None:
+    """Write the CalculiX deck of a pose.
+
+    Parameters
+    ----------
+    model : WristAtPose
+        The pose.
+    path : Path
+        The deck, `*.inp`.
+    wrench : (6,) float
+        On the platform at O in F [N, N m].
+    gravity : (3,) float
+        Acceleration field in F [m/s^2].
+    closed : (m,) bool
+        Flange sectors in contact; their gaps are held at zero.
+    """
+    partial = path.with_suffix(".partial")
+    with partial.open("w") as deck:
+        deck.writelines(line + "\n" for line in _deck(model, wrench, gravity, closed))
+    os.replace(partial, path)
+
+
+def run_deck(path: Path) -> Array:
+    """Run CalculiX on a deck of `write_deck` and read the platform's twist.
+
+    Parameters
+    ----------
+    path : Path
+        The deck, `*.inp`; results are written beside it.
+
+    Returns
+    -------
+    (6,) float
+        Twist of the platform at O in F [m, rad].
+
+    Raises
+    ------
+    InputError
+        If `ccx` is not installed or ends with an error.
+    """
+    solver = shutil.which("ccx")
+    if solver is None:
+        raise InputError("the solver ccx is not installed (Debian package calculix-ccx)")
+    job = subprocess.run(
+        [solver, "-i", path.stem],
+        cwd=path.parent,
+        capture_output=True,
+        text=True,
+        timeout=TIME_LIMIT_S,
+        check=False,
+    )
+    results = path.with_suffix(".dat")
+    if job.returncode != 0 or not results.is_file():
+        last = [line for line in job.stdout.splitlines() if line.strip()][-1:]
+        raise InputError(f"ccx failed on {path.name}: {' '.join(last).strip()}")
+    rows = [line.split() for line in results.read_text().splitlines()]
+    moved = {int(row[0]): row[1:] for row in rows if len(row) == 4 and row[0].isdigit()}
+    if len(moved) != 2:
+        raise InputError(f"ccx wrote no platform displacement into {results.name}")
+    shift, turn = (np.array(moved[node], dtype=float) for node in sorted(moved))
+    return np.concatenate([shift / MILLIMETRES, turn])
+
+
+def _deck(
+    model: WristAtPose, wrench: Array, gravity: Array, closed: NDArray[np.bool_]
+) -> Iterator[str]:
+    counts = [len(part.nodes) for part in model.placed]
+    first = 1 + np.concatenate([[0], np.cumsum(counts)])
+    # Two nodes per frame (shift at O, turn), one per passive joint (slide, turn), one per sector
+    # (its gap): nodes of no element, whose degrees of freedom the equations give a meaning.
+    own = int(first[-1])
+    columns = _columns(model, first, own)
+    gap_node = own + 2 * len(FRAMES) + len(PASSIVE_JOINTS)
+    platform = own + 2 * FRAMES.index("platform")
+
+    yield "*NODE, NSET=ALL"
+    for part, start in zip(model.placed, first, strict=False):
+        for number, place in enumerate(part.nodes * MILLIMETRES, int(start)):
+            yield f"{number}," + ",".join(map(_number, place))
+    for number in range(own, gap_node + len(closed)):
+        yield f"{number},0.,0.,0."
+    yield from _elements(model, first)
+    yield from _wall_equations(model, first, own)
+    yield "*BOUNDARY"
+    for part, start in zip(model.placed, first, strict=False):
+        if part.name in ("joint_1", "joint_5"):
+            yield from (f"{int(start) + node},1,3" for node in np.unique(part.motor_wall // 3))
+    yield from (f"{gap_node - len(PASSIVE_JOINTS) + k},3" for k in range(len(PASSIVE_JOINTS)))
+    yield from (f"{gap_node + sector},2,3" for sector in range(len(closed)))
+    yield from (f"{gap_node + sector},1" for sector in np.flatnonzero(~closed))
+    yield from _contact_equations(model, columns, gap_node, closed)
+    yield "*NSET, NSET=PLATFORM"
+    yield f"{platform},{platform + 1}"
+    yield "*STEP"
+    yield "*STATIC"
+    for sector in np.flatnonzero(closed):
+        yield "*BOUNDARY"
+        yield f"{gap_node + sector},1,1,{_number(-MILLIMETRES * model.gaps[sector])}"
+    yield "*CLOAD"
+    load = (wrench + platform_weight(model, gravity)) * np.repeat([1.0, MILLIMETRES], 3)
+    for k, value in enumerate(load):
+        yield f"{platform + k // 3},{k % 3 + 1},{_number(value)}"
+    size = float(np.linalg.norm(gravity))
+    if size > 0.0:
+        direction = ",".join(map(_number, gravity / size))
+        yield "*DLOAD"
+        yield from (
+            f"{part.name.upper()},GRAV,{_number(MILLIMETRES * size)},{direction}"
+            for part in model.placed
+        )
+    yield "*NODE PRINT, NSET=PLATFORM"
+    yield "U"
+    yield "*END STEP"
+
+
+def _elements(model: WristAtPose, first: NDArray[np.int64]) -> Iterator[str]:
+    start_element = 1
+    for part, start in zip(model.placed, first, strict=False):
+        elements = _right_handed(part.nodes, part.body.mesh.elements)
+        yield f"*ELEMENT, TYPE=C3D10, ELSET={part.name.upper()}"
+        for number, nodes in enumerate(elements + int(start), start_element):
+            yield f"{number}," + ",".join(map(str, nodes))
+        start_element += len(elements)
+        material = part.body.solid.material
+        yield f"*MATERIAL, NAME=M_{part.name.upper()}"
+        yield "*ELASTIC"
+        yield f"{_number(material.young * MEGAPASCALS)},{_number(material.poisson)}"
+        yield "*DENSITY"
+        yield _number(material.density * TONNES / MILLIMETRES**3)
+        yield f"*SOLID SECTION, ELSET={part.name.upper()}, MATERIAL=M_{part.name.upper()}"
+
+
+def _right_handed(nodes: Array, elements: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Swap two corners, and the middles with them, where a tetrahedron is left-handed."""
+    edges = nodes[elements[:, 1:4]] - nodes[elements[:, :1]]
+    mirrored = elements[:, [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]]
+    return np.where((np.linalg.det(edges) < 0.0)[:, None], mirrored, elements)
+
+
+def _wall_equations(model: WristAtPose, first: NDArray[np.int64], own: int) -> Iterator[str]:
+    """Every node of a moving wall follows the frames: u - sum of coefficients x unknowns = 0."""
+    for part, start in zip(model.placed, first, strict=False):
+        motion = rigid_motion(part.nodes * MILLIMETRES)
+        for wall, screw in (
+            (part.motor_wall, part.motor_screw),
+            (part.platform_wall, part.platform_screw),
+        ):
+            for unknown, row in zip(wall, motion[wall] @ screw, strict=True):
+                masters = np.flatnonzero(np.abs(row) > NEGLIGIBLE)
+                if len(masters) == 0:
+                    continue
+                terms = [(int(start) + unknown // 3, unknown % 3 + 1, 1.0)]
+                terms += [(*_screw_dof(own, int(k)), -row[k]) for k in masters]
+                yield from _equation(terms)
+
+
+def _contact_equations(
+    model: WristAtPose, columns: NDArray[np.int64], gap_node: int, closed: NDArray[np.bool_]
+) -> Iterator[str]:
+    """Mean displacement of a closed sector against the hub = dof 1 of its gap node."""
+    openings = model.openings.tocsr()
+    inner = openings.shape[1] - SCREWS
+    shared = np.bincount(openings.indices, minlength=openings.shape[1])
+    for sector in np.flatnonzero(closed):
+        row = openings[sector].tocoo()
+        coefficients = row.data.copy()
+        # Rows are per metre and radian; the deck's shifts are in millimetres.
+        turns = (row.col >= inner) & (columns[row.col, 2] == 1)
+        coefficients[turns] *= MILLIMETRES
+        order = np.argsort(-np.abs(coefficients) * ((row.col < inner) & (shared[row.col] == 1)))
+        terms = [
+            (int(columns[row.col[k], 0]), int(columns[row.col[k], 1]), coefficients[k])
+            for k in order
+            if abs(coefficients[k]) > NEGLIGIBLE
+        ]
+        yield from _equation([*terms, (gap_node + int(sector), 1, -1.0)])
+
+
+def _columns(model: WristAtPose, first: NDArray[np.int64], own: int) -> NDArray[np.int64]:
+    """Node, direction and whether it is a turn, for each unknown of the model (u, 3)."""
+    count = model.openings.shape[1]
+    table = np.zeros((count, 3), dtype=np.int64)
+    for follow, start in zip(model.follow, first, strict=False):
+        of_nodes = follow[:, : count - SCREWS].tocoo()
+        table[of_nodes.col, 0] = start + of_nodes.row // 3
+        table[of_nodes.col, 1] = of_nodes.row % 3 + 1
+    for k in range(SCREWS):
+        in_frame = k < 6 * len(FRAMES)
+        is_turn = k // 3 % 2 if in_frame else (k - 6 * len(FRAMES)) % 2
+        table[count - SCREWS + k] = (*_screw_dof(own, k), is_turn)
+    return table
+
+
+def _screw_dof(own: int, k: int) -> tuple[int, int]:
+    """Node and direction that stand for one of the frames' and joints' unknowns."""
+    if k < 6 * len(FRAMES):
+        return own + k // 3, k % 3 + 1
+    k -= 6 * len(FRAMES)
+    return own + 2 * len(FRAMES) + k // 2, k % 2 + 1
+
+
+def _equation(terms: list[tuple[int, int, float]]) -> Iterator[str]:
+    yield "*EQUATION"
+    yield f"{len(terms)}"
+    for start in range(0, len(terms), 4):
+        yield ",".join(f"{node},{way},{_number(c)}" for node, way, c in terms[start : start + 4])
+
+
+def _number(value: float) -> str:
+    """Write a number as CalculiX can read it: it ignores what follows the twentieth character."""
+    return f"{value:.12e}"
