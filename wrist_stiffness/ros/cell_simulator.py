@@ -107,7 +107,9 @@ class CellSimulator(Node):
             listeners = self.count_subscribers("/joint_states")
             if listeners < self.get_parameter("listeners").value:
                 return False
-            if self._enable_at_repeat and not self._enable.service_is_ready():
+            if self._enable_at_repeat and not (
+                self._enable.service_is_ready() and self.count_subscribers("/motor_commands")
+            ):
                 return False
             self._start_ns = self.get_clock().now().nanoseconds
         return True
