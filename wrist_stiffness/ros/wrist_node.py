@@ -11,6 +11,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -65,7 +66,13 @@ class WristNode(LifecycleNode):
         self._model_fault = "no model is loaded"
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._use_parameters)
-        self.create_service(Trigger, "~/reload_model", self._on_reload)
+        # Of a group of its own: while it waits for the model, no other callback of its group runs.
+        self.create_service(
+            Trigger,
+            "~/reload_model",
+            self._on_reload,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
         self.create_service(Trigger, "~/tare", self._on_tare)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", RELIABLE_QOS)
         # Not the node's clock: a simulated one may stand still.
