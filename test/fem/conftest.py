@@ -91,7 +91,7 @@ def wrist(gap: float | None = 20e-6, skew: float = 0.0) -> Geometry:
             mass=0.0212,
             centre_of_gravity=np.array([1e-3, -2e-3, -15e-3]),
             tool_point=np.array([0.0, 0.0, -18e-3]),
-            readout_points=np.eye(3) * 20e-3,
+            readout_points=np.vstack([np.eye(3), np.zeros(3)]) * 20e-3,
         ),
         limits=Limits(
             joint_lower=np.full(2, -1.0),
