@@ -126,7 +126,7 @@ effects: []
     [
         ("schema: 1", "schema: 7", "7 is not 1"),
         ("name: x\n", "", "name is missing"),
-        ("effects: []", "effects: [{effect: creep}]", "knows no effects"),
+        ("effects: []", "effects: [{effect: creep}]", "component is missing"),
         ("effects: []", "effects: []\nfoo: 1", "foo"),
         ("effects: []", "effects: []\nevaluation: magic", "'magic' is not one of"),
         ("{path: TABLE}", "{path: TABLE, checksum: abc}", "was made for abc"),

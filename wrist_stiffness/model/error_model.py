@@ -3,38 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Evaluation, Table
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.model.block import Block, Load, Sample
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.evaluation import Memory, evaluate, parameter_twists
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.situation import lengths
 
-
-@dataclass(frozen=True)
-class Load:
-    """Wrench on the platform at O, fixed in F or turning with the platform.
-
-    Parameters
-    ----------
-    wrench : (6,) float
-        Force and moment at O [N, N m].
-    on_platform : bool
-        True if the components are in U (`wrist_platform`), else in F (`wrist_base`).
-    """
-
-    wrench: Array
-    on_platform: bool = False
-
-    def in_base(self, configuration: Configuration) -> Array:
-        """Return the wrench in F at a configuration, (6,) [N, N m]."""
-        if not self.on_platform:
-            return self.wrench
-        return block_diagonal(configuration.platform) @ self.wrench
+CHUNK = 2048
+"""Samples evaluated at a time: about 150 MB of operators with 24 flange sectors."""
 
 
 @dataclass(frozen=True)
@@ -46,17 +34,23 @@ class Prediction:
     twist : (6,) float
         At O in F, own weight included [m, rad].
     covariance : (6, 6) float
-        Of the twist, from the table's stated error and the encoder step.
+        Of the twist, from the table's stated error, the encoder step and the effects' parameters.
     configuration : Configuration
         The rigid wrist.
     active : (m,) bool
         Flange sectors in contact.
+    measured : (6,) float
+        What the pose sensor would say of the twist; the same without effects of the sensor.
+    warnings : tuple of str
+        Effects that were left out or have left first order.
     """
 
     twist: Array
     covariance: Array
     configuration: Configuration
     active: NDArray[np.bool_]
+    measured: Array
+    warnings: tuple[str, ...] = ()
 
     @property
     def motion(self) -> tuple[Array, Array]:
@@ -75,6 +69,29 @@ class Prediction:
 
 
 @dataclass(frozen=True)
+class BlockPrediction:
+    """Predicted pose errors of n samples.
+
+    Parameters
+    ----------
+    twist : (n, 6) float
+        At O in F, own weight included [m, rad]; NaN where refused.
+    measured : (n, 6) float
+        What the pose sensor would say [m, rad].
+    accepted : (n,) bool
+        False where a sample is outside the table's domain or load range or not finite; the effects'
+        memory passes over such samples as a node does.
+    warnings : tuple of str
+        Each once.
+    """
+
+    twist: Array
+    measured: Array
+    accepted: NDArray[np.bool_]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class ErrorModel:
     """A table and the effects that were added to it.
 
@@ -86,20 +103,62 @@ class ErrorModel:
         Elastic lookup of the wrist.
     evaluation : str
         `closed_form` or `spline`.
+    effects : tuple of Effect
+        In the order in which they entered.
+    table_file : path, optional
+        Where the table was read.
+    lineage : tuple of Step
+        How the model came about, oldest first.
+
+    Raises
+    ------
+    InputError
+        If an effect is there twice, or changes the elastic parts of which a spline knows nothing.
     """
 
     name: str
     table: Table
     evaluation: Evaluation
+    effects: tuple[Effect, ...] = ()
+    table_file: Path | None = None
+    lineage: tuple[Step, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that the effects go together and with the evaluation."""
+        names = [effect.name for effect in self.effects]
+        for effect in self.effects:
+            if names.count(effect.name) > 1:
+                raise InputError(f"model {self.name}: {effect.name} is there twice")
+            if self.evaluation == "spline" and effect.stage == "parts":
+                raise InputError(
+                    f"model {self.name}: {effect.name} changes the elastic parts, which needs "
+                    "evaluation: closed_form"
+                )
 
     def with_evaluation(self, evaluation: Evaluation) -> ErrorModel:
         """Return the same model with the other evaluation of its table."""
         return replace(self, evaluation=evaluation)
 
+    def with_effects(self, *effects: Effect) -> ErrorModel:
+        """Return the model with these effects instead of its own."""
+        return replace(self, effects=effects)
+
+    @cached_property
+    def parts(self) -> ElasticComponents:
+        """Elastic parts of the table with the effects that change them."""
+        parts = self.table.components
+        for effect in self.effects:
+            parts = effect.law.changed(parts, self.table.geometry, effect.component, effect.si)
+        return parts
+
+    def session(self) -> Session:
+        """Return a fresh memory for a stream of samples."""
+        return Session(self)
+
     def predict(
         self, theta: Array, load: Load, active: NDArray[np.bool_] | None = None
     ) -> Prediction:
-        """Predict the pose error of one sample.
+        """Predict the pose error of one sample, at rest and with nothing before it.
 
         Parameters
         ----------
@@ -123,19 +182,157 @@ class ErrorModel:
         LoadRangeError
             If the load is outside the table's range.
         """
+        if self.effects:
+            return self.session().advance(Sample(0.0, theta, load))
         configuration = self.table.workspace.configuration(theta)
         wrench = load.in_base(configuration)
         self.table.check_load(wrench)
         operators = self.table.operators_at(configuration, self.evaluation)
         response = respond(operators, wrench, active=active)
-        covariance = self._covariance(configuration, response.twist)
-        return Prediction(response.twist, covariance, configuration, response.active)
+        return Prediction(
+            response.twist,
+            self.table_covariance(configuration, response.twist),
+            configuration,
+            response.active,
+            response.twist,
+        )
 
-    def _covariance(self, configuration: Configuration, twist: Array) -> Array:
-        """Variance of the table's stated error and of an encoder count spread over its step."""
+    def batch(self, block: Block) -> BlockPrediction:
+        """Predict the pose error of a whole recording, in bounded memory.
+
+        Parameters
+        ----------
+        block : Block
+            n samples.
+
+        Returns
+        -------
+        BlockPrediction
+            The same as a session's predictions sample by sample.
+        """
+        accepted = self.accepts(block)
+        usable = block.take(accepted)
+        twist = np.full((len(block), 6), np.nan)
+        measured = twist.copy()
+        rows = np.flatnonzero(accepted)
+        memory: Memory | None = None
+        warnings: dict[str, None] = {}
+        for start in range(0, len(usable), CHUNK):
+            part = slice(start, start + CHUNK)
+            result, memory = evaluate(self, usable.take(part), memory)
+            twist[rows[part]], measured[rows[part]] = result.twist, result.measured
+            warnings.update(dict.fromkeys(result.warnings))
+        return BlockPrediction(twist, measured, accepted, tuple(warnings))
+
+    def accepts(self, block: Block) -> NDArray[np.bool_]:
+        """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""
+        limits = self.table.geometry.limits
+        finite = np.isfinite(block.time) & np.isfinite(block.theta).all(axis=1)
+        if block.theta_dot is not None:
+            finite &= np.isfinite(block.theta_dot).all(axis=1)
+        finite[finite] = self.table.workspace.domain(block.theta[finite])
+        force, moment = lengths(block.load[:, :3]), lengths(block.load[:, 3:])
+        return finite & (force <= limits.force) & (moment <= limits.moment)
+
+    def table_covariance(self, configuration: Configuration, twist: Array) -> Array:
+        """Variance of the table's stated error and of an encoder count spread over its step.
+
+        Parameters
+        ----------
+        configuration : Configuration
+            Of one pose.
+        twist : (6,) float
+            Predicted there [m, rad].
+
+        Returns
+        -------
+        (6, 6) float
+            Translation first, in F.
+        """
         jacobian = np.zeros((6, 2))
         jacobian[3:] = self.table.mechanism.jacobian(configuration)
         step = self.table.geometry.limits.encoder_step
         relative = self.table.header.errors["stated_relative"]
         scale = np.repeat([np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])], 3)
         return jacobian @ jacobian.T * step**2 / 12.0 + np.diag((relative * scale) ** 2 / 3.0)
+
+
+class Session:
+    """A model with the memory of a stream of samples.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Predicts.
+    """
+
+    def __init__(self, model: ErrorModel) -> None:
+        self.model = model
+        self._memory: Memory | None = None
+
+    def advance(self, sample: Sample) -> Prediction:
+        """Predict one sample and remember it.
+
+        Parameters
+        ----------
+        sample : Sample
+            Not earlier than the one before.
+
+        Returns
+        -------
+        Prediction
+            Twist, covariance and contact state.
+
+        Raises
+        ------
+        WristError
+            If the sample is out of range, not finite or earlier than the one before; it is not
+            remembered.
+        """
+        prediction, self._memory = self._predicted(sample)
+        return prediction
+
+    def preview(self, sample: Sample) -> Prediction:
+        """Predict what `advance` would, and forget it: to try other angles.
+
+        Parameters
+        ----------
+        sample : Sample
+            Not earlier than the last one remembered.
+
+        Returns
+        -------
+        Prediction
+            Twist, covariance and contact state.
+
+        Raises
+        ------
+        WristError
+            As in `advance`.
+        """
+        return self._predicted(sample)[0]
+
+    def _predicted(self, sample: Sample) -> tuple[Prediction, Memory]:
+        model, memory = self.model, self._memory
+        if not np.isfinite(sample.time):
+            raise InputError(f"sample: time {sample.time} is not finite")
+        if memory is not None and sample.time < memory.time:
+            raise InputError(
+                f"sample: time {sample.time:.6f} s is before the last one, {memory.time:.6f} s"
+            )
+        configuration = model.table.workspace.configuration(sample.theta)
+        model.table.check_load(sample.load.wrench)
+        result, later = evaluate(model, sample.block, memory)
+        twist = result.twist[0]
+        covariance = model.table_covariance(configuration, twist)
+        states = memory.states if memory else (None,) * len(model.effects)
+        for effect, state in zip(model.effects, states, strict=True):
+            for moved in parameter_twists(effect, result, state).values():
+                covariance += np.outer(moved[0], moved[0])
+        prediction = Prediction(
+            twist, covariance, configuration, result.active[0], result.measured[0], result.warnings
+        )
+        return prediction, later
+
+
+__all__ = ["BlockPrediction", "ErrorModel", "Load", "Prediction", "Session"]

@@ -1,16 +1,29 @@
-"""Read a model file (YAML): which table, and which effects on top of it."""
+"""Read and write a model file (YAML): which table, and which effects on top of it."""
 
 from __future__ import annotations
 
+import hashlib
+import os
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import EVALUATIONS, Evaluation
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law, law_from_file
 
 SCHEMA = 1
+FORMULA, PYTHON = "formula", "python"
+"""Words for `effect:` that announce a user's own law."""
 
 
 def load_model(path: str | Path) -> ErrorModel:
@@ -29,8 +42,9 @@ def load_model(path: str | Path) -> ErrorModel:
     Raises
     ------
     InputError
-        If the file cannot be read, a key is missing, unknown or wrong, or the table is another one
-        than the model was made for.
+        If the file cannot be read, a key is missing, unknown or wrong, an effect, component or
+        parameter is unknown or out of bounds, or the table is another one than the model was made
+        for.
     TableError
         If the table cannot be read.
     """
@@ -40,13 +54,10 @@ def load_model(path: str | Path) -> ErrorModel:
     if schema != SCHEMA:
         raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
     name = root.text("name")
-    effects = root.take("effects")
-    if effects != []:
-        raise InputError(
-            f"{path}.effects: this version knows no effects, found {effects!r}; use []"
-        )
+    effects = tuple(_effect(block, path.parent) for block in _blocks(root, "effects"))
     entry = root.block("table")
-    table = load_table(path.parent / entry.text("path"))
+    table_file = path.parent / entry.text("path")
+    table = load_table(table_file)
     if "checksum" in entry.values and (wanted := entry.text("checksum")) != table.checksum:
         raise InputError(
             f"{path}.table.checksum: the model was made for {wanted[:12]}, "
@@ -56,5 +67,154 @@ def load_model(path: str | Path) -> ErrorModel:
     evaluation: Evaluation = table.header.evaluation
     if "evaluation" in root.values:
         evaluation = root.text("evaluation", EVALUATIONS)  # type: ignore[assignment]
+    lineage = _blocks(root, "lineage") if "lineage" in root.values else []
+    steps = tuple(_step(block) for block in lineage)
     root.no_more_keys()
-    return ErrorModel(name, table, evaluation)
+    try:
+        return ErrorModel(name, table, evaluation, effects, table_file, steps)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def save_model(model: ErrorModel, path: str | Path) -> None:
+    """Write a model file, complete or not at all.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Read from a file, perhaps with other effects.
+    path : path
+        File to write; an older one is replaced.  Paths in it are relative to it.
+
+    Raises
+    ------
+    InputError
+        If the model's table was never in a file, or the file cannot be written.
+    """
+    path = Path(path)
+    if model.table_file is None:
+        raise InputError(f"{path}: the table of model {model.name} was not read from a file")
+    content: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": model.name,
+        "table": {
+            "path": _relative(model.table_file, path.parent),
+            "checksum": model.table.checksum,
+        },
+        "evaluation": model.evaluation,
+        "effects": [_entry(effect, path.parent) for effect in model.effects],
+    }
+    if model.lineage:
+        content["lineage"] = [step.as_values() for step in model.lineage]
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def file_sha256(path: str | Path) -> str:
+    """Return the SHA-256 of a file, by which a child names its parent.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _blocks(root: Block, key: str) -> list[Block]:
+    values = root.take(key)
+    if not isinstance(values, list):
+        raise InputError(f"{root.place}.{key}: {values!r} is not a list")
+    return [
+        Block(value, f"{root.place}.{key}[{number}]", InputError, sources=())
+        for number, value in enumerate(values)
+    ]
+
+
+def _effect(block: Block, folder: Path) -> Effect:
+    estimates = _estimates(block)
+    try:
+        law = _law(block, folder, list(estimates))
+        effect = Effect(law, block.text("component"), estimates)
+    except InputError as error:
+        if str(error).startswith(block.place):
+            raise
+        raise InputError(f"{block.place}: {error}") from error
+    block.no_more_keys()
+    return effect
+
+
+def _law(block: Block, folder: Path, keys: list[str]) -> Law:
+    name = block.text("effect")
+    if name == PYTHON:
+        return law_from_file(block.text("class"), folder)
+    if name != FORMULA:
+        return find_law(name)
+    covariates = block.take("covariates") if "covariates" in block.values else []
+    if not (isinstance(covariates, list) and all(isinstance(c, str) for c in covariates)):
+        raise InputError(f"{block.place}.covariates: {covariates!r} is not a list of names")
+    return FormulaLaw(
+        block.text("id"),
+        block.text("component"),
+        block.vector("direction", size=6),
+        block.text("expression"),
+        covariates,
+        keys,
+    )
+
+
+def _estimates(block: Block) -> dict[str, Estimate]:
+    if "parameters" not in block.values:
+        return {}
+    inner = block.block("parameters")
+    estimates = {}
+    for key in map(str, inner.values):
+        if isinstance(inner.values.get(key), list):
+            value, sigma = inner.vector(key, size=2)
+            estimates[key] = Estimate(float(value), float(sigma))
+        else:
+            estimates[key] = Estimate(inner.number(key))
+    return estimates
+
+
+def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
+    law = effect.law
+    own: dict[str, Any] = {"effect": law.id, "component": effect.component}
+    if isinstance(law, FormulaLaw):
+        own = {"effect": FORMULA, "id": law.id, "component": effect.component}
+        own["direction"] = law.direction.tolist()
+        own["expression"] = law.formula.text
+        if law.covariates:
+            own["covariates"] = list(law.covariates)
+    elif law.file is not None:
+        reference = f"{_relative(law.file, folder)}:{type(law).__name__}"
+        own = {"effect": PYTHON, "class": reference, "component": effect.component}
+    own["parameters"] = {
+        key: [float(estimate.value), float(estimate.sigma)]
+        for key, estimate in effect.estimates.items()
+    }
+    return own
+
+
+def _step(block: Block) -> Step:
+    recordings = block.block("recordings")
+    step = Step(
+        block.text("command"),
+        block.text("date"),
+        block.text("parent_sha256"),
+        {str(name): recordings.text(name) for name in recordings.values},
+    )
+    block.no_more_keys()
+    return step
+
+
+def _relative(target: Path, folder: Path) -> str:
+    return Path(os.path.relpath(target.resolve(), folder.resolve())).as_posix()

@@ -1,0 +1,1 @@
+"""The catalogue: one file per law, found by `model.registry`."""

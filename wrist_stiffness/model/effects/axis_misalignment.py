@@ -1,0 +1,56 @@
+"""A joint's axis that is not where the drawing has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import JOINTS
+from wrist_stiffness.model.at_point import cross_axes
+from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.parameters import Parameter, symmetric
+from wrist_stiffness.model.situation import Situation
+
+FELT = {
+    "joint_1": "uvw",
+    "joint_2": "uv",
+    "joint_3": "u",
+    "joint_4": "uv",
+    "joint_5": "uvw",
+}
+"""Directions that reach the platform: a cylindrical joint takes up its own axis, and joint_3's body
+on the motor's side, link_3, also slides along and turns about joint_4."""
+
+
+class AxisMisalignment(Law):
+    """Constant screw at O, fixed in the body on the motor's side of the joint.
+
+    w is the joint's axis at home, u is perpendicular to it and to the other axis of its link (the
+    frame-side joints: to the next axis), v = w x u.
+    """
+
+    id = "axis_misalignment"
+    stage = "geometry"
+    places = JOINTS
+    sentence = "the axis of {place} misses the centre or is tilted"
+    check = "indicate the pin against its neighbours' axes on a coordinate measuring machine"
+    excited_by = "poses all over the workspace, without load"
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return shifts and tilts along and about the felt directions."""
+        return (
+            *(symmetric(f"shift_{axis}_um", 1000.0, 30.0) for axis in FELT[place]),
+            *(symmetric(f"tilt_{axis}_mdeg", 1000.0, 50.0) for axis in FELT[place]),
+        )
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the screw, turned with its body."""
+        felt = FELT[place]
+        axes = cross_axes(at.table.geometry, place)[: len(felt)]
+        shift = np.array([values[f"shift_{axis}_um"] for axis in felt]) @ axes
+        tilt = np.array([values[f"tilt_{axis}_mdeg"] for axis in felt]) @ axes
+        return at.screw(place, np.concatenate([shift, tilt])), None

@@ -1,0 +1,31 @@
+"""A load sensor with a wrong gain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.situation import Situation
+
+
+class LoadScale(Law):
+    """The sensor says (1 + scale) times the true wrench."""
+
+    id = "load_scale"
+    stage = "load"
+    places = ("load_sensor",)
+    sentence = "the load sensor reads too much (or too little) by a constant factor"
+    check = "hang a reference weight on the platform"
+    excited_by = "loads of several sizes beside a known weight"
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return the excess."""
+        return (Parameter("scale_percent", -50.0, 100.0, 3.0, linear=False),)
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return true minus said."""
+        return Contribution(wrench=(1.0 / (1.0 + values["scale_percent"]) - 1.0) * at.load), None

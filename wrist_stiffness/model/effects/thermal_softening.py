@@ -1,0 +1,36 @@
+"""A polymer bushing that softens as it warms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from wrist_stiffness.mechanism.components import JOINTS
+from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.scaled_part import extra
+from wrist_stiffness.model.situation import Situation
+from wrist_stiffness.model.warmth import LAG, warmth
+
+
+class ThermalSoftening(Law):
+    """Flexibility grows with the temperature above reference."""
+
+    id = "thermal_softening"
+    stage = "reaction"
+    places = JOINTS
+    sentence = "the bushing of {place} softens as it warms"
+    check = "repeat one loaded pose cold and warm"
+    signals = ("temperature of the joint, or ambient",)
+    excited_by = "the same loads at temperatures at least 5 K apart"
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return the growth of flexibility by the temperature, and the lag behind ambient."""
+        return (Parameter("softening_percent_per_K", -5.0, 20.0, 1.0), LAG)
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the further screw."""
+        warm, state = warmth(at, place, values[LAG.key], state)
+        return extra(at, place, values["softening_percent_per_K"] * warm), state

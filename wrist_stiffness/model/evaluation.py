@@ -1,0 +1,226 @@
+"""Evaluate a model over a block: stage after stage, then contact once with everything in it.
+
+0 <= lambda  perpendicular to  g0 + B' W + sum_k N_k delta_k + A lambda >= 0
+xi = C W + sum_k G_k delta_k + B lambda
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.contacts import solve_contacts
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.law import NOTHING, STAGES, Contribution, MissingSignalError
+from wrist_stiffness.model.situation import Situation, lengths
+
+if TYPE_CHECKING:
+    from wrist_stiffness.model.error_model import ErrorModel
+
+FIRST_ORDER_LIMIT = 2e-3
+"""A screw that turns by more than this has left first order [rad]."""
+
+SAMPLE_STAGES = STAGES[1:]
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What an evaluation leaves for the next block.
+
+    Parameters
+    ----------
+    states : tuple
+        State of each effect.
+    time : float
+        Of the last sample [s].
+    theta : (2,) float
+        Its motor angles [rad].
+    active : (m,) bool
+        Its contact state.
+    """
+
+    states: tuple[Any, ...]
+    time: float
+    theta: Array
+    active: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Result of an evaluation of n samples.
+
+    Parameters
+    ----------
+    situation : Situation
+        As the reaction stage saw it.
+    twist : (n, 6) float
+        Pose error of the platform, first order in every screw [m, rad].
+    measured : (n, 6) float
+        What the pose sensor says of it, composed exactly [m, rad].
+    force : (n, m) float
+        Contact forces [N].
+    active : (n, m) bool
+        Contact state.
+    contributions : tuple of Contribution
+        What each effect added.
+    warnings : tuple of str
+        Effects without their signals, and effects past first order.
+    """
+
+    situation: Situation
+    twist: Array
+    measured: Array
+    force: Array
+    active: NDArray[np.bool_]
+    contributions: tuple[Contribution, ...]
+    warnings: tuple[str, ...]
+
+
+def evaluate(model: ErrorModel, block: Block, memory: Memory | None) -> tuple[Evaluated, Memory]:
+    """Evaluate a model over a block.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Table and effects.
+    block : Block
+        n > 0 samples inside the table's domain and load range.
+    memory : Memory or None
+        What the block before left, None at the start.
+
+    Returns
+    -------
+    Evaluated
+        For n samples.
+    Memory
+        For the next block.
+    """
+    block = with_speeds(block, memory)
+    at = situation_of(model, block, None if memory is None else memory.active)
+    states = list(memory.states) if memory else [None] * len(model.effects)
+    added = [NOTHING] * len(model.effects)
+    warnings = []
+    for stage in SAMPLE_STAGES:
+        total = at.given
+        for number, effect in enumerate(model.effects):
+            if effect.stage != stage:
+                continue
+            try:
+                added[number], states[number] = effect.law.advance(
+                    at, effect.component, effect.si, states[number]
+                )
+            except MissingSignalError as missing:
+                warnings.append(f"{effect.name}: {missing.signal} is missing, left out")
+            total = total + added[number]
+            warnings += _first_order(effect, added[number])
+        if total is not at.given:
+            at = advanced(at, total)
+    twist, gap = at.free
+    force, active = solve_contacts(at.operators.approach, gap, at.guess)
+    twist = twist + (at.operators.force_twist @ force[..., None])[..., 0]
+    result = Evaluated(at, twist, seen(at, twist), force, active, tuple(added), tuple(warnings))
+    return result, Memory(tuple(states), float(block.time[-1]), block.theta[-1], active[-1])
+
+
+def situation_of(model: ErrorModel, block: Block, guess: NDArray[np.bool_] | None) -> Situation:
+    """Return a block at its configurations, before any effect but those on the elastic parts."""
+    configuration = model.table.mechanism.forward(block.theta)
+    if model.evaluation == "spline":
+        operators = model.table.operators_at(configuration, "spline")
+    else:
+        operators = contact_operators(configuration, model.parts, model.table.geometry.gravity)
+    load = block.load
+    if block.load_on_platform:
+        halves = load.reshape(-1, 2, 3) @ np.swapaxes(configuration.platform, -1, -2)
+        load = halves.reshape(-1, 6)
+    return Situation(block, load, configuration, operators, model.table, model.parts, guess=guess)
+
+
+def advanced(at: Situation, given: Contribution) -> Situation:
+    """Return the situation with what another stage added; its projectors need no new work."""
+    later = replace(at, given=given)
+    for name in ("influence", "_turned_flexibility", "speed", "own_weight", "jacobian", "told"):
+        if name in at.__dict__:
+            later.__dict__[name] = at.__dict__[name]
+    return later
+
+
+def seen(at: Situation, twist: Array) -> Array:
+    """Return the twist that the pose sensor reports, log(exp(X) exp(xi) exp(Y)), (n, 6)."""
+    left, right = at.given.sensor_left, at.given.sensor_right
+    if left is None and right is None:
+        return twist
+    rotation, shift = exp_twist(twist)
+    if right is not None:
+        turned, moved = exp_twist(right)
+        shift = shift + (rotation @ moved[..., None])[..., 0]
+        rotation = rotation @ turned
+    if left is not None:
+        turned, moved = exp_twist(left)
+        shift = moved + (turned @ shift[..., None])[..., 0]
+        rotation = turned @ rotation
+    return log_motion(rotation, shift)
+
+
+def with_speeds(block: Block, memory: Memory | None) -> Block:
+    """Return the block with motor speeds, by backward differences where it has none."""
+    if block.theta_dot is not None:
+        return block
+    first = (block.time[0], block.theta[0]) if memory is None else (memory.time, memory.theta)
+    interval = np.diff(block.time, prepend=first[0])[:, None]
+    step = np.diff(block.theta, axis=0, prepend=first[1][None])
+    speed = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
+    return replace(block, theta_dot=speed)
+
+
+def parameter_twists(effect: Effect, result: Evaluated, state: Any) -> Mapping[str, Array]:
+    """Return what one standard uncertainty of each parameter of an effect moves.
+
+    Parameters
+    ----------
+    effect : Effect
+        One of the evaluated model.
+    result : Evaluated
+        The evaluation.
+    state : object
+        Its state before the block.
+
+    Returns
+    -------
+    dict of str to (n, 6) float
+        Twist of the platform by the parameter's name [m, rad].
+    """
+    at = result.situation
+    moved = {}
+    for other in effect.varied:
+        key = next(k for k in other.estimates if other.estimates[k] != effect.estimates[k])
+        try:
+            change = effect.law.changed_contribution(
+                at, effect.component, effect.si, other.si, state
+            )
+        except MissingSignalError:
+            continue
+        moved[key] = at.with_contact(*at.carried(change), result.active)[0]
+    return moved
+
+
+def _first_order(effect: Effect, added: Contribution) -> list[str]:
+    turned = [
+        float(np.max(lengths(screw[:, 3:])))
+        for screw in (added.limb_1, added.limb_2, added.both)
+        if screw is not None
+    ]
+    if turned and max(turned) > FIRST_ORDER_LIMIT:
+        return [
+            f"{effect.name}: turns by {1e3 * max(turned):.2f} mrad, past the first order "
+            f"({1e3 * FIRST_ORDER_LIMIT:g} mrad) in which it is carried"
+        ]
+    return []

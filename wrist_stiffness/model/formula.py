@@ -1,0 +1,159 @@
+"""A user's formula: parsed into a tree of allowed operations, never evaluated as code."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+
+Value = Any
+"""A number or an array (n,)."""
+
+FUNCTIONS: dict[str, tuple[int, Callable[..., Value]]] = {
+    "sin": (1, np.sin),
+    "cos": (1, np.cos),
+    "tan": (1, np.tan),
+    "exp": (1, np.exp),
+    "log": (1, np.log),
+    "sqrt": (1, np.sqrt),
+    "abs": (1, np.abs),
+    "tanh": (1, np.tanh),
+    "sign": (1, np.sign),
+    "min": (2, np.minimum),
+    "max": (2, np.maximum),
+}
+"""Number of arguments and meaning of each function."""
+
+OPERATIONS: dict[type[ast.AST], Callable[..., Value]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+    ast.USub: np.negative,
+    ast.UAdd: np.positive,
+}
+
+LONGEST = 1000
+"""Characters of a formula."""
+
+DEEPEST = 50
+"""Levels of a formula's tree."""
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An expression in named variables.
+
+    Parameters
+    ----------
+    text : str
+        Numbers, names, + - * / **, parentheses and `FUNCTIONS`.
+    variables : tuple of str
+        Names that it may use.
+
+    Raises
+    ------
+    InputError
+        If it holds anything else; the message names the column.
+    """
+
+    text: str
+    variables: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Check the whole expression."""
+        self._check(self._tree, 0)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Variables that the expression does use."""
+        used = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
+        return frozenset(used - FUNCTIONS.keys())
+
+    def __call__(self, values: Mapping[str, Value]) -> Array:
+        """Return the value for variables of n samples.
+
+        Parameters
+        ----------
+        values : dict of str to float or (n,) float
+            At least the `names`.
+
+        Returns
+        -------
+        (n,) float or float
+            Not finite where the formula is not defined.
+        """
+        with np.errstate(all="ignore"):
+            return np.asarray(_value(self._tree, values), dtype=float)
+
+    @cached_property
+    def _tree(self) -> ast.expr:
+        if len(self.text) > LONGEST:
+            raise InputError(f"formula: {len(self.text)} characters, at most {LONGEST}")
+        try:
+            return ast.parse(self.text, mode="eval").body
+        except SyntaxError as error:
+            raise InputError(
+                f"formula {self.text!r}, column {error.offset or 1}: {error.msg}"
+            ) from error
+        except (ValueError, RecursionError, MemoryError) as error:
+            raise InputError(f"formula {self.text!r}: cannot be read: {error}") from error
+
+    def _check(self, node: ast.expr, depth: int) -> None:
+        if depth > DEEPEST:
+            raise self._refusal(node, f"nested deeper than {DEEPEST} levels")
+        if isinstance(node, ast.Constant):
+            if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+                raise self._refusal(node, f"{node.value!r} is not a number")
+            if not abs(node.value) <= float(np.finfo(float).max):
+                raise self._refusal(node, "the number is too large")
+        elif isinstance(node, ast.Name):
+            if node.id not in self.variables:
+                raise self._refusal(
+                    node, f"unknown name {node.id}; known are {', '.join(self.variables)}"
+                )
+        elif isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
+            self._check(node.left, depth + 1)
+            self._check(node.right, depth + 1)
+        elif isinstance(node, ast.UnaryOp) and type(node.op) in OPERATIONS:
+            self._check(node.operand, depth + 1)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+            if node.func.id not in FUNCTIONS:
+                raise self._refusal(
+                    node, f"unknown function {node.func.id}; known are {', '.join(FUNCTIONS)}"
+                )
+            count = FUNCTIONS[node.func.id][0]
+            if len(node.args) != count:
+                raise self._refusal(
+                    node, f"{node.func.id} takes {count} values, not {len(node.args)}"
+                )
+            for argument in node.args:
+                self._check(argument, depth + 1)
+        else:
+            raise self._refusal(node, "only numbers, names, + - * / ** and functions are allowed")
+
+    def _refusal(self, node: ast.expr, why: str) -> InputError:
+        return InputError(f"formula {self.text!r}, column {node.col_offset + 1}: {why}")
+
+
+def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
+    match node:
+        case ast.Constant(value=number):
+            return float(number)  # type: ignore[arg-type]
+        case ast.Name(id=name):
+            return values[name]
+        case ast.BinOp(left=left, op=op, right=right):
+            return OPERATIONS[type(op)](_value(left, values), _value(right, values))
+        case ast.UnaryOp(op=op, operand=operand):
+            return OPERATIONS[type(op)](_value(operand, values))
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            return FUNCTIONS[name][1](*(_value(argument, values) for argument in arguments))
+    raise InputError(f"formula: {ast.dump(node)} was not checked")

@@ -1,0 +1,123 @@
+"""An effect that a user states as a formula in the model file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.formula import FUNCTIONS, Formula
+from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.places import LIMB
+from wrist_stiffness.model.situation import Situation
+
+MOTION = ("theta_1", "theta_2", "theta_dot_1", "theta_dot_2")
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+TEMPERATURE = "T_"
+
+
+class FormulaLaw(Law):
+    """A screw along a fixed direction of the component's body, as large as a formula says.
+
+    Parameters
+    ----------
+    name : str
+        Id of the effect.
+    place : str
+        Its component.
+    direction : (6,) float
+        (translation; rotation) at O in the component's home frame for a value of 1 [m, rad].
+    expression : str
+        In `theta_1`, `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `fx` ... `mz` (wrench
+        through the component at O in its home frame [N, N m]), `W_fx` ... `W_mz` (wrench on the
+        platform at O in F), `T_<component>` [degC], `time` [s], the covariates and the parameters.
+    covariates : sequence of str
+        Covariates that it may use.
+    keys : sequence of str
+        Parameters; one whose name ends in a known unit is converted to SI units.
+
+    Raises
+    ------
+    InputError
+        If the component carries no screw, the direction is not six finite numbers or zero, a name
+        is no name or used twice, or the expression is not allowed.
+    """
+
+    stage = "reaction"
+    check = "what the formula's author has in mind"
+    excited_by = "a wide range of what the formula depends on"
+
+    def __init__(
+        self,
+        name: str,
+        place: str,
+        direction: Array,
+        expression: str,
+        covariates: Sequence[str],
+        keys: Sequence[str],
+    ) -> None:
+        if place not in LIMB:
+            raise InputError(f"{name}: component {place!r} is not one of {', '.join(LIMB)}")
+        if direction.shape != (6,) or not np.isfinite(direction).all() or not direction.any():
+            raise InputError(f"{name}: direction {direction.tolist()} is not six finite numbers")
+        self.id = name
+        self.places = (place,)
+        self.sentence = f"{{place}}: {expression}"
+        self.direction = direction
+        self.covariates = tuple(covariates)
+        self._keys = tuple(keys)
+        known = (
+            *MOTION,
+            *WRENCH,
+            *(f"W_{axis}" for axis in WRENCH),
+            "time",
+            *(f"{TEMPERATURE}{part}" for part in (*LIMB, "ambient")),
+        )
+        for own in (*self.covariates, *self._keys):
+            if not own.isidentifier():
+                raise InputError(f"{name}: {own!r} is not a name")
+            if own in known or own in FUNCTIONS or (*covariates, *keys).count(own) > 1:
+                raise InputError(f"{name}: the name {own} is in use")
+        self.formula = Formula(expression, (*known, *self.covariates, *self._keys))
+        self.signals = tuple(
+            used
+            for used in sorted(self.formula.names)
+            if used in self.covariates or used.startswith(TEMPERATURE)
+        )
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return the formula's own parameters, without bounds."""
+        return tuple(Parameter(key, -np.inf, np.inf, np.inf, linear=False) for key in self._keys)
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the screw."""
+        variables = {name: self._signal(at, place, name, values) for name in self.formula.names}
+        size = np.broadcast_to(self.formula(variables), len(at.block))
+        if not np.isfinite(size).all():
+            moment = at.block.time[np.argmin(np.isfinite(size))]
+            raise InputError(f"{self.id}: the formula has no finite value at time {moment:.6f} s")
+        return at.screw(place, np.outer(size, self.direction)), None
+
+    def _signal(
+        self, at: Situation, place: str, name: str, values: Mapping[str, float]
+    ) -> float | Array:
+        if name in values:
+            return values[name]
+        if name in self.covariates:
+            return at.covariate(name)
+        if name == "time":
+            return at.block.time
+        if name.startswith(TEMPERATURE):
+            reference = at.table.geometry.reference_temperature
+            return at.temperature(name.removeprefix(TEMPERATURE)) + reference
+        if name in MOTION:
+            return np.concatenate([at.block.theta, at.speed], axis=1)[:, MOTION.index(name)]
+        if name.startswith("W_"):
+            return at.wrench[:, WRENCH.index(name.removeprefix("W_"))]
+        return at.at_home(place, at.through_place(place))[:, WRENCH.index(name)]

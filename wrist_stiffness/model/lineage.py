@@ -1,0 +1,38 @@
+"""How a model came about."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step from a parent model to its child.
+
+    Parameters
+    ----------
+    command : str
+        What was run.
+    date : str
+        When, ISO 8601.
+    parent_sha256 : str
+        Of the parent's model file.
+    recordings : dict of str to str
+        SHA-256 of each recording by its name.
+    """
+
+    command: str
+    date: str
+    parent_sha256: str
+    recordings: Mapping[str, str]
+
+    def as_values(self) -> dict[str, Any]:
+        """Return the step as the model file holds it."""
+        return {
+            "command": self.command,
+            "date": self.date,
+            "parent_sha256": self.parent_sha256,
+            "recordings": dict(self.recordings),
+        }

@@ -1,0 +1,70 @@
+"""Sums over the past that laws with memory share, whole blocks at once.
+
+Both are compositions of maps (clamps, affine maps), which are associative: a block of n samples
+takes log2(n) passes of NumPy instead of n steps of Python.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+
+
+def play(values: Array, half_width: Array | float, start: Array) -> Array:
+    """Follow a value with lost motion: y_i = clip(y_{i-1}, u_i - h, u_i + h).
+
+    Parameters
+    ----------
+    values : (n, ...) float
+        u, the driving value.
+    half_width : float or (n, ...) float
+        h, not negative.
+    start : (...) float
+        y before the first sample.
+
+    Returns
+    -------
+    (n, ...) float
+        y, exact to the bit in any split of the samples.
+    """
+    low, high = values - half_width, values + half_width
+    step = 1
+    while step < len(values):
+        # Clamp after clamp is a clamp: the earlier limits, clamped by the later ones.
+        low[step:], high[step:] = (
+            np.clip(low[:-step], low[step:], high[step:]),
+            np.clip(high[:-step], low[step:], high[step:]),
+        )
+        step *= 2
+    return np.clip(start, low, high)
+
+
+def lag(values: Array, interval: Array, time_constant: float, before: Array, start: Array) -> Array:
+    """Follow a value with a first-order lag, exact for the mean of neighbouring samples held.
+
+    Parameters
+    ----------
+    values : (n, k) float
+        u, the driving value.
+    interval : (n,) float
+        Time since the sample before [s]; the first one since the block before.
+    time_constant : float
+        [s], above 0.
+    before, start : (k,) float
+        u and x of the sample before the block.
+
+    Returns
+    -------
+    (n, k) float
+        x with x' = (u - x) / time_constant.
+    """
+    decay = np.exp(-interval / time_constant)[:, None]
+    earlier = np.concatenate([before[None], values[:-1]])
+    sum_ = -np.expm1(-interval / time_constant)[:, None] * (0.5 * (earlier + values))
+    step = 1
+    while step < len(values):
+        sum_[step:] = sum_[step:] + decay[step:] * sum_[:-step]
+        decay[step:] = decay[step:] * decay[:-step]
+        step *= 2
+    return decay * start + sum_

@@ -1,0 +1,97 @@
+"""Parameters of an effect: names with units for people, SI values for the laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+UNITS = {
+    "um": 1e-6,
+    "mm": 1e-3,
+    "m": 1.0,
+    "mdeg": np.pi / 180e3,
+    "deg": np.pi / 180.0,
+    "mrad": 1e-3,
+    "rad": 1.0,
+    "N": 1.0,
+    "Nmm": 1e-3,
+    "Nm": 1.0,
+    "g": 1e-3,
+    "kg": 1.0,
+    "gmm2": 1e-9,
+    "ms": 1e-3,
+    "s": 1.0,
+    "h": 3600.0,
+    "K": 1.0,
+    "percent": 1e-2,
+    "ppm": 1e-6,
+}
+"""Size in SI units of everything that a parameter's name may end in."""
+
+
+def si_factor(key: str) -> float:
+    """Return the SI size of the unit that a parameter's name ends in.
+
+    Parameters
+    ----------
+    key : str
+        `clearance_um`, `slope_um_per_N`; a name without a known unit is dimensionless.
+
+    Returns
+    -------
+    float
+        1e-6 for `clearance_um`, 1 where there is no unit.
+    """
+    words = key.split("_")
+    if len(words) >= 4 and words[-2] == "per" and words[-3] in UNITS and words[-1] in UNITS:
+        return UNITS[words[-3]] / UNITS[words[-1]]
+    return UNITS.get(words[-1], 1.0) if len(words) > 1 else 1.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a law, in the unit that its name ends in.
+
+    Parameters
+    ----------
+    key : str
+        Name with unit as people type it, `clearance_um`.
+    lower, upper : float
+        Bounds, both allowed.
+    scale : float
+        Prior standard deviation: how large it may be in an ordinary wrist.
+    mean : float
+        Prior mean.
+    linear : bool
+        Whether the effect is proportional to it (all linear parameters of a law together), so that
+        a regression may treat it as a column.
+    """
+
+    key: str
+    lower: float
+    upper: float
+    scale: float
+    mean: float = 0.0
+    linear: bool = True
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Value of a parameter and its standard uncertainty, in the unit of its name.
+
+    Parameters
+    ----------
+    value : float
+        The value.
+    sigma : float
+        One standard uncertainty, not negative.
+    """
+
+    value: float
+    sigma: float = 0.0
+
+
+def symmetric(key: str, bound: float, scale: float) -> Parameter:
+    """Return a linear parameter with bounds of both signs."""
+    return Parameter(key, -bound, bound, scale)

@@ -1,0 +1,126 @@
+"""Find the laws: the catalogue of this package, and those of other installed packages."""
+
+from __future__ import annotations
+
+import inspect
+from functools import cache
+from importlib import import_module, metadata, util
+from pathlib import Path
+from pkgutil import iter_modules
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model import effects
+from wrist_stiffness.model.law import Law
+
+ENTRY_POINTS = "wrist_stiffness.effects"
+"""Group in which another package offers its own `Law` classes."""
+
+
+@cache
+def catalogue() -> dict[str, Law]:
+    """Return all laws by their id, the package's own first.
+
+    Raises
+    ------
+    InputError
+        If an entry point cannot be imported, is no law, or takes a name that is in use.
+    """
+    laws: dict[str, Law] = {}
+    for module in iter_modules(effects.__path__):
+        for law in laws_in(import_module(f"{effects.__name__}.{module.name}")):
+            laws[law.id] = law
+    for point in metadata.entry_points(group=ENTRY_POINTS):
+        try:
+            found = point.load()
+        except Exception as error:
+            raise InputError(f"entry point {point.name}: {point.value}: {error}") from error
+        law = law_of(found, f"entry point {point.name}")
+        if law.id in laws:
+            raise InputError(f"entry point {point.name}: the name {law.id} is in use")
+        laws[law.id] = law
+    return laws
+
+
+def find_law(name: str) -> Law:
+    """Return a law of the catalogue.
+
+    Raises
+    ------
+    InputError
+        If there is none of this name.
+    """
+    laws = catalogue()
+    if name not in laws:
+        raise InputError(f"unknown effect {name!r}; known are {', '.join(sorted(laws))}")
+    return laws[name]
+
+
+def laws_in(module: object) -> list[Law]:
+    """Return the laws that a module itself defines."""
+    name = getattr(module, "__name__", "")
+    return [
+        law_of(found, name)
+        for found in vars(module).values()
+        if inspect.isclass(found)
+        and issubclass(found, Law)
+        and found.__module__ == name
+        and not inspect.isabstract(found)
+    ]
+
+
+def law_of(found: object, place: str) -> Law:
+    """Return an instance of a law class.
+
+    Raises
+    ------
+    InputError
+        If it is no complete law.
+    """
+    if not (inspect.isclass(found) and issubclass(found, Law)):
+        raise InputError(f"{place}: {found!r} is not a class derived from Law")
+    if inspect.isabstract(found):
+        missing = ", ".join(sorted(found.__abstractmethods__))
+        raise InputError(f"{place}: {found.__name__} does not define {missing}")
+    wanted = ("id", "stage", "places", "sentence", "check", "excited_by")
+    if missing := ", ".join(name for name in wanted if not hasattr(found, name)):
+        raise InputError(f"{place}: {found.__name__} does not define {missing}")
+    return found()
+
+
+def law_from_file(reference: str, folder: Path) -> Law:
+    """Return a user's own law from a Python file, which is executed.
+
+    Parameters
+    ----------
+    reference : str
+        `FILE.py:CLASS`, relative to `folder`.
+    folder : path
+        Of the model file.
+
+    Returns
+    -------
+    Law
+        An instance.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be run or has no such law.
+    """
+    file, _, name = reference.rpartition(":")
+    path = folder / file
+    if not file or not path.is_file():
+        raise InputError(f"{reference}: no file {path}; write FILE.py:CLASS")
+    spec = util.spec_from_file_location(f"wrist_stiffness_user_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{reference}: {path.name} is not a Python file")
+    module = util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InputError(f"{reference}: cannot be run: {error}") from error
+    if not hasattr(module, name):
+        raise InputError(f"{reference}: {path.name} has no class {name}")
+    law = law_of(getattr(module, name), reference)
+    law.file = path
+    return law

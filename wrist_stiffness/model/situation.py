@@ -1,0 +1,320 @@
+"""n samples and what follows from them: configuration, operators, wrenches through the parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
+from wrist_stiffness.mechanism.energy import component_wrenches
+from wrist_stiffness.mechanism.influence import Influence, influence
+from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
+from wrist_stiffness.mechanism.statics import (
+    ContactOperators,
+    component_rotations,
+    slides,
+    turned_flexibilities,
+    weight_response,
+)
+from wrist_stiffness.mechanism.vectors import block_diagonal, dot
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.contacts import forces_of, solve_contacts
+from wrist_stiffness.model.law import NOTHING, Contribution, MissingSignalError
+from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
+
+_TURNING = {"joint_2": ("link_1", "platform"), "joint_3": ("link_3", "platform")}
+_TURNING["joint_4"] = ("link_2", "link_3")
+"""Body on the motor side and on the platform side of each passive joint."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A block at its configurations; everything that a law may ask for.
+
+    Parameters
+    ----------
+    block : Block
+        The samples, with speeds.
+    load : (n, 6) float
+        What the load sensor says, in F at O [N, N m].
+    configuration : Configuration
+        Of shape (n,).
+    operators : ContactOperators
+        Of shape (n,), of the parts as they are with the model's effects.
+    table : Table
+        Geometry and mechanism.
+    parts : ElasticComponents
+        Elastic parts as they are with the model's effects.
+    given : Contribution
+        Sum of what earlier stages added.
+    guess : (m,) bool or None
+        First guess of the contact state.
+    """
+
+    block: Block
+    load: Array
+    configuration: Configuration
+    operators: ContactOperators
+    table: Table
+    parts: ElasticComponents
+    given: Contribution = NOTHING
+    guess: NDArray[np.bool_] | None = None
+
+    @cached_property
+    def influence(self) -> Influence:
+        """Projectors of the configurations."""
+        return influence(self.configuration)
+
+    @cached_property
+    def _turned_flexibility(self) -> Array:
+        return turned_flexibilities(self.configuration, self.parts)
+
+    @cached_property
+    def speed(self) -> Array:
+        """Motor speeds, (n, 2) [rad/s]."""
+        speed = self.block.theta_dot
+        return np.zeros_like(self.block.theta) if speed is None else speed
+
+    @property
+    def wrench(self) -> Array:
+        """Wrench on the platform at O in F with all that earlier stages added, (n, 6) [N, N m]."""
+        return self.load if self.given.wrench is None else self.load + self.given.wrench
+
+    def temperature(self, name: str) -> Array:
+        """Return the temperature of a component or of `ambient` above reference, (n,) [K]."""
+        if name not in self.block.temperatures:
+            raise MissingSignalError(f"temperature of {name}")
+        return self.block.temperatures[name] - self.table.geometry.reference_temperature
+
+    def body(self, place: str) -> Array:
+        """Rotation from home of the body that a place turns with, (n, 3, 3)."""
+        return self.configuration.bodies[..., BODIES.index(BODY[place]), :, :]
+
+    def at_home(self, place: str, six: Array) -> Array:
+        """Return 6-vectors (n, 6) at O in F in the place's body, turned back home."""
+        halves = six.reshape(-1, 2, 3) @ self.body(place)
+        return halves.reshape(-1, 6)
+
+    def in_base(self, place: str, six: Array) -> Array:
+        """Return 6-vectors (n, 6) or (6,) at O in the place's home frame at O in F."""
+        halves = np.reshape(six, (-1, 2, 3)) @ np.swapaxes(self.body(place), -1, -2)
+        return halves.reshape(-1, 6)
+
+    def screw(self, place: str, home: Array) -> Contribution:
+        """Return a screw (n, 6) or (6,) at O in the place's home frame as a contribution."""
+        return Contribution(**{LIMB[place]: self.in_base(place, home)})
+
+    def motor_turn(self, motor: str, angle: Array) -> Contribution:
+        """Return an angle (n,) [rad] added to a motor's as the screw about its axis."""
+        axis = self.table.geometry.axes[MOTOR_JOINT[motor]]
+        screw = np.zeros((len(angle), 6))
+        screw[:, 3:] = angle[:, None] * axis
+        return Contribution(**{LIMB[motor]: screw})
+
+    @cached_property
+    def own_weight(self) -> Array:
+        """Wrench of own weight through the elastic components, (n, 8, 6) [N, N m]."""
+        return weight_response(self.configuration, self.parts, self.table.geometry.gravity).wrench
+
+    @cached_property
+    def told(self) -> tuple[Array, Array]:
+        """Twist and gaps under the told load and own weight alone, slides free, (n, 6), (n, m)."""
+        column, operators = self.load[..., None], self.operators
+        twist = operators.weight_twist + (operators.compliance @ column)[..., 0]
+        gap = operators.gap + (np.swapaxes(operators.force_twist, -1, -2) @ column)[..., 0]
+        return twist, gap
+
+    @cached_property
+    def free(self) -> tuple[Array, Array]:
+        """Twist and gaps under all that earlier stages added, slides free, (n, 6), (n, m)."""
+        (twist, gap), added = self.told, self.carried(self.given)
+        return twist + added[0], gap + added[1]
+
+    @cached_property
+    def contact_force(self) -> Array:
+        """Force of the flange sectors under all that earlier stages added, (n, m) [N]."""
+        return solve_contacts(self.operators.approach, self.free[1], self.guess)[0]
+
+    @cached_property
+    def through(self) -> Array:
+        """Wrench through the elastic components under all that earlier stages added.
+
+        Own weight and contact included, (n, 8, 6) at O in F [N, N m].
+        """
+        through = self.own_weight + component_wrenches(
+            self.configuration, self.parts, self.wrench, self.contact_force
+        )
+        return through if self.given.through is None else through + self.given.through
+
+    def through_place(self, place: str) -> Array:
+        """Return the wrench through a joint, link, motor, the frame or the platform, (n, 6).
+
+        At O in F [N, N m]; what it does to the platform side of the place.
+        """
+        if place == "frame":
+            return self.through_place("motor_1") + self.through_place("motor_2")
+        if place == "platform":
+            return self.wrench
+        return self.through[:, ELASTIC.index(MOTOR_JOINT.get(place, place))]
+
+    def elastic_screw(self, place: str) -> Array:
+        """Return C_k W_k of a link or bushing, (n, 6) at O in F [m, rad]."""
+        k = ELASTIC.index(place)
+        return (self._turned_flexibility[:, k] @ self.through[:, k, :, None])[..., 0]
+
+    @cached_property
+    def slides(self) -> Array:
+        """Slides of joint_2 to joint_4 under all that earlier stages added, (n, 3) [m]."""
+        bent = (self._turned_flexibility @ self.through[..., None])[..., 0]
+        sectors = self.parts.sectors
+        turn = block_diagonal(component_rotations(self.configuration))
+        for sector, k in enumerate(sectors.component):
+            bent[:, k] += turn[:, k] @ sectors.screw[sector] * self.contact_force[:, sector, None]
+        moved = slides(self.influence, bent)
+        relative = _difference(self.given.limb_1, self.given.limb_2)
+        if relative is not None:
+            moved = moved + (self.influence.slides_limb_1 @ relative[:, :3, None])[..., 0]
+        return moved
+
+    def turn(self, joint: str) -> Array:
+        """Turn of a passive joint from home, platform side against motor side, (n,) [rad]."""
+        before, after = (
+            self.configuration.bodies[..., BODIES.index(body), :, :] for body in _TURNING[joint]
+        )
+        relative = np.swapaxes(before, -1, -2) @ after
+        axis = self.table.geometry.axes[joint]
+        vee = np.stack(
+            [
+                relative[..., 2, 1] - relative[..., 1, 2],
+                relative[..., 0, 2] - relative[..., 2, 0],
+                relative[..., 1, 0] - relative[..., 0, 1],
+            ],
+            axis=-1,
+        )
+        return np.arctan2(vee @ axis, np.trace(relative, axis1=-2, axis2=-1) - 1.0)
+
+    def carried(self, added: Contribution) -> tuple[Array, Array]:
+        """Carry a contribution to the platform and to the flange gaps, with slides free.
+
+        Parameters
+        ----------
+        added : Contribution
+            Of n samples; what it says of the pose sensor is left out.
+
+        Returns
+        -------
+        twist : (n, 6) float
+            Of the platform [m, rad].
+        gap : (n, m) float
+            Opening of the sectors [m].
+        """
+        projectors, sectors = self.influence, self.parts.sectors
+        n = len(self.block)
+        twist, gap = np.zeros((n, 6)), np.zeros((n, len(sectors.gap)))
+        for six, g in ((added.limb_1, projectors.limb_1), (added.limb_2, projectors.limb_2)):
+            if six is not None:
+                twist += _halves(g, six)
+        if added.both is not None:
+            twist += added.both
+        relative = _difference(added.limb_1, added.limb_2)
+        if relative is not None:
+            slid = (projectors.slides_limb_1 @ relative[:, :3, None])[..., 0]
+            gap += slid @ sectors.slide.T
+        if added.wrench is not None:
+            column = added.wrench[..., None]
+            twist += (self.operators.compliance @ column)[..., 0]
+            gap += (np.swapaxes(self.operators.force_twist, -1, -2) @ column)[..., 0]
+        if added.through is not None:
+            bent = (self._turned_flexibility @ added.through[..., None])[..., 0]
+            twist += _halves(projectors.of_components(), bent).sum(axis=-2)
+            gap += slides(projectors, bent) @ sectors.slide.T
+            for sector, k in enumerate(sectors.component):
+                home = self.at_home(ELASTIC[k], added.through[:, k])
+                gap[:, sector] += home @ sectors.screw[sector]
+        if added.gap is not None:
+            gap += added.gap
+        return twist, gap
+
+    def with_contact(
+        self, twist: Array, gap: Array, closed: NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """Return what a carried contribution does where the closed sectors hold: the tangent.
+
+        Parameters
+        ----------
+        twist : (n, 6) float
+            Carried with slides free [m, rad].
+        gap : (n, m) float
+            Opening that the sectors do not let happen [m].
+        closed : (n, m) bool
+            Contact state.
+
+        Returns
+        -------
+        twist : (n, 6) float
+            Of the platform [m, rad].
+        force : (n, m) float
+            Change of the contact forces [N].
+        """
+        force = forces_of(self.operators.approach, gap, closed)
+        return twist + (self.operators.force_twist @ force[..., None])[..., 0], force
+
+    def slide_flexibility(self, joint: str) -> tuple[Array, Array]:
+        """Return how far a joint slides, and turns, for a unit force, and torque, along its axis.
+
+        Returns
+        -------
+        slide : (n,) float
+            [m/N]; with all flanges open.
+        turn : (n,) float
+            [rad/(N m)].
+        """
+        row = self.influence.slides()[..., PASSIVE_JOINTS.index(joint), :]
+        flexibility = self._turned_flexibility
+        slide = np.einsum("nki,nkij,nkj->n", row, flexibility[..., :3, :3], row)
+        turn = np.einsum("nki,nkij,nkj->n", row, flexibility[..., 3:, 3:], row)
+        return slide, turn
+
+    def joint_push(self, joint: str, force: Array, torque: Array) -> Contribution:
+        """Return a force (n,) [N] and torque (n,) [N m] of a passive joint on its platform side.
+
+        Both are along the axis, with their reactions on the motor side.
+        """
+        row = self.influence.slides()[..., PASSIVE_JOINTS.index(joint), :]
+        return Contribution(
+            through=np.concatenate(
+                [row * force[:, None, None], row * torque[:, None, None]], axis=-1
+            )
+        )
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Jacobian of the platform's angular velocity, (n, 3, 2)."""
+        return self.table.mechanism.jacobian(self.configuration)
+
+    def covariate(self, name: str) -> Array:
+        """Return a covariate, (n,)."""
+        if name not in self.block.covariates:
+            raise MissingSignalError(f"covariate {name}")
+        return self.block.covariates[name]
+
+
+def _halves(matrix: Array, six: Array) -> Array:
+    """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
+    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
+    return halves.reshape(six.shape)
+
+
+def _difference(first: Array | None, second: Array | None) -> Array | None:
+    if first is None:
+        return None if second is None else -second
+    return first if second is None else first - second
+
+
+def lengths(vectors: Array) -> Array:
+    """Return the length of (..., 3) vectors."""
+    return np.sqrt(dot(vectors, vectors))

@@ -1,0 +1,45 @@
+"""Parameters that come as vectors: one key for each axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.parameters import Parameter, symmetric
+
+AXES = ("x", "y", "z")
+
+
+def axis_keys(pattern: str) -> tuple[str, ...]:
+    """Return three keys, `pattern` with `{}` replaced by x, y and z."""
+    return tuple(pattern.format(axis) for axis in AXES)
+
+
+def symmetric_vector(pattern: str, bound: float, scale: float) -> tuple[Parameter, ...]:
+    """Return three linear parameters with bounds of both signs."""
+    return tuple(symmetric(key, bound, scale) for key in axis_keys(pattern))
+
+
+def vector(values: Mapping[str, float], pattern: str) -> Array:
+    """Return the three values of a pattern, (3,)."""
+    return np.array([values[key] for key in axis_keys(pattern)])
+
+
+SHIFT, TURN = "shift_{}_um", "turn_{}_mdeg"
+
+
+def twist_parameters(
+    shift: tuple[float, float], turn: tuple[float, float]
+) -> tuple[Parameter, ...]:
+    """Return six parameters of a small screw, from (bound, prior scale) of shift and turn."""
+    return (*symmetric_vector(SHIFT, *shift), *symmetric_vector(TURN, *turn))
+
+
+def twist(values: Mapping[str, float]) -> Array:
+    """Return the small screw that six parameters state, (6,) [m, rad]."""
+    return np.concatenate([vector(values, SHIFT), vector(values, TURN)])
+
+
+FORCE, MOMENT = "f{}_N", "m{}_Nmm"
