@@ -58,6 +58,23 @@ def test_a_fault_of_the_program_is_not_hidden():
         main(TRY, [command(raising(ZeroDivisionError()))])
 
 
+@pytest.mark.parametrize(
+    ("module", "extra"), [("netgen.occ", "fem"), ("skfem", "fem"), ("matplotlib.figure", "plot")]
+)
+def test_a_missing_extra_is_named(capsys, module, extra):
+    error = ModuleNotFoundError(f"No module named '{module}'", name=module)
+    assert main(TRY, [command(raising(error))]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert f"pip install 'wrist_stiffness[{extra}]'" in err
+
+
+def test_a_missing_module_of_our_own_is_not_hidden():
+    with pytest.raises(ModuleNotFoundError):
+        main(TRY, [command(raising(ModuleNotFoundError("x", name="wrist_stiffness.fam")))])
+
+
 def test_interrupt_exits_with_130(capsys):
     assert main(TRY, [command(raising(KeyboardInterrupt()))]) == 130
     assert capsys.readouterr() == ("", "")

@@ -1,0 +1,198 @@
+"""`table check | show | build`: answers, exit codes, pictures, and what is refused."""
+
+import copy
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.table_file import load_table, save_table
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.shipped import shipped_file
+
+CHECKS = {
+    "file",
+    "compliance",
+    "spline s operative",
+    "spline phi operative",
+    "spline s domain",
+    "spline phi domain",
+}
+
+
+def check(path, tmp_path, *options):
+    """Return the exit code and the findings of `table check`."""
+    report = tmp_path / "check.json"
+    code = main(["table", "check", str(path), "--json", str(report), *map(str, options)])
+    result = json.loads(report.read_text())
+    assert result["passed"] == (code == 0)
+    return code, {finding["name"]: finding["passed"] for finding in result["findings"]}
+
+
+def test_good_table_is_good(small_table, tmp_path, capsys):
+    _, path = small_table
+    assert check(path, tmp_path) == (0, dict.fromkeys(CHECKS, True))
+    assert capsys.readouterr().out.endswith(f"{path}: good\n")
+
+
+@pytest.mark.slow
+def test_shipped_table_is_good_and_of_the_shipped_geometry(tmp_path):
+    pytest.importorskip("netgen", reason="table check needs the mesher")
+    path = shipped_file("precomputed/palmieri2015.npz")
+    code, findings = check(path, tmp_path, "--geometry", shipped_file("config/palmieri2015.yaml"))
+    assert (code, findings) == (0, dict.fromkeys(CHECKS | {"geometry"}, True))
+
+
+@pytest.mark.parametrize("quantity", ["s", "phi"])
+def test_table_that_states_too_small_an_error_is_not_good(small_table, tmp_path, capsys, quantity):
+    table, _ = small_table
+    errors = copy.deepcopy(table.header.errors)
+    errors["predicted"]["operative"][quantity] *= 0.99
+    path = tmp_path / "boastful.npz"
+    save_table(replace(table, header=replace(table.header, errors=errors)), path)
+    code, findings = check(path, tmp_path)
+    assert code == 1
+    assert [name for name, passed in findings.items() if not passed] == [
+        f"spline {quantity} operative"
+    ]
+    assert f"BAD  spline {quantity} operative" in capsys.readouterr().out
+
+
+def test_table_with_a_spoilt_node_is_not_good(small_table, tmp_path):
+    """One value of one node, as a foreign sweep might get it wrong."""
+    table, _ = small_table
+    operators = table.operators.copy()
+    operators[12] *= 1.2
+    path = tmp_path / "spoilt.npz"
+    save_table(replace(table, operators=operators), path)
+    assert check(path, tmp_path)[0] == 1
+
+
+def test_geometry_is_compared_by_its_values(small_table, tmp_path):
+    table, path = small_table
+    geometry = tmp_path / "geometry.yaml"
+    geometry.write_text(yaml.safe_dump(table.header.geometry))
+    assert check(path, tmp_path, "--geometry", geometry)[0] == 0
+    changed = copy.deepcopy(table.header.geometry)
+    changed["links"]["link_3"]["section_axial_mm"] += 0.1
+    geometry.write_text(yaml.safe_dump(changed))
+    code, findings = check(path, tmp_path, "--geometry", geometry)
+    assert (code, findings["geometry"]) == (1, False)
+    assert all(passed for name, passed in findings.items() if name != "geometry")
+
+
+def damaged(content, how):
+    if how == "cut":
+        return content[: len(content) // 2]
+    if how == "empty":
+        return b""
+    if how == "text":
+        return b"schema: 1\n"
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
+
+
+@pytest.mark.parametrize("how", ["cut", "empty", "text", "flipped"])
+@pytest.mark.parametrize("action", ["check", "show"])
+def test_damaged_table_is_refused(small_table, tmp_path, refused, action, how):
+    path = tmp_path / "damaged.npz"
+    path.write_bytes(damaged(small_table[1].read_bytes(), how))
+    assert f"{path}: " in refused("table", action, path)
+
+
+def test_foreign_npz_is_refused(tmp_path, refused):
+    np.savez(tmp_path / "foreign.npz", nodes=np.zeros((3, 2)))
+    assert "not a table of this program" in refused("table", "check", tmp_path / "foreign.npz")
+
+
+def coloured(pixels):
+    """Return which part of a picture is neither white nor grey nor black."""
+    return np.mean(np.ptp(pixels, axis=-1) > 0.02)
+
+
+def test_pictures_show_something(small_table, tmp_path, capsys):
+    image = pytest.importorskip("matplotlib.image", reason="pictures need matplotlib")
+    folder = tmp_path / "new" / "maps"
+    assert main(["table", "show", str(small_table[1]), "-o", str(folder)]) == 0
+    written = capsys.readouterr().out.split("written: ")[1:]
+    assert {path.name for path in folder.iterdir()} == {
+        "map_s.png",
+        "map_phi.png",
+        "budget.png",
+        "bent.png",
+    }
+    assert {line.strip() for line in written} == {str(path) for path in folder.iterdir()}
+    seen = {path.name: image.imread(path)[..., :3] for path in folder.iterdir()}
+    for pixels in seen.values():
+        height, width, _ = pixels.shape
+        assert 400 < height < 2000
+        assert 600 < width < 2500
+        assert 0.03 < coloured(pixels) < 0.9
+    for name in ("map_s.png", "map_phi.png"):
+        assert coloured(seen[name]) > 0.3
+    assert not np.array_equal(seen["map_s.png"], seen["map_phi.png"])
+
+
+@pytest.mark.slow
+def test_statistics_are_those_of_the_closed_form(tmp_path, monkeypatch, capsys):
+    """Independent of the spline: the rated load at every pose of the same fine grid."""
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    assert main(["table", "show", "--json", "maps.json"]) == 0
+    told = json.loads((tmp_path / "maps.json").read_text())
+    table = load_table(shipped_file("precomputed/palmieri2015.npz"))
+    poses = table.workspace.grid(41)
+    poses = poses[table.workspace.operative(poses)]
+    configuration = table.mechanism.forward(poses)
+    operators = contact_operators(configuration, table.components, np.zeros(3))
+    exact = rated_map(configuration, operators, table.geometry)
+    for name, values in (("s_um", 1e6 * exact[:, 3]), ("s_z_um", 1e6 * exact[:, 2])):
+        assert told["operative"][name]["mean"] == pytest.approx(values.mean(), rel=0.01)
+    phi = 100.0 * np.degrees(exact[:, 4])
+    assert told["operative"]["phi_1e-2deg"]["max"] == pytest.approx(phi.max(), rel=0.05)
+    assert told["domain_max"]["s_um"] >= told["operative"]["s_um"]["max"]
+    shown = capsys.readouterr().out
+    assert f"mean {told['operative']['s_um']['mean']:7.2f}" in shown
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--load", "1", "2"], "3 or 6 numbers, not 2"),
+        (["--load", "0", "0", "-50"], "50 N"),
+        (["--load", "0", "0", "nan"], "nan"),
+        (["-o", "a_file"], "a_file: cannot be made"),
+    ],
+)
+def test_show_refuses(small_table, tmp_path, monkeypatch, refused, options, named):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a_file").touch()
+    assert named in refused("table", "show", small_table[1], *options)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["-o", "table.txt"], "table.txt: a table's name ends in .npz"),
+        (["-o", "nowhere/table.npz"], "nowhere: no such folder"),
+        (["-o", "table.npz", "--grid", "1"], "1 x 1"),
+        (["-o", "table.npz", "--tolerance", "0"], "tolerance 0 is not above 0"),
+        (["-o", "table.npz", "--tolerance", "nan"], "tolerance nan is not above 0"),
+        (["-o", "table.npz", "--interface", "soft"], "'soft'"),
+        (["missing.yaml", "-o", "table.npz"], "missing.yaml: cannot be read"),
+        (["flat.yaml", "-o", "table.npz"], "wall_mm: -0.75 is not above 0"),
+        ([], "-o/--output"),
+    ],
+)
+def test_build_refuses_before_it_computes(tmp_path, monkeypatch, refused, options, named):
+    monkeypatch.chdir(tmp_path)
+    shipped = shipped_file("config/palmieri2015.yaml").read_text()
+    values = yaml.safe_load(shipped)
+    values["bushings"]["joint_4"]["wall_mm"] = -0.75
+    (tmp_path / "flat.yaml").write_text(yaml.safe_dump(values))
+    assert named in refused("table", "build", *options)
+    assert not (tmp_path / "table.npz").exists()
