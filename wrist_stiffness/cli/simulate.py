@@ -1,50 +1,97 @@
-"""`wrist-stiffness simulate`: a recording of the virtual cell."""
+"""`wrist-stiffness simulate`: a recording of the virtual cell, with or without a hidden effect."""
+
+from __future__ import annotations
 
 import argparse
-import json
-import os
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
-from wrist_stiffness.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from wrist_stiffness.lookup.table import Table
+    from wrist_stiffness.simulation.cell import CellSettings
+
+DESCRIPTION = """\
+Write a recording of a virtual wrist at work. Its true laws are finer than those of any model; with
+--effect or --blind it hides one more. Sizes are in units of one sample's noise."""
+
+EPILOG = """\
+examples:
+  wrist-stiffness simulate -o clean --seconds 120
+  wrist-stiffness simulate -o play --effect joint_clearance@joint_3 --size 3
+  wrist-stiffness simulate -o riddle --blind 7 --seconds 120   # what is it?
+  wrist-stiffness simulate --reveal 7 --seconds 120            # the same options open it"""
 
 
-def add_parser(commands: "argparse._SubParsersAction[OneLineParser]") -> None:
-    """Add the command."""
-    parser = commands.add_parser("simulate", help="write a recording of a virtual cell")
-    parser.add_argument(
-        "-o", "--output", required=True, metavar="RECORDING", help="rosbag2 folder or .mcap file"
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `simulate`."""
+    parser = commands.add_parser(
+        "simulate",
+        help="write a recording of a virtual cell",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("-o", "--output", metavar="RECORDING", help="rosbag2 folder or .mcap file")
     parser.add_argument("--table", help="table of the true wrist (default: the shipped one)")
     parser.add_argument("--seconds", type=float, default=60.0, help="duration (default: 60)")
     parser.add_argument("--rate", type=float, default=100.0, help="samples per second (100)")
     parser.add_argument("--seed", type=int, default=0, help="of program and noise (default: 0)")
     parser.add_argument(
+        "--experiment",
+        default="rich",
+        help="rich, paper, dead_weights or production (default: rich)",
+    )
+    parser.add_argument(
         "--instrument",
         default="interferometer",
         help="pose sensor: interferometer, tracker, cmm, ideal (default: interferometer)",
     )
+    parser.add_argument(
+        "--base", default="exact", help="exact, or wrong as real wrists are (default: exact)"
+    )
+    secret = parser.add_mutually_exclusive_group()
+    secret.add_argument(
+        "--effect", metavar="NAME@COMPONENT[:FORM]", help="hide this effect (names: docs)"
+    )
+    secret.add_argument("--blind", type=int, metavar="SEED", help="hide what the seed draws")
+    secret.add_argument("--reveal", type=int, metavar="SEED", help="tell what the seed hid")
+    parser.add_argument("--size", type=float, default=3.0, help="of --effect (default: 3)")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing recording")
-    parser.add_argument("--json", metavar="FILE", help="write the result there")
-    parser.set_defaults(run=run)
+    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+    parser.set_defaults(run=_run)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Simulate, then say what was written."""
+def _run(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.simulation.cell import CellSettings
-    from wrist_stiffness.workflows.simulate import simulate_recording
+    from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.simulate import hide, hide_blind, simulate_recording
 
+    table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
     settings = CellSettings(
         rate_hz=arguments.rate,
         program_seconds=arguments.seconds,
         program_seed=max(arguments.seed, 0),
+        experiment=arguments.experiment,
         instrument=arguments.instrument,
+        base=arguments.base,
+        base_seed=max(arguments.seed, 0),
     )
+    if arguments.reveal is not None:
+        return _reveal(arguments, table, settings)
+    if arguments.output is None:
+        raise InputError("simulate: -o RECORDING says where to write")
+    if arguments.blind is not None:
+        settings = hide_blind(arguments.blind, table, settings, arguments.seconds)
+    elif arguments.effect is not None:
+        settings = hide(arguments.effect, arguments.size, table, settings, arguments.seconds)
     written = simulate_recording(
         arguments.output,
-        load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz")),
+        table,
         settings,
         arguments.seconds,
         arguments.seed,
@@ -52,8 +99,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.overwrite,
     )
     if arguments.json:
-        _write_json(
-            Path(arguments.json),
+        write_json(
+            arguments.json,
             {
                 "recording": str(written.path),
                 "samples": written.samples,
@@ -64,7 +111,19 @@ def run(arguments: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _write_json(path: Path, result: dict[str, object]) -> None:
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    os.replace(partial, path)
+def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
+    from dataclasses import asdict
+
+    from wrist_stiffness.simulation.blind import draw
+    from wrist_stiffness.simulation.catalogue import ALL
+    from wrist_stiffness.workflows.json_file import write_json
+
+    secret = draw(arguments.reveal, table, settings, arguments.seconds)
+    hidden = secret.hidden
+    if arguments.json:
+        write_json(arguments.json, {"size": secret.size, **asdict(hidden)})
+    print(
+        f"{hidden.effect}@{hidden.component} ({hidden.form}): {hidden.magnitude:.4g} "
+        f"{ALL[hidden.effect].unit}, size {secret.size:.3g} times the noise of one sample"
+    )
+    return EXIT_DONE

@@ -12,13 +12,18 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import angles_text, first_where
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.drive import Drive
 from wrist_stiffness.simulation.experiment import experiment
+from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, instrument
 from wrist_stiffness.simulation.laws.law import Law
 from wrist_stiffness.simulation.program import Program
 from wrist_stiffness.simulation.wrist import TrueState, TrueWrist
+
+SENSED = (*HEATED, "ambient")
+"""Bodies whose temperature the cell knows."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,8 @@ class CellSettings:
         Noise of the load estimate.
     hidden : tuple of HiddenEffect
         What the true wrist has besides its base.
+    base, base_seed : str, int
+        `exact`, or `wrong` as the seed draws it.
 
     Raises
     ------
@@ -55,6 +62,8 @@ class CellSettings:
     instrument: str = "interferometer"
     load_sensor: LoadSensor = LoadSensor()
     hidden: tuple[HiddenEffect, ...] = ()
+    base: str = "exact"
+    base_seed: int = 0
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -83,8 +92,8 @@ class CellSample:
         Rotation as measured.
     measured_shift : (..., 3) float
         Position as measured [m].
-    temperature : (..., 7) float
-        Of the bodies `heat.HEATED`, absolute [degC].
+    temperature : (..., 8) float
+        Of `SENSED` [degC].
     """
 
     encoder: Array
@@ -122,7 +131,10 @@ class VirtualCell:
             np.random.default_rng(settings.program_seed),
             settings.program_seconds,
         )
-        self._laws: Sequence[Law] = [build(hidden, table) for hidden in settings.hidden]
+        self._laws: Sequence[Law] = [
+            *(build(hidden, table) for hidden in settings.hidden),
+            *base_laws(settings.base, table, np.random.default_rng(settings.base_seed)),
+        ]
         self._wrist = TrueWrist(table, self._laws)
         drive_rng, load_rng, pose_rng = rng.spawn(3)
         sensor, pose_sensor = settings.load_sensor, instrument(settings.instrument)
@@ -192,7 +204,8 @@ class VirtualCell:
             pose_shift=true.shift,
             measured_rotation=wobble @ rotation,
             measured_shift=shift + noise[:, :3],
-            temperature=self.table.geometry.reference_temperature + true.block.temperature,
+            temperature=self.table.geometry.reference_temperature
+            + np.column_stack([true.block.temperature, room]),
         )
 
     def _readings(

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -20,7 +21,9 @@ MAX_SWEEPS = 60
 """Passes in which histories (creep, friction) and equilibrium find each other."""
 
 SWEEP_TOLERANCE = 1e-13
-"""Largest change of the platform's twist in the last pass [m, rad]."""
+"""Largest change of the platform's twist in the last pass, up to `TWIST_SCALE` [m, rad]."""
+
+TWIST_SCALE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -130,8 +133,14 @@ class TrueWrist:
             before = state
             moved, friction = self._histories(block, pose, state, screws, acting, False)
             state = pose.solve(load, moved, bends, pose.friction_wrench(friction))
-            if np.max(np.abs(state.twist - before.twist)) <= SWEEP_TOLERANCE:
+            change = np.max(np.abs(state.twist - before.twist))
+            if change <= SWEEP_TOLERANCE * max(1.0, np.max(np.abs(state.twist)) / TWIST_SCALE):
                 break
+        else:
+            raise InputError(
+                f"true wrist: creep or friction found no equilibrium in {MAX_SWEEPS} passes; the "
+                f"last changed the platform's twist by {change:.1e}"
+            )
         self._histories(block, pose, state, screws, acting, True)
         return state
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,16 +21,22 @@ from wrist_stiffness.recording.messages import (
     PoseStamped,
     Quaternion,
     String,
+    Temperature,
     Vector3,
     Wrench,
     WrenchStamped,
 )
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
-from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
+from wrist_stiffness.simulation.blind import draw
+from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
+from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
+from wrist_stiffness.simulation.size import Scale
 
 BASE_FRAME = "wrist_base"
 START_NS = 1_700_000_000_000_000_000
 """Stamp of a recording's first sample: a fixed date, so that a seed gives the same bytes."""
+
+THERMOMETER_STEP_K = 0.1
 
 BLOCK = 500
 """Samples in memory at a time."""
@@ -101,6 +107,7 @@ def simulate_recording(
         raise InputError(f"simulate: seed {seed} is negative")
     cell = VirtualCell(table, settings, np.random.default_rng(seed))
     total = max(1, round(seconds * settings.rate_hz))
+    thermometer = max(1, round(settings.rate_hz))
     with RecordingWriter(path, overwrite=overwrite) as writer:
         notes = String(json.dumps(recording_notes(table, settings), sort_keys=True))
         writer.write(topics.RECORDING_NOTES, notes, START_NS)
@@ -110,10 +117,62 @@ def simulate_recording(
             sent = cell.desired(time_s)
             block = cell.run(time_s, sent)
             for i, t in enumerate(time_s):
-                _write_sample(writer, START_NS + round(t * 1e9), sent[i], block[i])
+                stamp_ns = START_NS + round(t * 1e9)
+                _write_sample(writer, stamp_ns, sent[i], block[i])
+                if (first + i) % thermometer == 0:
+                    _write_temperatures(writer, stamp_ns, block[i])
             if progress is not None:
                 progress(int(number[-1]) + 1, total)
     return Simulated(Path(path), total, total / settings.rate_hz)
+
+
+def hide(
+    name: str, size: float, table: Table, settings: CellSettings, seconds: float
+) -> CellSettings:
+    """Return the settings with one more hidden effect of a wanted size.
+
+    Parameters
+    ----------
+    name : str
+        `NAME@COMPONENT` or `NAME@COMPONENT:FORM` of the catalogue; the first form by default.
+    size : float
+        In units of one sample's noise, over this experiment.
+    table : Table
+        Of the wrist.
+    settings : CellSettings
+        The experiment.
+    seconds : float
+        Its duration [s].
+
+    Returns
+    -------
+    CellSettings
+        The same with the effect.
+
+    Raises
+    ------
+    InputError
+        If the name is not in the catalogue or the size cannot be had.
+    """
+    effect, _, place = name.partition("@")
+    component, _, form = place.partition(":")
+    if effect not in ALL or not component:
+        raise InputError(
+            f"effect {name!r} is not NAME@COMPONENT with a NAME of: {', '.join(sorted(ALL))}"
+        )
+    if not (np.isfinite(size) and size > 0.0):
+        raise InputError(f"effect {name!r}: size {size:g} is not a positive number")
+    entry = ALL[effect]
+    start = HiddenEffect(
+        effect, component, form or entry.forms[0], entry.plausible, settings.program_seed
+    )
+    hidden = Scale(table, settings, seconds).sized(start, size)
+    return replace(settings, hidden=(*settings.hidden, hidden))
+
+
+def hide_blind(seed: int, table: Table, settings: CellSettings, seconds: float) -> CellSettings:
+    """Return the settings with the effect that a seed draws (see `blind.draw`)."""
+    return replace(settings, hidden=(draw(seed, table, settings, seconds).hidden,))
 
 
 def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
@@ -142,3 +201,10 @@ def _write_sample(
         (topics.PLATFORM_POSE, PoseStamped(header, pose)),
     ):
         writer.write(topic, message, stamp_ns)
+
+
+def _write_temperatures(writer: RecordingWriter, stamp_ns: int, sample: CellSample) -> None:
+    for component, celsius in zip(SENSED, sample.temperature.tolist(), strict=True):
+        shown = THERMOMETER_STEP_K * round(celsius / THERMOMETER_STEP_K)
+        message = Temperature(Header(stamp_ns, component), shown, THERMOMETER_STEP_K**2 / 12.0)
+        writer.write(topics.TEMPERATURES, message, stamp_ns)
