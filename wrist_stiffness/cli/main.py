@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from wrist_stiffness import __version__
-from wrist_stiffness.cli import cell, predict, replay, simulate, table
+from wrist_stiffness.cli import cell, explain, predict, replay, simulate, table
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -47,7 +47,7 @@ class CommandModule(Protocol):
         """Add this command's parser."""
 
 
-COMMANDS: tuple[CommandModule, ...] = (table, predict, simulate, replay, cell)
+COMMANDS: tuple[CommandModule, ...] = (table, predict, explain, simulate, replay, cell)
 
 
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:

@@ -17,7 +17,7 @@ from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import Memory, evaluate, parameter_twists
+from wrist_stiffness.model.evaluation import Memory, evaluate, parameter_changes
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.situation import lengths
 
@@ -326,9 +326,11 @@ class Session:
         twist = result.twist[0]
         covariance = model.table_covariance(configuration, twist)
         states = memory.states if memory else (None,) * len(model.effects)
+        at = result.situation
         for effect, state in zip(model.effects, states, strict=True):
-            for moved in parameter_twists(effect, result, state).values():
-                covariance += np.outer(moved[0], moved[0])
+            for change in parameter_changes(effect, at, state):
+                moved = at.with_contact(*at.carried(change), result.active)[0]
+                covariance += np.outer(moved, moved)
         prediction = Prediction(
             twist, covariance, configuration, result.active[0], result.measured[0], result.warnings
         )

@@ -6,7 +6,6 @@ xi = C W + sum_k G_k delta_k + B lambda
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -181,35 +180,30 @@ def with_speeds(block: Block, memory: Memory | None) -> Block:
     return replace(block, theta_dot=speed)
 
 
-def parameter_twists(effect: Effect, result: Evaluated, state: Any) -> Mapping[str, Array]:
-    """Return what one standard uncertainty of each parameter of an effect moves.
+def parameter_changes(effect: Effect, at: Situation, state: Any) -> list[Contribution]:
+    """Return what one standard uncertainty of each uncertain parameter of an effect adds.
 
     Parameters
     ----------
     effect : Effect
         One of the evaluated model.
-    result : Evaluated
-        The evaluation.
+    at : Situation
+        As the evaluation left it.
     state : object
-        Its state before the block.
+        The effect's state before the block.
 
     Returns
     -------
-    dict of str to (n, 6) float
-        Twist of the platform by the parameter's name [m, rad].
+    list of Contribution
+        Empty where the effect lacks a signal.
     """
-    at = result.situation
-    moved = {}
-    for other in effect.varied:
-        key = next(k for k in other.estimates if other.estimates[k] != effect.estimates[k])
-        try:
-            change = effect.law.changed_contribution(
-                at, effect.component, effect.si, other.si, state
-            )
-        except MissingSignalError:
-            continue
-        moved[key] = at.with_contact(*at.carried(change), result.active)[0]
-    return moved
+    try:
+        return [
+            effect.law.changed_contribution(at, effect.component, effect.si, other.si, state)
+            for other in effect.varied
+        ]
+    except MissingSignalError:
+        return []
 
 
 def _first_order(effect: Effect, added: Contribution) -> list[str]:

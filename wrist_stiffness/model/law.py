@@ -204,3 +204,7 @@ class Law(ABC):
     ) -> ElasticComponents:
         """Return the elastic parts with the effect; only laws of the stage `parts` change them."""
         return parts
+
+    def part_factor(self, values: Mapping[str, float]) -> float:
+        """Return by how much a law of the stage `parts` scales the flexibility of its part."""
+        return 1.0

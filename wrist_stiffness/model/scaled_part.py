@@ -26,6 +26,10 @@ class ScaledPart(Law):
         """Return the fraction."""
         return (Parameter("flexibility_percent", -90.0, 900.0, 30.0, linear=False),)
 
+    def part_factor(self, values: Mapping[str, float]) -> float:
+        """Return 1 + fraction."""
+        return 1.0 + values["flexibility_percent"]
+
     def changed(
         self,
         parts: ElasticComponents,
@@ -34,7 +38,7 @@ class ScaledPart(Law):
         values: Mapping[str, float],
     ) -> ElasticComponents:
         """Return the parts with one of them scaled."""
-        factor = 1.0 + values["flexibility_percent"]
+        factor = self.part_factor(values)
         flexibility = parts.flexibility.copy()
         flexibility[ELASTIC.index(place)] *= factor
         contact = dict(parts.contact)
@@ -57,7 +61,7 @@ class ScaledPart(Law):
         state: Any,
     ) -> Contribution:
         """Return the further screw of the part under the wrench that it carries now."""
-        now, then = (1.0 + v["flexibility_percent"] for v in (values, others))
+        now, then = self.part_factor(values), self.part_factor(others)
         return Contribution(**{LIMB[place]: (then / now - 1.0) * at.elastic_screw(place)})
 
 

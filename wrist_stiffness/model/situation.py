@@ -166,14 +166,32 @@ class Situation:
         k = ELASTIC.index(place)
         return (self._turned_flexibility[:, k] @ self.through[:, k, :, None])[..., 0]
 
+    def screws_under(self, through: Array, force: Array) -> Array:
+        """Return the elastic screw of each component; a bushing's flanges belong to it.
+
+        Parameters
+        ----------
+        through : (n, 8, 6) float
+            Wrench through the components at O in F [N, N m].
+        force : (n, m) float
+            Of the flange sectors [N].
+
+        Returns
+        -------
+        (n, 8, 6) float
+            At O in F [m, rad].
+        """
+        screws: Array = (self._turned_flexibility @ through[..., None])[..., 0]
+        own = self.parts.sectors.component
+        turn = block_diagonal(component_rotations(self.configuration).take(own, axis=-3))
+        pressed = np.einsum("nmij,mj,nm->nmi", turn, self.parts.sectors.screw, force)
+        belongs = own[:, None] == np.arange(len(ELASTIC))
+        return screws + np.einsum("nmi,mk->nki", pressed, belongs)
+
     @cached_property
     def slides(self) -> Array:
         """Slides of joint_2 to joint_4 under all that earlier stages added, (n, 3) [m]."""
-        bent = (self._turned_flexibility @ self.through[..., None])[..., 0]
-        sectors = self.parts.sectors
-        turn = block_diagonal(component_rotations(self.configuration))
-        for sector, k in enumerate(sectors.component):
-            bent[:, k] += turn[:, k] @ sectors.screw[sector] * self.contact_force[:, sector, None]
+        bent = self.screws_under(self.through, self.contact_force)
         moved = slides(self.influence, bent)
         relative = _difference(self.given.limb_1, self.given.limb_2)
         if relative is not None:
@@ -239,9 +257,7 @@ class Situation:
             gap += added.gap
         return twist, gap
 
-    def with_contact(
-        self, twist: Array, gap: Array, closed: NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
+    def with_contact(self, twist: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
         """Return what a carried contribution does where the closed sectors hold: the tangent.
 
         Parameters
@@ -255,13 +271,11 @@ class Situation:
 
         Returns
         -------
-        twist : (n, 6) float
-            Of the platform [m, rad].
-        force : (n, m) float
-            Change of the contact forces [N].
+        (n, 6) float
+            Twist of the platform [m, rad].
         """
         force = forces_of(self.operators.approach, gap, closed)
-        return twist + (self.operators.force_twist @ force[..., None])[..., 0], force
+        return twist + (self.operators.force_twist @ force[..., None])[..., 0]
 
     def slide_flexibility(self, joint: str) -> tuple[Array, Array]:
         """Return how far a joint slides, and turns, for a unit force, and torque, along its axis.

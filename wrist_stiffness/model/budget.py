@@ -1,0 +1,137 @@
+"""Split a predicted pose error by component and by effect, so that the parts add up to it.
+
+Contact is held as the whole solution left it: sectors that touch stay closed, and each part's share
+is the tangent of that state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.energy import component_wrenches
+from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.model.block import Sample
+from wrist_stiffness.model.contacts import forces_of
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.evaluation import evaluate, parameter_changes
+from wrist_stiffness.model.law import Contribution
+from wrist_stiffness.model.situation import Situation
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one component or one effect adds to the pose error.
+
+    Parameters
+    ----------
+    name : str
+        Component, or effect@component.
+    twist : (6,) float
+        At O in F [m, rad].
+    spread : (p, 6) float
+        Twist of one standard uncertainty of each uncertain parameter [m, rad].
+    """
+
+    name: str
+    twist: Array
+    spread: Array
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A pose error and its shares.
+
+    Parameters
+    ----------
+    elastic : tuple of Share
+        Of the elastic components as the table has them, in the order of `ELASTIC`.
+    effects : tuple of Share
+        Of the model's effects, in their order.
+    second_order : (6,) float
+        What the exact composition with the pose sensor's effects adds to the sum [m, rad].
+    twist : (6,) float
+        Pose error of the platform [m, rad].
+    measured : (6,) float
+        What the pose sensor would say of it: the sum of all shares and `second_order` [m, rad].
+    table_covariance : (6, 6) float
+        Of the table's stated error and the encoder step.
+    platform : (3, 3) float
+        Rotation U -> F of the rigid platform.
+    warnings : tuple of str
+        Effects that were left out or have left first order.
+    """
+
+    elastic: tuple[Share, ...]
+    effects: tuple[Share, ...]
+    second_order: Array
+    twist: Array
+    measured: Array
+    table_covariance: Array
+    platform: Array
+    warnings: tuple[str, ...]
+
+
+def budget(model: ErrorModel, sample: Sample) -> Budget:
+    """Split the pose error of one sample, at rest and with nothing before it.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its table is evaluated in closed form, which alone knows the components.
+    sample : Sample
+        Angles, load and other signals.
+
+    Returns
+    -------
+    Budget
+        Shares that add up.
+
+    Raises
+    ------
+    UnreachablePoseError, SingularPoseError, LoadRangeError
+        If pose or load are out of range.
+    """
+    model = model.with_evaluation("closed_form")
+    configuration = model.table.workspace.configuration(sample.theta)
+    model.table.check_load(sample.load.wrench)
+    result, _ = evaluate(model, sample.block, None)
+    at = result.situation
+    force = forces_of(at.operators.approach, at.told[1], result.active)
+    through = at.own_weight + component_wrenches(configuration, at.parts, at.load, force)
+    screws = at.screws_under(through, force)
+    carried = block_diagonal(at.influence.of_components()) @ screws[..., None]
+    twists = carried[0, :, :, 0]
+    effects = []
+    for effect, added in zip(model.effects, result.contributions, strict=True):
+        if effect.stage == "parts":
+            k = ELASTIC.index(effect.component)
+            nominal = twists[k] / effect.law.part_factor(effect.si)
+            twist, twists[k] = twists[k] - nominal, nominal
+        else:
+            twist = _felt(at, added, result.active)
+        spread = [_felt(at, c, result.active) for c in parameter_changes(effect, at, None)]
+        effects.append(Share(effect.name, twist, np.reshape(spread, (-1, 6))))
+    elastic = [Share(name, twists[k], np.empty((0, 6))) for k, name in enumerate(ELASTIC)]
+    total = twists.sum(axis=0) + sum((share.twist for share in effects), np.zeros(6))
+    return Budget(
+        tuple(elastic),
+        tuple(effects),
+        result.measured[0] - total,
+        result.twist[0],
+        result.measured[0],
+        model.table_covariance(configuration, result.twist[0]),
+        configuration.platform,
+        result.warnings,
+    )
+
+
+def _felt(at: Situation, added: Contribution, closed: NDArray[np.bool_]) -> Array:
+    """Twist (6,) of a contribution at the pose sensor, to first order."""
+    twist: Array = at.with_contact(*at.carried(added), closed)[0]
+    for sensor in (added.sensor_left, added.sensor_right):
+        twist = twist if sensor is None else twist + sensor[0]
+    return twist
