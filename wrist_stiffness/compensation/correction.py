@@ -12,8 +12,8 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
-STEP_TOLERANCE = 1e-10
-"""A fixed-point step below this ends the search [rad]; 1e-6 of an encoder step."""
+TOLERANCE = 1e-10
+"""The search ends where the angles are known to this [rad]; 1e-6 of an encoder step."""
 
 MAX_ITERATIONS = 20
 
@@ -29,7 +29,7 @@ class Correction:
     before, after : (6,) float
         Residual twist, actual minus desired, at O in F without and with the correction [m, rad].
     prediction : Prediction
-        At the corrected angles.
+        At the corrected angles, or so near to them that the twist is the same.
     """
 
     delta: Array
@@ -72,17 +72,22 @@ def correct(model: ErrorModel, command: Array, load: Load, objective: Objective)
     task = objective.matrix(desired)
     step_of_task = np.linalg.pinv(task[:, 3:] @ model.table.mechanism.jacobian(desired))
     before = residual_twist(prediction, desired.platform)
-    after, delta = before, np.zeros(2)
+    reached = Correction(np.zeros(2), before, before, prediction)
+    size = np.inf
     for _ in range(MAX_ITERATIONS):
-        step = -step_of_task @ (task @ after)
-        if np.max(np.abs(step)) < STEP_TOLERANCE:
-            return Correction(delta, before, after, prediction)
-        delta = delta + step
+        step = -step_of_task @ (task @ reached.after)
+        last, size = size, float(np.max(np.abs(step)))
+        # The steps shrink by a constant factor, so the last two of them bound what is missing.
+        if size < TOLERANCE or (size < last < np.inf and size**2 < TOLERANCE * (last - size)):
+            return as_applied(model, reached, reached.delta + step)
+        delta = reached.delta + step
         prediction = model.predict(command + delta, load, prediction.active)
-        after = residual_twist(prediction, desired.platform)
+        reached = Correction(
+            delta, before, residual_twist(prediction, desired.platform), prediction
+        )
     raise InputError(
         f"correction: no fixed point after {MAX_ITERATIONS} steps, last step "
-        f"{np.degrees(np.max(np.abs(step))):.2e} deg"
+        f"{np.degrees(size):.2e} deg"
     )
 
 

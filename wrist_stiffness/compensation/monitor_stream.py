@@ -122,7 +122,7 @@ class MonitorStream(Stream):
         if abs(norm - 1.0) > UNIT_TOLERANCE:
             raise InputError(f"measured pose: quaternion has the norm {norm:.4g}, not 1")
         theta = self._angles_at(stamp_ns)
-        model = self._loaded_model()
+        model = self.loaded_model()
         prediction = model.predict(theta, self.loads.at(stamp_ns)[1])
         rotation = Rotation.from_quat(numbers[3:]).as_matrix()
         residual = residual_of_pose(rotation, numbers[:3], prediction)

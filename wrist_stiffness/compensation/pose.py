@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -23,10 +22,12 @@ def pose_of_twist(twist: Array) -> tuple[Array, Array]:
     position : (3,) float
         Where the point at O goes [m].
     quaternion : (4,) float
-        Rotation, x y z w with w >= 0.
+        Rotation, x y z w with w >= 0 for angles up to pi.
     """
-    quaternion = Rotation.from_rotvec(twist[3:]).as_quat(canonical=True)
-    return exp_twist(twist)[1], quaternion
+    half = 0.5 * float(np.sqrt(twist[3:] @ twist[3:]))
+    # sinc is of pi x: sin(half) / half, without a division by zero.
+    vector = 0.5 * np.sinc(half / np.pi) * twist[3:]
+    return exp_twist(twist)[1], np.append(vector, np.cos(half))
 
 
 def twist_at(twist: Array, point: Array) -> Array:

@@ -59,7 +59,8 @@ class Stream:
         """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
         return self.loads.tare()
 
-    def _loaded_model(self) -> ErrorModel:
+    def loaded_model(self) -> ErrorModel:
+        """Return the model, or raise InputError where there is none."""
         if self.model is None:
             raise InputError("no model is loaded")
         return self.model
@@ -117,7 +118,7 @@ class PredictionStream(Stream):
         """
         theta = self.settings.motors.angles(names, positions)
         load_stamp_ns, load = self.loads.at(stamp_ns)
-        return PredictedSample(stamp_ns, load_stamp_ns, self._loaded_model().predict(theta, load))
+        return PredictedSample(stamp_ns, load_stamp_ns, self.loaded_model().predict(theta, load))
 
 
 @dataclass(frozen=True)
@@ -243,7 +244,7 @@ class CorrectionStream(Stream):
                 fault = error
         delta = self._advance(stamp_ns, theta, correction)
         if correction is not None:
-            correction = as_applied(self._loaded_model(), correction, delta)
+            correction = as_applied(self.loaded_model(), correction, delta)
         sent[list(self.settings.motors.places(names))] = theta + delta
         marked = self.enabled or bool(np.any(delta))
         return CorrectedCommand(
@@ -308,7 +309,7 @@ class CorrectionStream(Stream):
 
     def _correction(self, load: Load, theta: Array) -> Correction:
         """Return the correction that is wanted: faded by the guards, refused beyond the limit."""
-        model = self._loaded_model()
+        model = self.loaded_model()
         platform = model.table.geometry.platform
         objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
         correction = correct(model, theta, load, objective)
@@ -331,5 +332,5 @@ class CorrectionStream(Stream):
         return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
 
     def _within_limits(self, load: Load, theta: Array) -> Array:
-        limits = self._loaded_model().table.geometry.limits
+        limits = self.loaded_model().table.geometry.limits
         return within_joint_limits(theta, self._correction(load, theta).delta, limits)

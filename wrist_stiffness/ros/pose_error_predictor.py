@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,16 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from visualization_msgs.msg import MarkerArray
 
+from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
+from wrist_stiffness.model.error_model import Prediction
 from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.load_wait import LoadWait
+from wrist_stiffness.ros.markers import wrist_markers
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.settings import PREDICTION
@@ -36,6 +41,7 @@ class PoseErrorPredictor(WristNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
+        self._drawn_ns = -NANOSECONDS
         wait_s = self.get_parameter("load_wait_s").value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.waiting = LoadWait(wait_s, lambda: steady.now().nanoseconds)
@@ -56,11 +62,12 @@ class PoseErrorPredictor(WristNode):
         self._phi_mdeg = self.create_lifecycle_publisher(
             Float64, "/pose_error/phi_mdeg", RELIABLE_QOS
         )
+        self._markers = self.create_lifecycle_publisher(MarkerArray, "/wrist_markers", RELIABLE_QOS)
         return super().on_configure(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Remove the outputs."""
-        for publisher in (self._error, self._s_um, self._phi_mdeg):
+        for publisher in (self._error, self._s_um, self._phi_mdeg, self._markers):
             self.destroy_lifecycle_publisher(publisher)
         return super().on_cleanup(state)
 
@@ -88,10 +95,24 @@ class PoseErrorPredictor(WristNode):
         except WristError as error:
             self.warn(error)
             return
-        self._error.publish(error_message(stamp_ns, prediction.twist, prediction.covariance))
-        self._s_um.publish(Float64(data=prediction.shift_norm * MICROMETRES))
+        error_out = error_message(stamp_ns, prediction.twist, prediction.covariance)
+        self._error.publish(error_out)
+        shift = error_out.pose.pose.position
+        self._s_um.publish(Float64(data=hypot(shift.x, shift.y, shift.z) * MICROMETRES))
         self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
         self.health.good()
+        self._draw(stamp_ns, prediction)
+
+    def _draw(self, stamp_ns: int, prediction: Prediction) -> None:
+        rate_hz = self.get_parameter("marker_rate_hz").value
+        # A stamp before the last one drawn says that the clock jumped back.
+        since_s = (stamp_ns - self._drawn_ns) / NANOSECONDS
+        if rate_hz == 0.0 or 0.0 <= since_s < 1.0 / rate_hz:
+            return
+        self._drawn_ns = stamp_ns
+        exaggeration = self.get_parameter("marker_exaggeration").value
+        table = self.stream.loaded_model().table
+        self._markers.publish(wrist_markers(stamp_ns, table, prediction, exaggeration))
 
 
 def main() -> int:

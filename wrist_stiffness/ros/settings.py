@@ -48,6 +48,12 @@ PREDICTION = (
         upper=1.0,
         fixed=True,
     ),
+    ParameterEntry(
+        "marker_rate_hz", 10.0, "of /wrist_markers; 0 for none [1/s]", lower=0.0, upper=100.0
+    ),
+    ParameterEntry(
+        "marker_exaggeration", 1000.0, "factor on the error drawn [-]", lower=0.0, upper=1e6
+    ),
 )
 
 CORRECTION = (

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from visualization_msgs.msg import Marker, MarkerArray
+
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.ros.markers import wrist_markers
+from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
+
+SECOND = 1_000_000_000
+DOWN = Load(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
+
+
+def place(point):
+    return np.array([point.x, point.y, point.z])
+
+
+@pytest.fixture
+def drawn(model):
+    prediction = model.predict(np.array([0.4, -0.3]), DOWN)
+    message = wrist_markers(SECOND, model.table, prediction, 500.0)
+    return prediction, {marker.ns: marker for marker in message.markers}
+
+
+def test_links_run_from_joint_to_joint(drawn):
+    prediction, markers = drawn
+    configuration = prediction.configuration
+    ends = {
+        "link_1": (np.array([1.0, 0.0, 0.0]), configuration.b, 0.031),
+        "link_2": (np.array([0.0, 1.0, 0.0]), configuration.d, 0.037),
+        "link_3": (configuration.d, configuration.c, 0.033),
+    }
+    for link, (start, end, radius) in ends.items():
+        points = np.array([place(point) for point in markers[link].points])
+        assert np.allclose(np.linalg.norm(points, axis=1), radius)
+        assert np.allclose(np.abs(points[0] @ start), radius)
+        assert np.allclose(np.abs(points[-1] @ end), radius)
+
+
+def test_the_platform_lies_below_o_and_is_moved_by_the_exaggerated_error(drawn, model):
+    prediction, markers = drawn
+    centre, normal = model.table.geometry.platform.centre, model.table.geometry.platform.normal
+    rigid, actual = markers["platform rigid"], markers["platform"]
+    assert np.allclose(place(rigid.pose.position), prediction.configuration.platform @ centre)
+    q = rigid.pose.orientation
+    stands = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()[:, 2]
+    assert np.allclose(stands, prediction.configuration.platform @ normal)
+    moved = place(actual.pose.position) - place(rigid.pose.position)
+    arm = prediction.configuration.platform @ centre
+    wanted = 500.0 * (prediction.twist[:3] + np.cross(prediction.twist[3:], arm))
+    assert np.allclose(moved, wanted, rtol=0.1, atol=0.02 * np.linalg.norm(wanted))
+
+
+def test_arrow_and_legend_show_the_shift(drawn):
+    prediction, markers = drawn
+    tip = place(markers["shift of O"].points[1])
+    assert np.allclose(tip, 500.0 * prediction.twist[:3], rtol=0.05, atol=1e-5)
+    assert "x 500" in markers["legend"].text
+    assert f"{1e6 * prediction.shift_norm:.2f} um" in markers["legend"].text
+
+
+def test_the_predictor_draws_at_its_rate(graph, model_path):
+    node = graph.add(PoseErrorPredictor, model_file=str(model_path), marker_rate_hz=10.0)
+    graph.listen(MarkerArray, "/wrist_markers")
+    graph.connected("/wrist_markers")
+    graph.load(SECOND)
+    graph.until(lambda: node.stream.loads.history.newest_ns == SECOND, "load")
+    for i in range(50):
+        graph.joints("/joint_states", SECOND + i * SECOND // 100)
+    graph.until(lambda: len(graph.heard["/wrist_markers"]) == 5, "five pictures")
+    marker = graph.heard["/wrist_markers"][0].markers[0]
+    assert marker.header.frame_id == "wrist_base"
+    assert marker.action == Marker.ADD
