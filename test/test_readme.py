@@ -9,6 +9,7 @@ import math
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = ("README.md", "docs/commands.md")
@@ -185,6 +189,18 @@ def test_a_wrong_document_is_found(block, fault, tmp_path):
     (command,) = commands_of(block)
     found = fault_of(command, tmp_path)
     assert (fault in found) if fault else found == ""
+
+
+def test_model_files_of_the_document_can_be_read(tmp_path):
+    shutil.copy(shipped_file("precomputed/palmieri2015.npz"), tmp_path / "my_wrist.npz")
+    examples = re.findall(
+        r"^```yaml\n(.*?)^```$", (ROOT / "docs/files.md").read_text(), re.M | re.S
+    )
+    assert examples
+    for number, example in enumerate(examples):
+        path = tmp_path / f"model_{number}.yaml"
+        path.write_text(example)
+        assert load_model(path).effects
 
 
 PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
