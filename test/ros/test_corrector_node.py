@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
@@ -11,6 +13,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from wrist_stiffness.compensation.correction import correct
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import nanoseconds, time_message
@@ -272,3 +275,27 @@ def test_a_damaged_model_leaves_the_running_one_in_use(graph, corrector, model, 
     wanted = (THETA + expected(model).delta).tolist()
     found = send_settled(graph, SECOND).position.tolist()
     assert found == pytest.approx(wanted, rel=0, abs=ROUNDING)
+
+
+def test_the_residual_is_also_given_at_the_task_point(graph, model, tmp_path):
+    tool = np.array([0.0, 0.01, 0.05])
+    geometry = dict(model.table.header.geometry)
+    geometry["platform"] = {**geometry["platform"], "tool_point_mm": (1e3 * tool).tolist()}
+    table = replace(model.table, header=replace(model.table.header, geometry=geometry))
+    save_table(table, tmp_path / "table.npz")
+    path = tmp_path / "model.yaml"
+    path.write_text("{schema: 1, name: tool, table: {path: table.npz}, effects: []}")
+    node = add_corrector(graph, path, enabled_on_start=True)
+    topic = "/pose_error_residual/task_point"
+    graph.listen(PoseWithCovarianceStamped, topic)
+    graph.connected(topic)
+    send_load(graph, node, SECOND)
+    send_settled(graph, SECOND)
+    graph.until(lambda: len(graph.heard[topic]) == 2, "residuals")
+    twist = expected(model).after
+    arm = model.table.mechanism.forward(np.array(THETA)).platform @ tool
+    place = graph.heard[topic][1].pose.pose.position
+    # One micrometre of O and the rotation that is left, times 51 mm.
+    assert [place.x, place.y, place.z] == pytest.approx(
+        (twist[:3] + np.cross(twist[3:], arm)).tolist(), rel=0, abs=1e-9
+    )

@@ -6,7 +6,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.mechanism.vectors import cross
+from wrist_stiffness.mechanism.vectors import skew
 
 
 def pose_of_twist(twist: Array) -> tuple[Array, Array]:
@@ -30,19 +30,20 @@ def pose_of_twist(twist: Array) -> tuple[Array, Array]:
     return exp_twist(twist)[1], np.append(vector, np.cos(half))
 
 
-def twist_at(twist: Array, point: Array) -> Array:
-    """Return the twist of the same motion seen at another point.
+def seen_from(point: Array) -> Array:
+    """Return the matrix that takes a twist at O to the twist of the same motion at another point.
 
     Parameters
     ----------
-    twist : (6,) float
-        At O in F, first order [m, rad].
     point : (3,) float
         In F [m].
 
     Returns
     -------
-    (6,) float
-        At the point.
+    (6, 6) float
+        Its congruence takes covariances along.  Exact for finite motions, too: the exponential of
+        the result is the same motion with the point as origin.
     """
-    return np.concatenate([twist[:3] + cross(twist[3:], point), twist[3:]])
+    matrix = np.eye(6)
+    matrix[:3, 3:] = -skew(point)
+    return matrix

@@ -13,6 +13,8 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
+from wrist_stiffness.compensation.correction import Correction
+from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import CorrectionStream
 from wrist_stiffness.errors import WristError
@@ -71,11 +73,20 @@ class AngleCorrector(WristNode):
         self._residual = self.create_lifecycle_publisher(
             PoseWithCovarianceStamped, "/pose_error_residual", RELIABLE_QOS
         )
+        self._task_residual = self.create_lifecycle_publisher(
+            PoseWithCovarianceStamped, "/pose_error_residual/task_point", RELIABLE_QOS
+        )
         return super().on_configure(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Remove the outputs."""
-        for publisher in (self._command, self._positions, self._trajectory, self._residual):
+        for publisher in (
+            self._command,
+            self._positions,
+            self._trajectory,
+            self._residual,
+            self._task_residual,
+        ):
             self.destroy_lifecycle_publisher(publisher)
         return super().on_cleanup(state)
 
@@ -105,11 +116,19 @@ class AngleCorrector(WristNode):
             self.warn(command.fault)
             return
         if command.correction is not None:
-            after = command.correction
-            self._residual.publish(
-                error_message(stamp_ns, after.after, after.prediction.covariance)
-            )
+            self._publish_residual(stamp_ns, command.correction)
         self.health.good()
+
+    def _publish_residual(self, stamp_ns: int, correction: Correction) -> None:
+        twist, prediction = correction.after, correction.prediction
+        self._residual.publish(error_message(stamp_ns, twist, prediction.covariance))
+        tool_point = self.stream.loaded_model().table.geometry.platform.tool_point
+        if not tool_point.any():
+            return
+        there = seen_from(prediction.configuration.platform @ tool_point)
+        self._task_residual.publish(
+            error_message(stamp_ns, there @ twist, there @ prediction.covariance @ there.T)
+        )
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         # A zero stamp says "at once".

@@ -60,6 +60,7 @@ TOPICS: dict[str, type[Message]] = {
     "/motor_positions_corrected": Float64MultiArray,
     "/motor_trajectory_corrected": JointTrajectory,
     "/pose_error_residual": PoseWithCovarianceStamped,
+    "/pose_error_residual/task_point": PoseWithCovarianceStamped,
     "/model_residual": PoseWithCovarianceStamped,
     "/model_alarm": Bool,
     "/diagnostics": DiagnosticArray,
