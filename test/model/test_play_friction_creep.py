@@ -1,0 +1,200 @@
+"""Laws with gaps and memory: sign, limits, closed loops, energy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
+from wrist_stiffness.model.block import Block, Load, Sample
+from wrist_stiffness.model.effects.joint_clearance import play_screw
+from wrist_stiffness.model.effects.joint_friction import slip
+from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.memory import lag, play
+
+AXIS, LENGTH, RADIAL = np.array([0.0, 0.0, 1.0]), 0.0065, 1e-5
+
+paths = arrays(float, st.tuples(st.integers(1, 40), st.just(2)), elements=st.floats(-1.0, 1.0))
+
+
+def test_pin_lies_on_the_side_of_its_force():
+    screw = play_screw(np.array([[3.0, 4.0, 7.0, 0.0, 0.0, 0.0]]), AXIS, LENGTH, RADIAL)[0]
+    assert np.allclose(screw, RADIAL * np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0]), rtol=1e-4)
+
+
+def test_couple_tilts_the_pin_corner_to_corner():
+    screw = play_screw(np.array([[0.0, 0.0, 0.0, 0.5, 0.0, 0.2]]), AXIS, LENGTH, RADIAL)[0]
+    assert np.allclose(screw, [0.0, 0.0, 0.0, 2.0 * RADIAL / LENGTH, 0.0, 0.0], rtol=1e-4)
+
+
+@given(arrays(float, (1, 6), elements=st.floats(-5.0, 5.0)))
+def test_play_yields_to_its_wrench(wrench):
+    """The work of the wrench is never negative, and no end moves further than the play."""
+    screw = play_screw(wrench, AXIS, LENGTH, RADIAL)[0]
+    assert wrench[0] @ screw >= 0.0
+    for end in (0.5 * LENGTH * AXIS, -0.5 * LENGTH * AXIS):
+        moved = screw[:3] + np.cross(screw[3:], end)
+        assert np.linalg.norm(moved) <= RADIAL * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_play_vanishes_with_its_gap_and_follows_its_load(weightless, make, joint):
+    """Without friction or weight the load's work on the play is positive, both ways."""
+    for sign in (1.0, -1.0):
+        block = make.rest((20.0, -10.0), sign * np.array([0.5, -0.4, -1.0, 0.01, 0.02, -0.01]))
+        whole, half = (
+            make.added(weightless, make.effect(f"joint_clearance@{joint}", clearance_um=c), block)[
+                0
+            ]
+            for c in (2.0, 1.0)
+        )
+        assert whole @ block.load[0] > 0.0
+        assert np.allclose(half, 0.5 * whole, rtol=1e-9)
+        none = make.effect(f"joint_clearance@{joint}", clearance_um=0.0)
+        assert not make.added(weightless, none, block).any()
+
+
+@given(paths, st.floats(0.0, 1.0))
+def test_play_is_a_clamp_after_a_clamp(values, width):
+    start = values[0]
+    followed, y = play(values, width, start), start
+    for u, at_once in zip(values, followed, strict=True):
+        y = np.minimum(np.maximum(y, u - width), u + width)
+        assert np.array_equal(y, at_once)
+
+
+@given(paths, st.floats(0.01, 10.0), st.integers(0, 100))
+def test_lag_is_a_step_after_a_step(values, time_constant, seed):
+    interval = np.random.default_rng(seed).uniform(0.0, 2.0, len(values))
+    before, start = np.array([0.3, -0.2]), np.array([0.1, 0.5])
+    slow = lag(values, interval, time_constant, before, start)
+    x, u_before = start, before
+    for u, dt, at_once in zip(values, interval, slow, strict=True):
+        decay = np.exp(-dt / time_constant)
+        x = decay * x + (1.0 - decay) * 0.5 * (u_before + u)
+        u_before = u
+        assert np.allclose(x, at_once, rtol=1e-12, atol=1e-13)
+
+
+PERIOD = 100
+
+
+def swing(degrees):
+    """Three equal periods of both motors in step, unloaded."""
+    phase = 2.0 * np.pi * np.arange(3 * PERIOD) / PERIOD
+    theta = np.radians(degrees) * np.stack([np.sin(phase), 0.7 * np.sin(phase)], axis=1)
+    return Block(0.02 * np.arange(3.0 * PERIOD), theta, np.zeros((3 * PERIOD, 6)))
+
+
+def motor_1_turn(model, block, twist):
+    """Return by how much motor 1 must have turned for a platform twist, (n,) [rad]."""
+    mechanism = model.table.mechanism
+    column = mechanism.jacobian(mechanism.forward(block.theta))[:, :, 0]
+    turn = np.einsum("ni,ni->n", twist[:, 3:], column) / np.einsum("ni,ni->n", column, column)
+    assert np.allclose(twist[:, 3:], turn[:, None] * column, atol=1e-15)
+    return turn
+
+
+def test_backlash_lies_half_a_width_behind_and_closes_its_loop(weightless, make):
+    block = swing(10.0)
+    effect = make.effect("backlash@motor_1", width_mdeg=50.0)
+    turned = motor_1_turn(weightless, block, make.added(weightless, effect, block))[PERIOD:]
+    speed = np.gradient(block.theta[:, 0])[PERIOD:]
+    far = np.abs(speed) > 0.3 * np.abs(speed).max()
+    assert np.allclose(turned[far], -np.radians(0.025) * np.sign(speed[far]), rtol=1e-9)
+    assert np.allclose(turned[PERIOD:], turned[:PERIOD], atol=1e-12)
+    assert np.abs(turned).max() <= np.radians(0.025) * (1 + 1e-9)
+
+
+def test_motor_at_rest_keeps_the_side_it_came_from(weightless, make):
+    angle = np.radians([0.0, 5.0, 5.0, 5.0])
+    block = Block(np.arange(4.0), np.stack([angle, 0 * angle], axis=1), np.zeros((4, 6)))
+    effect = make.effect("backlash@motor_1", width_mdeg=40.0)
+    turned = motor_1_turn(weightless, block, make.added(weightless, effect, block))[1:]
+    assert np.allclose(turned, -np.radians(0.020), rtol=1e-9)
+
+
+@given(paths, st.floats(0.01, 3.0))
+def test_friction_never_creates_energy(moved, budget):
+    """Each slip goes along with the force on the bristle's foot; no force exceeds the budget."""
+    foot = moved[0]
+    compliance = np.array([[0.3, 1.7]])
+    for position in moved:
+        force, later = slip(position[None], compliance, np.array([budget]), foot)
+        assert force[0] @ (later - foot) >= -1e-15
+        assert np.linalg.norm(force[0]) <= budget * (1.0 + 1e-12)
+        foot = later
+
+
+def test_turning_frees_the_slide():
+    """One budget: a joint that turns far has nothing left against its slide."""
+    steps = np.linspace(0.0, 1.0, 200)
+    budget, compliance = np.full(200, 1.0), np.full((200, 2), 0.01)
+    at_rest = slip(np.stack([0 * steps, 0.005 * steps], 1), compliance, budget, np.zeros(2))[0]
+    turning = slip(np.stack([steps, 0.005 * steps], 1), compliance, budget, np.zeros(2))[0]
+    assert at_rest[-1, 1] == pytest.approx(0.5)
+    assert abs(turning[-1, 1]) < 0.02
+    assert turning[-1, 0] == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("joint", PASSIVE_JOINTS)
+def test_friction_is_a_closed_loop_that_vanishes_with_its_coefficient(free_model, make, joint):
+    block = swing(20.0)
+    rubbing = make.effect(f"joint_friction@{joint}", coefficient=0.3, preload_N=2.0)
+    loop = make.added(free_model, rubbing, block)
+    size = np.abs(loop).max()
+    assert np.allclose(loop[2 * PERIOD :], loop[PERIOD : 2 * PERIOD], atol=1e-3 * size)
+    # The same pose on the way up and on the way down.
+    up, down = loop[PERIOD + 5], loop[PERIOD + PERIOD // 2 - 5]
+    assert np.abs(up - down).max() > 0.1 * size > 1e-10
+    smooth = make.effect(f"joint_friction@{joint}", coefficient=0.0)
+    assert np.abs(make.added(free_model, smooth, block)).max() < 1e-6 * size
+
+
+def test_slide_locks_when_the_load_comes_at_rest(free_model, make):
+    """A stiff bristle with a large budget holds the slide that a load at rest would make."""
+    joint, number = "joint_3", 1
+    theta = np.tile(np.radians([20.0, -10.0]), (2, 1))
+    load = np.array([np.zeros(6), [0.6, -0.5, -1.0, 0.0, 0.0, 0.0]])
+    block = Block(np.arange(2.0), theta, load)
+    free, _ = evaluate(free_model, block, None)
+    wanted = np.diff(free.situation.slides[:, number])[0]
+    locked = free_model.with_effects(
+        make.effect(f"joint_friction@{joint}", coefficient=2.0, preload_N=100.0, presliding_um=0.01)
+    )
+    held, _ = evaluate(locked, block, None)
+    at = held.situation
+    slid = at.slides[1, number] - free.situation.slides[0, number]
+    assert abs(wanted) > 1e-8
+    assert abs(slid) < 0.02 * abs(wanted)
+
+
+def test_creep_settles_to_its_step(weightless, make):
+    """After a load step the delayed part follows 1 - exp(-t / tau)."""
+    effect = make.effect("creep@joint_1", delayed_percent=40.0, time_constant_s=5.0)
+    session = weightless.with_effects(effect).session()
+    theta = np.radians([20.0, -10.0])
+    wrench = Load(np.array([0.3, 0.2, -1.0, 0.0, 0.0, 0.0]))
+    session.advance(Sample(0.0, theta, Load(np.zeros(6))))
+    session.advance(Sample(1.0, theta, Load(np.zeros(6))))
+    first = session.advance(Sample(1.0, theta, wrench)).twist
+    settled = make.added(
+        weightless,
+        make.effect("bushing_stiffness@joint_1", flexibility_percent=40.0),
+        make.rest((20.0, -10.0), wrench.wrench),
+    )[0]
+    for t in (2.0, 5.0, 60.0):
+        crept = session.advance(Sample(1.0 + t, theta, wrench)).twist - first
+        assert np.allclose(crept, settled * (1.0 - np.exp(-t / 5.0)), rtol=1e-6, atol=1e-15)
+
+
+def test_unloaded_creep_comes_back(weightless, make):
+    effect = make.effect("creep@joint_1", delayed_percent=40.0, time_constant_s=1.0)
+    theta, loaded = np.radians([20.0, -10.0]), Load(np.array([0.3, 0.2, -1.0, 0.0, 0.0, 0.0]))
+    session = weightless.with_effects(effect).session()
+    session.advance(Sample(0.0, theta, loaded))
+    kept = session.advance(Sample(0.0, theta, Load(np.zeros(6)))).twist
+    gone = session.advance(Sample(40.0, theta, Load(np.zeros(6)))).twist
+    assert np.linalg.norm(kept) > 1e-8
+    assert np.linalg.norm(gone) < 1e-9 * np.linalg.norm(kept)
