@@ -33,7 +33,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         shared("launch/*.launch.py"),
-        shared("config/*.yaml"),
+        shared("config/*.*"),
         shared("precomputed/*.npz"),
     ],
     zip_safe=False,
