@@ -39,6 +39,7 @@ class Pose:
     axis: np.ndarray
     lever: np.ndarray
     link: np.ndarray
+    before: np.ndarray
     turn: np.ndarray
     torque: np.ndarray
     force: np.ndarray
@@ -48,15 +49,17 @@ def pose_of(table: Observations) -> Pose:
     """Kinematics of every unit: (n, 3, 3) axes, levers from joint to tip and links."""
     q = np.column_stack([table.covariate(f"q{i}") for i in (1, 2, 3)])
     force = np.column_stack([table.covariate(f) for f in ("fx", "fy", "fz")])
-    turn = Rotation.identity(len(q))
+    turn = Rotation.from_rotvec(np.zeros((len(q), 3)))
     axis, link = np.empty((len(q), 3, 3)), np.empty((len(q), 3, 3))
+    before = np.empty((len(q), 3, 3, 3))
     for i in range(3):
+        before[:, i] = turn.as_matrix()
         axis[:, i] = turn.apply(AXES[i])
         turn = turn * Rotation.from_rotvec(q[:, [i]] * AXES[i])
         link[:, i] = turn.apply(LINKS[i])
     lever = np.cumsum(link[:, ::-1], axis=1)[:, ::-1]
     torque = np.einsum("nij,nij->ni", axis, np.cross(lever, force[:, None]))
-    return Pose(axis, lever, link, turn.as_matrix(), torque, force)
+    return Pose(axis, lever, link, before, turn.as_matrix(), torque, force)
 
 
 def joint_twist(pose: Pose, i: int, axis: np.ndarray | None = None) -> np.ndarray:
@@ -113,19 +116,24 @@ def catalogue() -> tuple[Candidate, ...]:
             return [joint_twist(p, i) * (p.torque[:, i] * grown)[:, None]]
 
         def tilt(t: Observations, p: Pose, s: tuple[float, ...], i: int = i) -> list:
-            across = np.cross(p.axis[:, i], p.link[:, i])
-            along = np.cross(p.axis[:, i], across)
-            return [joint_twist(p, i, across), joint_twist(p, i, along)]
+            across = np.flatnonzero(AXES[i] == 0)
+            return [joint_twist(p, i, p.before[:, i, :, k]) for k in across]
 
         found += [
             candidate("compliance", name, scaled(i, lambda t, p, i=i: p.torque[:, i]), (1e-5,)),
-            candidate("backlash", name, scaled(i, lambda t, p, i=i: t.covariate(f"a{i + 1}") / 2),
-                      (3e-5,)),
+            candidate(
+                "backlash", name, scaled(i, lambda t, p, i=i: t.covariate(f"a{i + 1}") / 2), (3e-5,)
+            ),
             candidate("eccentricity", name, eccentric, (3e-5, 3e-5)),
             candidate("hardening", name, hard, (1e-6,)),
             candidate("axis_tilt", name, tilt, (3e-4, 3e-4)),
-            candidate("creep", name, creep, (1e-5,),
-                      (ShapeParameter("time_constant_s", (2.0, 5.0, 12.0, 30.0)),)),
+            candidate(
+                "creep",
+                name,
+                creep,
+                (1e-5,),
+                (ShapeParameter("time_constant_s", (2.0, 5.0, 12.0, 30.0)),),
+            ),
         ]
     for i in (1, 2):
         name = f"link_{i + 1}"
@@ -247,12 +255,21 @@ def campaign(rng: np.random.Generator, n: int = 160, rich: bool = True) -> Obser
         for column in table.values():
             column[row] = column[origin]
     session = np.repeat([0, 1], [n - n // 4, n // 4])
-    replicate[session == 1] = np.where(replicate[session == 1] >= 0,
-                                       replicate[session == 1] + 1000, -1)
+    replicate[session == 1] = np.where(
+        replicate[session == 1] >= 0, replicate[session == 1] + 1000, -1
+    )
     time = 5.0 * np.arange(n)
     table["temperature"] = 3 * (1 - np.exp(-time / 300)) + 0.5 * np.sin(time / 90)
-    return Observations(np.zeros((n, 6)), table, np.diag(NOISE**2), time, session, replicate,
-                        np.full(n, 100.0), QUANTITIES)
+    return Observations(
+        np.zeros((n, 6)),
+        table,
+        np.diag(NOISE**2),
+        time,
+        session,
+        replicate,
+        np.full(n, 100.0),
+        QUANTITIES,
+    )
 
 
 def coloured_noise(table: Observations, rng: np.random.Generator) -> np.ndarray:
@@ -295,8 +312,9 @@ def hide(
         else:
             columns = np.stack(effect(table, pose_of(table), ()), axis=2)
         plausible = np.linalg.norm(columns, axis=(0, 1))
-        change = (columns / plausible) @ (rng.choice([-1, 1], columns.shape[2])
-                                          * rng.uniform(0.5, 1.0, columns.shape[2]))
+        change = (columns / plausible) @ (
+            rng.choice([-1, 1], columns.shape[2]) * rng.uniform(0.5, 1.0, columns.shape[2])
+        )
         change = change * (1 + law_error * smooth_field(table, rng, 6))
         white = (change - change.mean(axis=0)) / NOISE
         values += change * size / np.sqrt(np.mean(white**2))

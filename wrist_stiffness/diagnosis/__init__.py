@@ -7,6 +7,7 @@ shows it on a plain table.
 from wrist_stiffness.diagnosis.candidates import Candidate, Parameter, ShapeParameter
 from wrist_stiffness.diagnosis.compression import averaged, compress, dwell_groups
 from wrist_stiffness.diagnosis.diagnose import diagnose
+from wrist_stiffness.diagnosis.fitted import FittedModel, fit
 from wrist_stiffness.diagnosis.nuisance import Nuisance
 from wrist_stiffness.diagnosis.observations import Observations, Quantity
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding
@@ -16,6 +17,7 @@ __all__ = [
     "Candidate",
     "Diagnosis",
     "Finding",
+    "FittedModel",
     "Nuisance",
     "Observations",
     "Parameter",
@@ -26,4 +28,5 @@ __all__ = [
     "compress",
     "diagnose",
     "dwell_groups",
+    "fit",
 ]

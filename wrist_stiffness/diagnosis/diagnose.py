@@ -5,6 +5,7 @@ import numpy as np
 from wrist_stiffness.diagnosis.candidates import Candidate
 from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
 from wrist_stiffness.diagnosis.estimates import estimate, joint_fit
+from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
     Hypothesis,
@@ -29,14 +30,13 @@ from wrist_stiffness.diagnosis.selection import (
 )
 from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.structure import (
+    CHANCE_OF_STRUCTURE,
     Excess,
     background,
     effective_dimension,
     lack_of_fit,
 )
 from wrist_stiffness.errors import InputError
-
-OMNIBUS_REARRANGEMENTS = 399
 
 FEWEST_UNITS = 12
 """Fewer units cannot be split into a part to learn from and a part to be judged by."""
@@ -88,7 +88,9 @@ def diagnose(
     base = base_with(evidence.base, kept)
     blocks = time_blocks(training.sessions, settings.blocks)
     excess = lack_of_fit(base.energy, base.freedom, evidence.noise.dof)
-    flexible = find_discrepancy(evidence, base, blocks, OMNIBUS_REARRANGEMENTS, settings.alpha, rng)
+    flexible = find_discrepancy(
+        evidence, base, blocks, settings.permutations, CHANCE_OF_STRUCTURE, rng
+    )
     unexplained = _unexplained(evidence, base.energy, excess, flexible, broken)
     findings = tuple(
         _finding(
@@ -119,6 +121,8 @@ def _refuse_unusable(observations: Observations, candidates: tuple[Candidate, ..
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise InputError(f"candidate {sorted(twice)[0]} is listed twice")
+    if not observations.measured.any():
+        raise InputError("nothing was measured: every value is NaN")
     if observations.n_units < FEWEST_UNITS:
         raise InputError(
             f"{observations.n_units} units are too few for a diagnosis, it needs {FEWEST_UNITS}"
@@ -166,11 +170,11 @@ def _opened(
 ) -> tuple[tuple[Entered, ...], list[HeldOut], list[str]]:
     """Judge each effect, in the order of entry, on the sealed part."""
     kept: list[Entered] = []
-    stages = [held_out(evidence, [], sealed, nuisances)]
+    stages = [held_out(fit_to(evidence, [], nuisances), sealed)]
     broken = []
     for each in entered:
         trial = [other.hypothesis for other in kept] + [each.hypothesis]
-        stage = held_out(evidence, trial, sealed, nuisances)
+        stage = held_out(fit_to(evidence, trial, nuisances), sealed)
         if refuted(stages[-1], stage):
             broken.append(each.name)
         else:

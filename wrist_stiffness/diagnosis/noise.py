@@ -25,40 +25,76 @@ RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
 
 
-def replicate_variance(residual: Array, observations: Observations) -> tuple[Array, float]:
+def replicate_variance(
+    values: Array, columns: Array, observations: Observations
+) -> tuple[Array, float]:
     """Pooled variance inside the groups of replicates.
+
+    What a candidate does between two replicates (drift, warming) is taken out; what it does
+    between conditions cannot reach the differences inside a group.
 
     Parameters
     ----------
-    residual : (n, m) array
-        NaN = not measured.
+    values : (n, m) array
+        Observations, zero where not measured.
+    columns : (n, m, q) array
+        Base and candidates, zero where not measured.
     observations : Observations
         With `replicate` labels; groups never span sessions.
 
     Returns
     -------
     (m,) array
-        Variance of one unit, NaN where there are no replicates.
+        Variance of one unit; one for a component that was never measured.
     float
-        Fewest degrees of freedom over the components.
+        Fewest degrees of freedom over the components; zero without replicates.
     """
     m = observations.n_components
-    if observations.replicate is None:
-        return np.full(m, np.nan), 0.0
-    total, freedom = np.zeros(m), np.zeros(m)
+    if observations.replicate is None or not (observations.replicate >= 0).any():
+        return np.ones(m), 0.0
     labels = np.stack([observations.replicate, observations.sessions], axis=1)
     repeated = labels[:, 0] >= 0
     _, group = np.unique(labels[repeated], axis=0, return_inverse=True)
-    rows = residual[repeated]
-    for number in range(group.max() + 1 if len(group) else 0):
-        members = rows[group == number]
-        good = np.isfinite(members)
-        count = good.sum(axis=0)
-        centre = np.where(good, members, 0.0).sum(axis=0) / np.maximum(count, 1)
-        total += np.where(good, (members - centre) ** 2, 0.0).sum(axis=0)
-        freedom += np.maximum(count - 1, 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return total / freedom, float(freedom.min())
+    measured = observations.measured[repeated]
+    count = np.zeros((group.max() + 1, m))
+    np.add.at(count, group, measured)
+    stacked = np.concatenate([columns, values[:, :, None]], axis=2)[repeated]
+    total = np.zeros((group.max() + 1, *stacked.shape[1:]))
+    np.add.at(total, group, stacked)
+    centre = total / np.maximum(count, 1)[:, :, None]
+    inside = np.where(measured[:, :, None], stacked - centre[group], 0.0)
+    freedom = np.maximum(count - 1, 0).sum(axis=0)
+
+    rows = inside.reshape(-1, stacked.shape[2])
+    original = np.linalg.norm(stacked.reshape(rows.shape), axis=0)
+    basis = orthonormal(rows[:, :-1], original[:-1])[:, : int(RICH_SHARE * freedom.sum())]
+    left = rows[:, -1] - basis @ (basis.T @ rows[:, -1])
+    freedom = freedom - basis.shape[1] / m
+    seen = observations.measured.any(axis=0)
+    variance = np.sum(left.reshape(-1, m) ** 2, axis=0) / np.maximum(freedom, 1)
+    return np.where(seen, variance, 1.0), float(freedom[seen].min())
+
+
+def share_inside_groups(
+    observations: Observations, colour_share: float, colour_time: float
+) -> float:
+    """Part of the variance that shows inside groups of replicates, in (0, 1].
+
+    Replicates that follow each other soon share most of a slow wander.
+    """
+    if observations.replicate is None:
+        return 1.0
+    expected, freedom = 0.0, 0
+    for session in np.unique(observations.sessions):
+        inside = (observations.sessions == session) & (observations.replicate >= 0)
+        for label in np.unique(observations.replicate[inside]):
+            times = observations.times[inside & (observations.replicate == label)]
+            gap = np.abs(times[:, None] - times)
+            together = colour_share * np.exp(-gap / colour_time)
+            together += (1 - colour_share) * np.eye(len(times))
+            expected += len(times) - together.sum() / len(times)
+            freedom += len(times) - 1
+    return expected / freedom if freedom and expected > 0 else 1.0
 
 
 def rich_basis(columns: Array, n_measured: int) -> Array:
@@ -87,7 +123,8 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
     n, m = observations.values.shape
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
-    variance = np.array([np.var(values[measured[:, c], c]) for c in range(m)])
+    count = np.maximum(measured.sum(axis=0), 1)
+    variance = np.sum(values**2, axis=0) / count
     reference = np.diag(np.where(variance > 0, variance, 1.0))
     stated = reference if observations.covariance is None else observations.covariance
     factor = component_factors(np.broadcast_to(stated, (n, m, m)), measured)
@@ -105,10 +142,13 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
     share, time_constant = colour(
         everything / size[:, None], measured, observations, basis.shape[1]
     )
-    repeated, freedom = replicate_variance(left, observations)
+    repeated, freedom = replicate_variance(
+        everything[:, :, -1], everything[:, :, :-1], observations
+    )
     if freedom >= FEWEST_REPLICATE_DOF:
         # 1/s^2 of a scatter s^2 with few degrees of freedom is too large on average.
-        scatter = np.diag(repeated * freedom / (freedom - 2))
+        visible = share_inside_groups(observations, share, time_constant)
+        scatter = np.diag(repeated * freedom / (freedom - 2) / visible)
         return NoiseModel(reference, scatter, share, time_constant, freedom * m, "replicates")
     if observations.covariance is not None:
         # What was stated is the white part; the wander comes on top of it.
@@ -133,7 +173,7 @@ def residual_covariance(left: Array, loss: float) -> Array:
     covariance = filled.T @ filled / (loss * np.maximum(pairs, 1))
     variance = np.diag(covariance)
     own = np.diag(np.where(variance > 0, variance, 1.0))
-    shrink = len(own) / (len(own) + pairs.min())
+    shrink = len(own) / (len(own) + pairs.max())
     return (1 - shrink) * covariance + shrink * own
 
 

@@ -11,6 +11,17 @@ MAD_TO_SIGMA = 1.4826
 ROUNDS = 15
 
 
+def robust_scale(values: Array) -> Array:
+    """Robust standard deviation of each component, (m,); one where nothing was measured."""
+    scale = np.ones(values.shape[1])
+    for component, column in enumerate(values.T):
+        good = column[np.isfinite(column)]
+        if good.size:
+            deviation = np.median(np.abs(good - np.median(good)))
+            scale[component] = MAD_TO_SIGMA * deviation if deviation > 0 else 1.0
+    return scale
+
+
 def lost_units(observations: Observations, columns: Array, limit: float) -> NDArray[np.bool_]:
     """Which units lie far from a model with everything in it.
 
@@ -34,9 +45,7 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> NDAr
     n, m = observations.values.shape
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
-    centre = np.nanmedian(observations.values, axis=0)
-    size = MAD_TO_SIGMA * np.nanmedian(np.abs(observations.values - centre), axis=0)
-    size = np.where(size > 0, size, 1.0)
+    size = robust_scale(observations.values)
     rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
     norm = np.linalg.norm(rows, axis=0)
     left, spread, _ = np.linalg.svd(rows / np.where(norm > 0, norm, 1.0), full_matrices=False)
@@ -48,8 +57,7 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> NDAr
         root = np.sqrt(np.repeat(weight, m))[:, None]
         fit = basis @ np.linalg.lstsq(root * basis, root[:, 0] * target, rcond=None)[0]
         residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
-        scale = MAD_TO_SIGMA * np.nanmedian(np.abs(residual), axis=0)
-        scaled = residual / np.where(scale > 0, scale, 1.0)
-        distance = np.sqrt(np.nanmean(scaled**2, axis=1))
+        scaled = np.where(measured, residual / robust_scale(residual), 0.0)
+        distance = np.sqrt(np.sum(scaled**2, axis=1) / np.maximum(measured.sum(axis=1), 1))
         weight = np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
     return distance > limit

@@ -35,15 +35,15 @@ def rearrangements(sessions: Array, repeats: int, rng: np.random.Generator) -> t
     order, sign = np.empty((repeats, n), dtype=np.int64), np.empty((repeats, n))
     for session in np.unique(sessions):
         places = np.flatnonzero(sessions == session)
-        for repeat in range(repeats):
-            rolled = np.roll(places, -rng.integers(STRETCH))
-            pieces = np.array_split(rolled, max(1, len(places) // STRETCH))
-            signs = rng.choice([-1.0, 1.0], len(pieces))
-            shuffled = rng.permutation(len(pieces))
-            order[repeat, places] = np.concatenate([pieces[i] for i in shuffled])
-            sign[repeat, places] = np.concatenate(
-                [np.full(len(pieces[i]), signs[i]) for i in shuffled]
-            )
+        count = len(places)
+        rolled = (np.arange(count) + rng.integers(STRETCH, size=(repeats, 1))) % count
+        piece = np.arange(count) // STRETCH
+        key, flip = rng.random((2, repeats, piece[-1] + 1))
+        moved = np.argsort(key[:, piece], axis=1, kind="stable")
+        order[:, places] = places[np.take_along_axis(rolled, moved, axis=1)]
+        sign[:, places] = np.where(
+            np.take_along_axis(flip[:, piece], moved, axis=1) < 0.5, -1.0, 1.0
+        )
     return order, sign
 
 

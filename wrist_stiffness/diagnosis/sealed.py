@@ -9,9 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.diagnosis.estimates import joint_fit
-from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
-from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
+from wrist_stiffness.diagnosis.fitted import FittedModel
 from wrist_stiffness.diagnosis.observations import Array, Observations, Quantity
 from wrist_stiffness.diagnosis.resampling import time_blocks
 
@@ -53,56 +51,18 @@ class HeldOut:
         return np.sum(self.residual[:, list(quantity.components)] ** 2, axis=1)
 
 
-def held_out(
-    training: Evidence,
-    effects: list[Hypothesis],
-    sealed: Observations,
-    nuisances: tuple[Nuisance, ...],
-) -> HeldOut:
-    """Predict sealed units by a model fitted to the others.
-
-    What is set up anew in a session that the training has not seen (a registration) is refitted
-    there; everything else keeps its fitted value.
+def held_out(model: FittedModel, sealed: Observations) -> HeldOut:
+    """Residuals of a model on the sealed units.
 
     Parameters
     ----------
-    training : Evidence
-        The units that the model was fitted to.
-    effects : list of Hypothesis
-        Effects in the model, evaluated on the training units.
+    model : FittedModel
+        Fitted to the other units.
     sealed : Observations
         Units put aside.
-    nuisances : tuple of Nuisance
-        The base.
     """
-    base_parameters, effect_parameters = joint_fit(training, effects)
-    known = dict(zip(training.nuisance.keys, base_parameters, strict=True))
-    columns = nuisance_columns(sealed, nuisances)
-    prediction = np.zeros(sealed.values.shape)
-    for effect, parameters in zip(effects, effect_parameters, strict=True):
-        prediction += effect.candidate.evaluate(sealed, effect.shape) @ parameters
-    fresh = np.array([key not in known for key in columns.keys], dtype=bool)
-    carried = np.array([known.get(key, 0.0) for key in columns.keys])
-    prediction += columns.columns @ carried
-    residual = sealed.values - prediction
-    if fresh.any():
-        residual = residual - columns.columns[:, :, fresh] @ _refitted(
-            training, sealed, residual, columns.columns[:, :, fresh], columns.prior_std[fresh]
-        )
-    white = training.noise.whiten(sealed, residual[:, :, None])[:, 0]
-    return HeldOut(residual, white)
-
-
-def _refitted(
-    training: Evidence, sealed: Observations, residual: Array, columns: Array, prior_std: Array
-) -> Array:
-    white = training.noise.whiten(sealed, np.concatenate([columns, residual[:, :, None]], axis=2))
-    proper = np.isfinite(prior_std)
-    rows = np.vstack([white[:, :-1], np.diag(1 / prior_std)[proper]])
-    target = np.concatenate([white[:, -1], np.zeros(proper.sum())])
-    norm = np.linalg.norm(rows, axis=0)
-    norm = np.where(norm > 0, norm, 1.0)
-    return np.linalg.lstsq(rows / norm, target, rcond=1e-10)[0] / norm
+    residual = model.residual(sealed)
+    return HeldOut(residual, model.noise.whiten(sealed, residual[:, :, None])[:, 0])
 
 
 def refuted(before: HeldOut, after: HeldOut) -> bool:

@@ -17,15 +17,17 @@ from wrist_stiffness.diagnosis.projection import Base
 
 
 def effective_dimension(base: Base, hypotheses: list[Hypothesis]) -> float:
-    """Participation ratio of the shapes that the catalogue can take beyond the base.
+    """Effective rank of the shapes that the catalogue can take beyond the base.
 
-    (sum of eigenvalues)^2 / (sum of their squares) of the Gram matrix of unit columns.
+    Exponential of the entropy of the eigenvalue shares of the Gram matrix of unit columns
+    (Roy and Vetterli 2007).
     """
     columns = np.hstack([base.directions(each.columns) for each in hypotheses])
     if columns.shape[1] == 0:
         return 1.0
-    gram = columns.T @ columns
-    return float(np.trace(gram) ** 2 / np.sum(gram**2))
+    size = np.linalg.eigvalsh(columns.T @ columns)
+    share = size[size > 0] / size[size > 0].sum()
+    return float(np.exp(-np.sum(share * np.log(share))))
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class Excess:
     p_value: float
 
 
-LACK_OF_FIT_LEVEL = 0.005
+CHANCE_OF_STRUCTURE = 0.001
+"""Probability with which noise is taken for structure, in each test that asks for it."""
 
 
 def lack_of_fit(energy: float, freedom: int, noise_dof: float) -> Excess:
@@ -63,7 +66,7 @@ def lack_of_fit(energy: float, freedom: int, noise_dof: float) -> Excess:
         p_value = float(chi2.sf(energy, freedom))
     else:
         p_value = float(f.sf(energy / freedom, freedom, noise_dof))
-    significant = p_value < LACK_OF_FIT_LEVEL
+    significant = p_value < CHANCE_OF_STRUCTURE
     return Excess(max(0.0, energy - freedom) if significant else 0.0, p_value)
 
 
