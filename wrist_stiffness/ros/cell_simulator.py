@@ -34,7 +34,13 @@ PARAMETERS = (
     ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),
     ParameterEntry("rate_hz", 100.0, "samples per second", lower=1.0, upper=2000.0),
     ParameterEntry("program_s", 60.0, "length of the motion [s]", lower=1.0, upper=86400.0),
-    ParameterEntry("programs", 0, "how often the motion is done, then the node ends; 0: for ever"),
+    ParameterEntry(
+        "programs",
+        0,
+        "how often the motion is done, then the node ends; 0: for ever",
+        lower=0,
+        upper=1e9,
+    ),
     ParameterEntry("seed", 0, "of the program and of the sensors' noise"),
     ParameterEntry("listeners", 0, "subscriptions of /joint_states to wait for before moving"),
     ParameterEntry(

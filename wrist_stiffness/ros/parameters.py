@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from wrist_stiffness.errors import InputError
@@ -27,7 +27,7 @@ class ParameterEntry:
     text : str
         What it does, one line.
     lower, upper : float or None
-        Range of a float.
+        Range of a number.
     choices : tuple of str
         Allowed texts; empty for any.
     fixed : bool
@@ -48,9 +48,15 @@ class ParameterEntry:
         descriptor = ParameterDescriptor(description=self.text, read_only=self.fixed)
         if self.choices:
             descriptor.additional_constraints = f"one of {', '.join(self.choices)}"
-        if self.lower is not None and self.upper is not None:
+        if self.lower is None or self.upper is None:
+            return descriptor
+        if isinstance(self.default, float):
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=self.lower, to_value=self.upper)
+            ]
+        else:
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(self.lower), to_value=int(self.upper))
             ]
         return descriptor
 

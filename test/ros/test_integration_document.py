@@ -1,0 +1,52 @@
+"""The integrator's document says what the nodes do."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.compensation.correction import correct
+from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.ros.recorder import TOPICS
+from wrist_stiffness.ros.settings import COMMON, CORRECTION, MONITOR, PREDICTION
+
+TEXT = (Path(__file__).parents[2] / "docs/integration.md").read_text(encoding="utf-8")
+LAST_DIGIT = 0.02  # um or mdeg; the document has two digits
+
+
+@pytest.mark.parametrize(
+    "entry", [*COMMON, *PREDICTION, *CORRECTION, *MONITOR], ids=lambda e: e.name
+)
+def test_every_parameter_is_described_with_its_default(entry):
+    default = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
+    row = re.search(rf"^\| `{entry.name}` \| `(.*?)` \|(.*)\|", TEXT, re.MULTILINE)
+    assert row is not None
+    assert row[1] == (str(default) or "empty")
+    for choice in entry.choices:
+        assert choice in row[2]
+
+
+@pytest.mark.parametrize(
+    "topic", [name for name in TOPICS if name.startswith(("/pose_error", "/motor", "/model"))]
+)
+def test_every_topic_is_described(topic):
+    assert f"`{topic}`" in TEXT
+
+
+def numbers(line):
+    row = next(row for row in TEXT.splitlines() if row.startswith(line))
+    return [float(number) for number in re.findall(r"-?\d+\.\d+", row.replace("−", "-"))]
+
+
+def test_the_worked_case_is_what_the_shipped_model_gives(model):
+    platform = model.table.geometry.platform
+    objective = Objective("pointing", platform.normal, platform.tool_point)
+    load = Load(np.array([0.0, 0.0, -3.0, 0.0, 0.0, 0.0]))
+    found = correct(model, np.radians([20.0, -10.0]), load, objective)
+    for line, twist in (("| before", found.before), ("| after", found.after)):
+        wanted = [*(1e6 * twist[:3]), *(1e3 * np.degrees(twist[3:]))]
+        assert numbers(line) == pytest.approx(wanted, abs=LAST_DIGIT)
+    delta = numbers("The motors turn by")[:2]
+    assert delta == pytest.approx(1e3 * np.degrees(found.delta), abs=LAST_DIGIT)
