@@ -27,7 +27,9 @@ from wrist_stiffness.mechanism.vectors import skew
 SHIPPED_SIZES = MeshSettings(
     link=1.2e-3, bore=0.8e-3, bushing=0.5e-3, bushing_corner=0.02e-3, bushing_arc=1.4e-3
 )
-"""Element sizes of the shipped tables; `convergence.py` states their error."""
+"""Element sizes of the shipped tables.  On the shipped wrist s, phi and the norm of C come out
+0.38, 0.32 and 0.32 % too small, by `convergence.mesh_convergence` with factors 2.25, 1.5, 1, 2/3
+over the operative workspace."""
 
 Condenser = Callable[[Solid, MeshSettings, Interface], CondensedSolid]
 """Makes the superelement of a solid."""

@@ -143,7 +143,7 @@ def _condense_distributing(body: ElasticBody, loads: Array) -> tuple[Array, Arra
     free = np.setdiff1d(np.arange(3 * len(nodes)), fixed)
     displacement = np.zeros_like(all_loads)
     displacement[free] = factorise(body.stiffness[free][:, free], free).solve(balanced[free])
-    displacement -= rigid @ (motor.T @ displacement)
+    # Balanced loads do no work on the rigid motion that is left in these displacements.
     work = _symmetric(balanced.T @ displacement)
     flexibility = work[:6, :6]
     on_platform = _inverse(flexibility) @ work[:6, 6:]
