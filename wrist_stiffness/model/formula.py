@@ -102,7 +102,7 @@ class Formula:
             return ast.parse(self.text, mode="eval").body
         except SyntaxError as error:
             raise InputError(
-                f"formula {self.text!r}, column {error.offset or 1}: {error.msg}"
+                f"formula {self.text!r}, column {error.offset or len(self.text) + 1}: {error.msg}"
             ) from error
         except (ValueError, RecursionError, MemoryError) as error:
             raise InputError(f"formula {self.text!r}: cannot be read: {error}") from error

@@ -63,7 +63,9 @@ class FormulaLaw(Law):
         if place not in LIMB:
             raise InputError(f"{name}: component {place!r} is not one of {', '.join(LIMB)}")
         if direction.shape != (6,) or not np.isfinite(direction).all() or not direction.any():
-            raise InputError(f"{name}: direction {direction.tolist()} is not six finite numbers")
+            raise InputError(
+                f"{name}: direction {direction.tolist()} is not six finite numbers, one not zero"
+            )
         self.id = name
         self.places = (place,)
         self.sentence = f"{{place}}: {expression}"

@@ -108,7 +108,9 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
         content["lineage"] = [step.as_values() for step in model.lineage]
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
+        text = yaml.safe_dump(
+            content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
+        )
         temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)
     except OSError as error:

@@ -1,0 +1,198 @@
+"""One law, two uses: any split of a recording gives the same predictions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wrist_stiffness.errors import InputError, LoadRangeError, UnreachablePoseError
+from wrist_stiffness.mechanism.contact import solve_contact
+from wrist_stiffness.model import error_model
+from wrist_stiffness.model.block import Block, Load, Sample
+from wrist_stiffness.model.contacts import solve_contacts
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import catalogue
+
+PLACED = [(law.id, place) for law in catalogue().values() for place in law.places]
+
+
+def plausible(name, place):
+    """Return an effect away from its null, with every parameter uncertain."""
+    law = catalogue()[name]
+    values = {p.key: p.mean or min(p.scale, p.upper) for p in law.parameters(place)}
+    if name == "flange_contact":
+        values = {"gap_um": -200.0}
+    return Effect(
+        law,
+        place,
+        {p.key: Estimate(values[p.key], 0.1 * p.scale) for p in law.parameters(place)},
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(model, make):
+    """A model with every law once, and its batch over a lively recording."""
+    chosen = dict(reversed(PLACED))
+    loaded = model.with_effects(*(plausible(name, place) for name, place in chosen.items()))
+    block = make.block()
+    return loaded, block, loaded.batch(block)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.integers(1, 59), max_size=6))
+def test_any_split_gives_the_same(whole, cuts):
+    loaded, block, at_once = whole
+    edges = [0, *sorted(set(cuts)), len(block)]
+    memory = None
+    for start, stop in zip(edges, edges[1:], strict=False):
+        result, memory = evaluate(loaded, block.take(slice(start, stop)), memory)
+        for part, all_ in ((result.twist, at_once.twist), (result.measured, at_once.measured)):
+            scale = np.abs(all_).max(axis=0)
+            assert np.all(np.abs(part - all_[start:stop]) <= 1e-12 * scale)
+
+
+@pytest.mark.parametrize(("name", "place"), PLACED)
+def test_session_is_the_batch_sample_by_sample(model, make, name, place):
+    """Every law at every place; and none is without effect."""
+    loaded = model.with_effects(plausible(name, place))
+    block = make.block(16)
+    at_once, plain = loaded.batch(block), model.batch(block)
+    assert np.abs(at_once.measured - plain.measured).max() > 1e-13
+    session = loaded.session()
+    for row in range(len(block)):
+        prediction = session.advance(sample_of(block, row))
+        scale = np.abs(at_once.twist).max(axis=0)
+        assert np.all(np.abs(prediction.twist - at_once.twist[row]) <= 1e-12 * scale)
+        scale = np.abs(at_once.measured).max(axis=0)
+        assert np.all(np.abs(prediction.measured - at_once.measured[row]) <= 1e-12 * scale)
+    assert np.linalg.eigvalsh(prediction.covariance).min() > -1e-20
+
+
+def test_preview_leaves_no_trace(whole):
+    loaded, block, at_once = whole
+    session = loaded.session()
+    for row in range(12):
+        sample = sample_of(block, row)
+        session.preview(replace(sample, theta=sample.theta + 0.2))
+        preview = session.preview(sample)
+        assert np.array_equal(preview.twist, session.advance(sample).twist)
+        assert np.allclose(preview.twist, at_once.twist[row], rtol=1e-9, atol=1e-15)
+
+
+def sample_of(block, row):
+    return Sample(
+        block.time[row],
+        block.theta[row],
+        Load(block.load[row]),
+        temperatures={name: values[row] for name, values in block.temperatures.items()},
+    )
+
+
+def test_chunks_do_not_show(whole, monkeypatch):
+    loaded, block, at_once = whole
+    monkeypatch.setattr(error_model, "CHUNK", 7)
+    in_chunks = loaded.batch(block)
+    scale = np.abs(at_once.twist).max(axis=0)
+    assert np.all(np.abs(in_chunks.twist - at_once.twist) <= 1e-12 * scale)
+    assert in_chunks.warnings
+
+
+def test_refused_samples_are_passed_over(model, make):
+    """Out of the domain, too large, not finite: NaN there, and no trace in the memory."""
+    loaded = model.with_effects(
+        make.effect("backlash@motor_1", width_mdeg=50.0), make.effect("creep@joint_2",
+        delayed_percent=30.0, time_constant_s=0.2),
+    )  # fmt: skip
+    block = make.block(40)
+    theta, load = block.theta.copy(), block.load.copy()
+    theta[5] = np.radians([90.0, 0.0])
+    theta[11, 1] = np.nan
+    load[20, 2] = -7.0
+    load[21, 0] = np.nan
+    result = loaded.batch(replace(block, theta=theta, load=load))
+    refused = [5, 11, 20, 21]
+    assert np.flatnonzero(~result.accepted).tolist() == refused
+    assert np.isnan(result.twist[refused]).all()
+    kept = np.setdiff1d(np.arange(40), refused)
+    without = loaded.batch(block.take(np.isin(np.arange(40), kept)))
+    assert np.array_equal(result.twist[kept], without.twist)
+    session = loaded.session()
+    session.advance(sample_of(block, 0))
+    for row, error in ((5, UnreachablePoseError), (11, InputError), (20, LoadRangeError)):
+        with pytest.raises(error):
+            session.advance(sample_of(replace(block, theta=theta, load=load), row))
+    assert session.advance(sample_of(block, 1)).twist == pytest.approx(
+        loaded.batch(block.take(slice(0, 2))).twist[1], rel=1e-12
+    )
+
+
+def test_time_does_not_run_backwards(model):
+    session = model.session()
+    session.advance(Sample(1.0, np.zeros(2), Load(np.zeros(6))))
+    with pytest.raises(InputError, match="0.500000 s is before the last one, 1.000000 s"):
+        session.advance(Sample(0.5, np.zeros(2), Load(np.zeros(6))))
+    with pytest.raises(InputError, match="time nan is not finite"):
+        session.advance(Sample(np.nan, np.zeros(2), Load(np.zeros(6))))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"time": np.zeros(2)}, "theta has shape"),
+        ({"load": np.zeros((3, 3))}, "load has shape"),
+        ({"time": np.array([0.0, 2.0, 1.0])}, "time falls from 2.000000 to 1.000000"),
+        ({"temperatures": {"link_1": np.zeros(2)}}, "link_1 has shape"),
+        ({"covariates": {"humidity": np.array([1.0, np.nan, 1.0])}}, "humidity is not finite"),
+    ],
+)
+def test_bad_blocks_are_refused(changes, text):
+    good = {"time": np.arange(3.0), "theta": np.zeros((3, 2)), "load": np.zeros((3, 6))}
+    with pytest.raises(InputError, match=text):
+        Block(**{**good, **changes})
+
+
+def test_load_in_platform_axes_is_the_same_load(model, make):
+    block = make.block(20)
+    turn = model.table.mechanism.forward(block.theta).platform
+    halves = np.einsum("nji,nhj->nhi", turn, block.load.reshape(-1, 2, 3)).reshape(-1, 6)
+    on_platform = replace(block, load=halves, load_on_platform=True)
+    loaded = model.with_effects(make.effect("load_scale@load_sensor", scale_percent=5.0))
+    assert np.allclose(loaded.batch(on_platform).twist, loaded.batch(block).twist, rtol=1e-9)
+
+
+def test_missing_signal_leaves_the_effect_out_and_says_so(model, make):
+    warm = make.effect("thermal_expansion@link_1")
+    loaded = model.with_effects(warm)
+    prediction = loaded.predict(np.zeros(2), Load(np.zeros(6)))
+    assert prediction.warnings == (
+        "thermal_expansion@link_1: temperature of ambient is missing, left out",
+    )
+    assert np.allclose(
+        prediction.twist, model.predict(np.zeros(2), Load(np.zeros(6))).twist, rtol=1e-12
+    )
+
+
+def test_past_first_order_is_said(model, make):
+    """2 mrad are 114.6 mdeg."""
+    block = make.rest((0.0, 0.0), (0.0, 0.0, -1.0))
+    for size, said in ((110.0, 0), (120.0, 1)):
+        off = make.effect("encoder_offset@motor_1", offset_mdeg=size)
+        assert len(model.with_effects(off).batch(block).warnings) == said
+
+
+def test_many_contacts_at_once_are_each_ones_contact():
+    rng = np.random.default_rng(0)
+    n, m = 200, 9
+    roots = rng.normal(size=(n, m, m)) + 2.0 * np.eye(m)
+    approach = 1e-7 * roots @ np.swapaxes(roots, 1, 2)
+    gap = 1e-6 * rng.normal(size=(n, m))
+    for guess in (None, np.ones(m, dtype=bool)):
+        force, active = solve_contacts(approach, gap, guess)
+        for row in range(n):
+            one, closed = solve_contact(approach[row], gap[row])
+            assert np.array_equal(active[row], closed)
+            assert np.allclose(force[row], one, rtol=1e-8, atol=1e-12 * one.max())

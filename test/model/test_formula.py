@@ -1,0 +1,132 @@
+"""A user's formula: what it means, and that nothing else gets through."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.formula import DEEPEST, FUNCTIONS, LONGEST, Formula
+
+NAMES = ("fx", "theta_1", "k")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 2 * fx", 7.0),
+        ("-fx ** 2", -9.0),
+        ("2 ** 3 ** 2", 512.0),
+        ("k * tanh(fx / k)", 0.5 * math.tanh(6.0)),
+        ("min(fx, k) - max(fx, k)", -2.5),
+        ("sqrt(abs(-4)) + sign(-2) + log(exp(1.5))", 2.5),
+        ("sin(theta_1)**2 + cos(theta_1)**2", 1.0),
+        ("+tan(theta_1)", math.tan(0.3)),
+        ("1e-3", 1e-3),
+    ],
+)
+def test_formulas_mean_what_they_say(text, value):
+    variables = {"fx": 3.0, "theta_1": 0.3, "k": 0.5}
+    assert Formula(text, NAMES)(variables) == pytest.approx(value, rel=1e-14)
+
+
+def test_formulas_take_whole_recordings():
+    fx = np.linspace(-2.0, 2.0, 7)
+    made = Formula("k * abs(fx)", NAMES)({"fx": fx, "k": 2.0})
+    assert np.array_equal(made, 2.0 * np.abs(fx))
+    assert Formula("k * abs(fx)", NAMES).names == {"k", "fx"}
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "why"),
+    [
+        ("fx + ", 6, "invalid syntax"),
+        ("fx * humidity", 6, "unknown name humidity"),
+        ("__import__('os')", 1, "unknown function __import__"),
+        ("fx.real", 1, "only numbers"),
+        ("k + fx[0]", 5, "only numbers"),
+        ("(lambda: 1)()", 1, "only numbers"),
+        ("fx if k else 2", 1, "only numbers"),
+        ("fx < k", 1, "only numbers"),
+        ("[fx]", 1, "only numbers"),
+        ("fx // 2", 1, "only numbers"),
+        ("not fx", 1, "only numbers"),
+        ("sin(fx, k)", 1, "sin takes 1 values, not 2"),
+        ("max(fx)", 1, "max takes 2 values, not 1"),
+        ("sin(x=fx)", 1, "only numbers"),
+        ("1 + sin", 5, "unknown name sin"),
+        ("'a'", 1, "'a' is not a number"),
+        ("1 + True", 5, "True is not a number"),
+        ("2j", 1, "2j is not a number"),
+        ("1e999", 1, "too large"),
+        ("", 1, "invalid syntax"),
+        ("fx; k", 3, "invalid syntax"),
+        ("(fx := 3)", 2, "only numbers"),
+        ("sin(*fx)", 5, "only numbers"),
+    ],
+)
+def test_anything_else_is_refused_with_its_column(text, column, why):
+    with pytest.raises(InputError) as caught:
+        Formula(text, NAMES)
+    assert why in str(caught.value)
+    assert f"column {column}:" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_endless_formulas_are_refused():
+    with pytest.raises(InputError, match="nested deeper"):
+        Formula("-" * (DEEPEST + 5) + "fx", NAMES)
+    with pytest.raises(InputError, match=f"at most {LONGEST}"):
+        Formula("fx+" * LONGEST + "fx", NAMES)
+    with pytest.raises(InputError):
+        Formula("(" * 300 + "fx" + ")" * 300, NAMES)
+
+
+def test_undefined_values_are_not_finite_and_not_loud():
+    assert not np.isfinite(Formula("log(fx)", NAMES)({"fx": -1.0}))
+    assert not np.isfinite(Formula("1 / fx", NAMES)({"fx": 0.0}))
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.text(st.sampled_from("fxk012.+-*/()[]{}:,'\"\\ \n\x00=<>&|~^@%!_ébé"), max_size=30))
+def test_random_text_is_a_formula_or_one_clear_line(text):
+    refusal = ""
+    try:
+        made = Formula(text, NAMES)
+    except InputError as error:
+        refusal = str(error)
+    assert "\n" not in refusal
+    assert refusal or made({"fx": 1.0, "theta_1": 1.0, "k": 1.0}).shape == ()
+
+
+def trees():
+    leaf = st.one_of(st.sampled_from(NAMES), st.floats(-9.0, 9.0).map(lambda x: f"({x!r})"))
+    unary = [name for name, (count, _) in FUNCTIONS.items() if count == 1]
+    return st.recursive(
+        leaf,
+        lambda inner: st.one_of(
+            st.tuples(inner, st.sampled_from("+-*/"), inner).map(lambda t: f"({''.join(t)})"),
+            st.tuples(st.sampled_from(unary), inner).map(lambda t: f"{t[0]}({t[1]})"),
+            st.tuples(inner, inner).map(lambda t: f"min({t[0]},{t[1]})"),
+        ),
+        max_leaves=8,
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(trees())
+def test_allowed_formulas_agree_with_python(text):
+    """The oracle is Python's own arithmetic on scalars."""
+    variables = {"fx": 1.7, "theta_1": -0.4, "k": 0.25}
+    meanings = {name: getattr(math, name, None) for name in FUNCTIONS}
+    meanings.update(abs=abs, min=min, max=max, sign=lambda x: float(np.sign(x)))
+    if len(text) > LONGEST:
+        return
+    made = float(Formula(text, NAMES)(variables))
+    try:
+        expected = eval(text, {"__builtins__": {}}, {**variables, **meanings})
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return
+    assert made == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True)

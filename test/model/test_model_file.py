@@ -1,0 +1,301 @@
+"""Model files: round trip exact, a person can read them, and every mistake is one clear line."""
+
+from dataclasses import replace
+from importlib import metadata
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wrist_stiffness.errors import InputError, TableError
+from wrist_stiffness.model import registry
+from wrist_stiffness.model.block import Load, Sample
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
+from wrist_stiffness.model.parameters import Estimate, si_factor
+from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.shipped import shipped_file
+
+TABLE = str(shipped_file("precomputed/palmieri2015.npz"))
+
+GOOD = """schema: 1
+name: x
+table: {path: TABLE}
+effects:
+- effect: joint_clearance
+  component: joint_3
+  parameters: {clearance_um: [12.1, 0.4]}
+- effect: formula
+  id: sag
+  component: link_2
+  direction: [0, 0, 0, 1, 0, 0]
+  expression: "sag_mdeg * tanh(fz / f0_N) + 1e-9 * humidity * T_link_2"
+  covariates: [humidity]
+  parameters: {sag_mdeg: [2.0, 0.1], f0_N: 0.5}
+- effect: python
+  class: own.py:Twist
+  component: platform
+  parameters: {turn_mdeg: [3, 0.5]}
+"""
+
+OWN = '''
+import numpy as np
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.parameters import Parameter
+
+
+class Twist(Law):
+    """Turns the platform about z."""
+
+    id = "twist"
+    stage = "geometry"
+    places = ("platform",)
+    sentence = "{place} is turned"
+    check = "look"
+    excited_by = "anything"
+
+    def parameters(self, place):
+        return (Parameter("turn_mdeg", -10.0, 10.0, 1.0),)
+
+    def advance(self, at, place, values, state):
+        return at.screw(place, np.array([0, 0, 0, 0, 0, values["turn_mdeg"]])), None
+'''
+
+
+def write(folder, text=GOOD, own=OWN):
+    (folder / "own.py").write_text(own)
+    path = folder / "m.yaml"
+    path.write_text(text.replace("TABLE", TABLE))
+    return path
+
+
+def test_a_users_own_laws_work(tmp_path):
+    model = load_model(write(tmp_path))
+    sample = Sample(
+        0.0, np.radians([20.0, -10.0]), Load(np.array([0.2, 0.3, -1.0, 0.0, 0.0, 0.0])),
+        temperatures={"link_2": 25.0}, covariates={"humidity": 40.0},
+    )  # fmt: skip
+    by_own = (
+        model.session().advance(sample).twist
+        - model.with_effects(*model.effects[:2]).session().advance(sample).twist
+    )
+    axis = model.table.mechanism.forward(sample.theta).platform[:, 2]
+    assert np.allclose(by_own, [0, 0, 0, *(np.radians(3e-3) * axis)], atol=1e-12)
+    by_formula = model.with_effects(model.effects[1]).session().advance(sample)
+    base = model.with_effects().session().advance(sample)
+    assert np.linalg.norm(by_formula.twist - base.twist) > 1e-7
+    assert model.effects[0].si == {"clearance_um": 12.1e-6}
+
+
+def test_round_trip_is_exact_and_stable(tmp_path):
+    model = load_model(write(tmp_path))
+    step = Step("extend", "2026-01-02T03:04:05Z", "ab" * 32, {"run_1": "cd" * 32})
+    saved = tmp_path / "saved.yaml"
+    save_model(replace(model, lineage=(step,)), saved)
+    again = load_model(saved)
+    assert [e.name for e in again.effects] == [e.name for e in model.effects]
+    assert [e.estimates for e in again.effects] == [e.estimates for e in model.effects]
+    assert again.lineage == (step,)
+    assert again.table.checksum == model.table.checksum
+    twice = tmp_path / "twice.yaml"
+    save_model(again, twice)
+    assert twice.read_bytes() == saved.read_bytes()
+    assert file_sha256(twice) == file_sha256(saved)
+    assert "clearance_um: [12.1, 0.4]" in saved.read_text()
+    assert not list(tmp_path.glob(".*.part"))
+
+
+def test_saved_elsewhere_the_paths_still_lead_to_table_and_law(tmp_path):
+    model = load_model(write(tmp_path))
+    folder = tmp_path / "deep" / "er"
+    folder.mkdir(parents=True)
+    save_model(model, folder / "m.yaml")
+    assert [e.name for e in load_model(folder / "m.yaml").effects] == [
+        e.name for e in model.effects
+    ]
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
+    laws = list(catalogue().values())
+    effects = {}
+    for law in data.draw(st.lists(st.sampled_from(laws), max_size=4)):
+        place = data.draw(st.sampled_from(law.places))
+        estimates = {
+            p.key: Estimate(data.draw(st.floats(p.lower, p.upper)), data.draw(st.floats(0.0, 1e6)))
+            for p in law.parameters(place)
+        }
+        effects[law.id, place] = Effect(law, place, estimates)
+    path = tmp_path_factory.mktemp("m") / "m.yaml"
+    save_model(model.with_effects(*effects.values()), path)
+    again = load_model(path)
+    assert [(e.name, e.estimates) for e in again.effects] == [
+        (e.name, e.estimates) for e in effects.values()
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("schema: 1", "schema: 7", "7 is not 1"),
+        ("name: x\n", "", "name is missing"),
+        ("effect: joint_clearance", "effect: magic", "unknown effect 'magic'; known are axis_mis"),
+        ("component: joint_3", "component: joint_9", "component 'joint_9' is not one of joint_1"),
+        ("component: joint_3", "component: motor_1", "component 'motor_1' is not one of joint_1"),
+        ("clearance_um", "clearance_mm", "unknown parameter clearance_mm; it has clearance_um"),
+        ("[12.1, 0.4]", "[1200, 0.4]", "clearance_um = 1200 is outside 0 to 500"),
+        ("[12.1, 0.4]", "[12.1, -1]", "uncertainty -1 of clearance_um"),
+        ("[12.1, 0.4]", "[12.1]", "is not a list of 2 finite numbers"),
+        ("[12.1, 0.4]", "[.nan, 0.1]", "is not a list of 2 finite numbers"),
+        ("[12.1, 0.4]", "much", "clearance_um: 'much' is not a finite number"),
+        ("effects:\n", "effects: 3\nx:\n", "3 is not a list"),
+        ("component: joint_3\n", "component: joint_3\n  color: red\n", "unknown key color"),
+        ("- effect: joint_clearance", "- 7\n- effect: joint_clearance", r"effects\[0\]: 7 is not"),
+        ("component: link_2", "component: pose_sensor", "component 'pose_sensor' is not one of"),
+        ("[0, 0, 0, 1, 0, 0]", "[0, 0, 1]", "is not a list of 6 finite numbers"),
+        ("[0, 0, 0, 1, 0, 0]", "[0, 0, 0, 0, 0, 0]", "is not six finite numbers, one not zero"),
+        ("tanh(fz", "tang(fz", "column 12: unknown function tang"),
+        ("[humidity]", "humidity", "is not a list of names"),
+        ("[humidity]", "[humidity, fz]", "the name fz is in use"),
+        ("[humidity]", "['a b', humidity]", "'a b' is not a name"),
+        ("[humidity]", "[]", "column 37: unknown name humidity"),
+        ("own.py:Twist", "own.py:Turn", "own.py has no class Turn"),
+        ("own.py:Twist", "none.py:Twist", "none.py"),
+        ("own.py:Twist", "own.py:np", "is not a class derived from Law"),
+        ("own.py:Twist", "own.py:Law", "Law does not define parameters"),
+        ("own.py:Twist", "Twist", "write FILE.py:CLASS"),
+        ("[3, 0.5]", "[30, 0.5]", "turn_mdeg = 30 is outside -10 to 10"),
+    ],
+)
+def test_bad_model_files_give_one_line(tmp_path, old, new, text):
+    assert old in GOOD
+    path = write(tmp_path, GOOD.replace(old, new))
+    with pytest.raises(InputError, match=text) as caught:
+        load_model(path)
+    assert "m.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("own", "text"),
+    [
+        ("raise RuntimeError('no')", "cannot be run: no"),
+        ("import does_not_exist", "cannot be run: No module"),
+        ("def (", "cannot be run"),
+        (OWN.replace('    check = "look"\n', ""), "Twist does not define check"),
+    ],
+)
+def test_bad_law_files_give_one_line(tmp_path, own, text):
+    with pytest.raises(InputError, match=text):
+        load_model(write(tmp_path, own=own))
+
+
+def test_twice_the_same_effect_is_refused(tmp_path):
+    first = GOOD[GOOD.index("- effect: joint") : GOOD.index("- effect: formula")]
+    with pytest.raises(InputError, match="joint_clearance@joint_3 is there twice"):
+        load_model(write(tmp_path, GOOD.replace(first, first + first)))
+
+
+def test_changed_parts_need_the_closed_form(tmp_path):
+    text = GOOD.replace("effects:\n", "evaluation: spline\neffects:\n").replace(
+        "joint_clearance\n  component: joint_3\n  parameters: {clearance_um: [12.1, 0.4]}",
+        "link_stiffness\n  component: link_1\n  parameters: {flexibility_percent: 5}",
+    )
+    with pytest.raises(InputError, match="needs evaluation: closed_form"):
+        load_model(write(tmp_path, text))
+
+
+def test_a_model_without_a_file_of_its_table_cannot_be_saved(model, tmp_path):
+    with pytest.raises(InputError, match="not read from a file"):
+        save_model(replace(model, table_file=None), tmp_path / "m.yaml")
+    with pytest.raises(InputError, match="cannot be written"):
+        save_model(model, tmp_path / "none" / "m.yaml")
+    with pytest.raises(InputError, match="cannot be read"):
+        file_sha256(tmp_path / "none.yaml")
+
+
+def test_model_without_its_table(tmp_path):
+    (tmp_path / "m.yaml").write_text("schema: 1\nname: x\ntable: {path: no.npz}\neffects: []\n")
+    with pytest.raises(TableError, match="no such file"):
+        load_model(tmp_path / "m.yaml")
+
+
+@pytest.mark.parametrize("law", catalogue().values(), ids=lambda law: law.id)
+def test_every_law_speaks_to_a_technician_and_has_sane_parameters(law):
+    for place in law.places:
+        text = law.sentence.format(place=place)
+        assert len(text) > 20
+        assert "{" not in text
+        keys = [p.key for p in law.parameters(place)]
+        assert keys
+        assert len(set(keys)) == len(keys)
+        for p in law.parameters(place):
+            assert p.lower <= p.mean <= p.upper
+            assert 0.0 < p.scale < np.inf
+            assert si_factor(p.key) > 0.0
+    assert len(law.check) > 20
+    assert len(law.excited_by) > 10
+
+
+CATALOGUE = """
+    link_stiffness bushing_stiffness drive_compliance mount_compliance frame_compliance
+    platform_compliance gravity joint_clearance flange_contact bushing_hardening joint_friction
+    backlash encoder_offset encoder_eccentricity transmission_error axis_misalignment
+    thermal_expansion thermal_softening creep cable_wrench load_bias load_scale load_misalignment
+    load_point measurement_frame target_mounting drift time_delay inertia
+"""
+
+
+def test_the_catalogue_is_complete():
+    assert " ".join(sorted(catalogue())) == " ".join(sorted(CATALOGUE.split()))
+
+
+@pytest.mark.parametrize(
+    ("key", "factor"),
+    [
+        ("clearance_um", 1e-6),
+        ("offset_mdeg", np.pi / 180e3),
+        ("x_um_per_N", 1e-6),
+        ("turn_x_mdeg_per_Nm", np.pi / 180e3),
+        ("shift_x_um_per_h", 1e-6 / 3600.0),
+        ("expansion_ppm_per_K", 1e-6),
+        ("mx_1_Nmm_per_rad", 1e-3),
+        ("order", 1.0),
+        ("m", 1.0),
+        ("per_N", 1.0),
+    ],
+)
+def test_units_in_names(key, factor):
+    assert si_factor(key) == pytest.approx(factor, rel=1e-15)
+
+
+def test_other_packages_offer_laws_by_entry_point(monkeypatch, tmp_path):
+    module = tmp_path / "foreign_laws.py"
+    module.write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def offered(value):
+        point = metadata.EntryPoint("twist", value, registry.ENTRY_POINTS)
+        monkeypatch.setattr(registry.metadata, "entry_points", lambda group: [point])
+        registry.catalogue.cache_clear()
+
+    try:
+        offered("foreign_laws:Twist")
+        assert registry.find_law("twist").places == ("platform",)
+        offered("foreign_laws:np")
+        with pytest.raises(InputError, match="entry point twist: .* is not a class"):
+            registry.catalogue()
+        offered("no_such_package:Twist")
+        with pytest.raises(InputError, match="entry point twist: no_such_package"):
+            registry.catalogue()
+        taken = tmp_path / "taken_name.py"
+        taken.write_text(OWN.replace('id = "twist"', 'id = "creep"'))
+        offered("taken_name:Twist")
+        with pytest.raises(InputError, match="entry point twist: the name creep is in use"):
+            registry.catalogue()
+    finally:
+        monkeypatch.undo()
+        registry.catalogue.cache_clear()
