@@ -3,14 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.diagnosis.candidates import Candidate
-from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.observations import Array, Labels, Mask, Observations
 from wrist_stiffness.errors import InputError
 
 
-def group_mean(values: Array, group: NDArray[np.int64], n_groups: int) -> Array:
+def group_mean(values: Array, group: Labels, n_groups: int) -> Array:
     """Mean over the rows of each group, ignoring NaN.
 
     Parameters
@@ -39,10 +38,8 @@ def group_mean(values: Array, group: NDArray[np.int64], n_groups: int) -> Array:
     return mean.reshape(n_groups, *values.shape[1:])
 
 
-def dwell_groups(
-    moving: NDArray[np.bool_], sessions: NDArray[np.int64], shortest: int = 5
-) -> NDArray[np.int64]:
-    """Number the stretches at rest.
+def dwell_groups(moving: Mask, sessions: Labels, shortest: int = 5) -> Labels:
+    """Give every stretch at rest a number.
 
     Parameters
     ----------
@@ -67,7 +64,7 @@ def dwell_groups(
     return number[stretch]
 
 
-def compress(observations: Observations, group: NDArray[np.int64]) -> Observations:
+def compress(observations: Observations, group: Labels) -> Observations:
     """Average the samples of each group into one unit.
 
     The scatter of a unit is left open: the mean of a thousand samples with coloured noise is
@@ -89,10 +86,10 @@ def compress(observations: Observations, group: NDArray[np.int64]) -> Observatio
         raise InputError("no sample belongs to a unit: the recording never comes to rest")
     n_groups = int(group.max()) + 1
 
-    def mean(column: Array) -> Array:
+    def mean(column: Array | Labels) -> Array:
         return group_mean(column.astype(np.float64), group, n_groups)
 
-    def label(column: NDArray[np.int64] | None) -> NDArray[np.int64] | None:
+    def label(column: Labels | None) -> Labels | None:
         return None if column is None else np.rint(mean(column)).astype(np.int64)
 
     if observations.session is not None:
@@ -111,7 +108,7 @@ def compress(observations: Observations, group: NDArray[np.int64]) -> Observatio
     )
 
 
-def averaged(candidate: Candidate, samples: Observations, group: NDArray[np.int64]) -> Candidate:
+def averaged(candidate: Candidate, samples: Observations, group: Labels) -> Candidate:
     """Evaluate a candidate on samples and average it over the units.
 
     For effects with a memory, whose value at a dwell depends on the way there.  The columns

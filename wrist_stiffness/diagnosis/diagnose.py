@@ -4,11 +4,11 @@ import numpy as np
 
 from wrist_stiffness.diagnosis.candidates import Candidate
 from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
-from wrist_stiffness.diagnosis.estimates import estimate, joint_fit
+from wrist_stiffness.diagnosis.estimates import joint_fit
+from wrist_stiffness.diagnosis.findings import Model, describe
 from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
-    Hypothesis,
     all_hypotheses,
     make_evidence,
 )
@@ -17,22 +17,18 @@ from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Array, Observations
 from wrist_stiffness.diagnosis.outliers import lost_units
-from wrist_stiffness.diagnosis.resampling import BlockGrams, stability, time_blocks
-from wrist_stiffness.diagnosis.result import Diagnosis, Finding, NotExcited, Unexplained
-from wrist_stiffness.diagnosis.rivals import indistinguishable
-from wrist_stiffness.diagnosis.sealed import HeldOut, bought, held_out, refuted, sealed_units
+from wrist_stiffness.diagnosis.resampling import time_blocks
+from wrist_stiffness.diagnosis.result import Diagnosis, NotExcited, Unexplained
+from wrist_stiffness.diagnosis.sealed import HeldOut, held_out, refuted, sealed_units
 from wrist_stiffness.diagnosis.selection import (
     Entered,
-    Selection,
     base_with,
-    rivals_of,
     select,
 )
 from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.structure import (
     CHANCE_OF_STRUCTURE,
     Excess,
-    background,
     effective_dimension,
     lack_of_fit,
 )
@@ -85,19 +81,15 @@ def diagnose(
 
     sealed, n_lost_aside = _cleaned(observations.take(aside), candidates, nuisances, settings)
     kept, stages, broken = _opened(evidence, chosen.entered, sealed, nuisances)
-    base = base_with(evidence.base, kept)
     blocks = time_blocks(training.sessions, settings.blocks)
+    base = base_with(evidence.base, kept)
     excess = lack_of_fit(base.energy, base.freedom, evidence.noise.dof)
     flexible = find_discrepancy(
         evidence, base, blocks, settings.permutations, CHANCE_OF_STRUCTURE, rng
     )
     unexplained = _unexplained(evidence, base.energy, excess, flexible, broken)
-    findings = tuple(
-        _finding(
-            evidence, testable, chosen, kept, which, stages, blocks, unexplained, settings, rng
-        )
-        for which in range(len(kept))
-    )
+    model = Model(evidence, testable, kept, tuple(stages), blocks, dimension, settings)
+    findings = tuple(describe(model, which, rng) for which in range(len(kept)))
     verdict = "effect" if findings else "none"
     if unexplained.energy_share >= settings.unexplained_share or broken:
         verdict = "unknown"
@@ -204,65 +196,6 @@ def _unexplained(
     return Unexplained(flexible.depends_on, float(share), "; ".join(sentences))
 
 
-def _finding(
-    evidence: Evidence,
-    testable: list[Hypothesis],
-    chosen: Selection,
-    kept: tuple[Entered, ...],
-    which: int,
-    stages: list[HeldOut],
-    blocks: Array,
-    unexplained: Unexplained,
-    settings: Settings,
-    rng: np.random.Generator,
-) -> Finding:
-    entered = kept[which]
-    others = base_with(evidence.base, kept[:which] + kept[which + 1 :])
-    ranked = rivals_of(evidence, testable, kept, which, chosen.dimension)
-    ranked = [
-        each
-        for each in ranked
-        if each.name != entered.name or each.hypothesis is entered.hypothesis
-    ]
-    own = next((e for e in ranked if e.hypothesis is entered.hypothesis), ranked[0])
-    best_first = [own, *(each for each in ranked if each is not own)]
-    members = indistinguishable(others, best_first, chosen.dimension, settings)
-    scale = float(background(own.remaining, chosen.dimension))
-    fitted = estimate(evidence, others, own.hypothesis, scale)
-    names = [p.name for p in own.hypothesis.candidate.parameters]
-    names += [p.name for p in own.hypothesis.candidate.shape]
-
-    one_each: dict[str, Hypothesis] = {}
-    for each in best_first:
-        one_each.setdefault(each.name, each.hypothesis)
-    grams = BlockGrams(evidence, others, list(one_each.values()), blocks)
-    price = np.log(others.freedom) * scale
-    prices = price * np.array([h.candidate.freedom for h in one_each.values()])
-    inside = np.isin(list(one_each), [m.name for m in members])
-    before, after = stages[which], stages[which + 1]
-    candidate = own.hypothesis.candidate
-    misfit = own.remaining / (own.remaining + own.gain)
-    told = candidate.evidence or f"{candidate.effect} at {candidate.component}"
-    told += f": explains {100 * (1 - misfit):.1f} % of what the rest of the model leaves"
-    if misfit > 0:
-        told += f"; its law misfits by {100 * np.sqrt(misfit):.0f} % of its size"
-    return Finding(
-        tuple((m.hypothesis.candidate.effect, m.hypothesis.candidate.component) for m in members),
-        {
-            name: (float(value), float(error))
-            for name, value, error in zip(names, fitted.values, fitted.uncertainty, strict=True)
-        },
-        float(np.linalg.norm(after.white) / np.linalg.norm(before.white)),
-        float(own.gain / scale - candidate.freedom * np.log(others.freedom)),
-        entered.p_value,
-        stability(grams, inside, prices, rng),
-        {q.key: bought(before, after, q) for q in evidence.observations.quantities},
-        candidate.compensable,
-        told,
-        candidate.check,
-    )
-
-
 def _floor(evidence: Evidence) -> dict[str, float]:
     inverse = np.linalg.inv(evidence.noise.factors(evidence.observations))
     variance = np.einsum("nij,nij->ni", inverse, inverse).mean(axis=0)
@@ -273,7 +206,7 @@ def _floor(evidence: Evidence) -> dict[str, float]:
 
 
 def _absorbed(evidence: Evidence, kept: tuple[Entered, ...]) -> tuple[str, ...]:
-    """What each nuisance group took up, as root mean square of each quantity."""
+    """Tell what each nuisance group took up, as root mean square of each quantity."""
     nuisance = evidence.nuisance
     parameters, _ = joint_fit(evidence, [each.hypothesis for each in kept])
     sentences = []

@@ -1,4 +1,4 @@
-"""None of these: can the conditions predict what is left, whatever the law?
+"""None of these: the conditions predict what is left, whatever the law.
 
 A Gaussian process over the conditions (squared-exponential kernel, Nystroem features) stands for
 every law that nobody thought of.  It is judged by what it predicts of blocks it has not seen, and
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from wrist_stiffness.diagnosis.hypotheses import Evidence
-from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.observations import Array, Labels
 from wrist_stiffness.diagnosis.permutation import rearranged, rearrangements
 from wrist_stiffness.diagnosis.projection import Base
 
@@ -72,7 +72,7 @@ def features(conditions: Array, length: float, rng: np.random.Generator) -> Arra
 
 
 def predicted_energy(
-    white_features: Array, residuals: Array, blocks: Array, signal: float
+    white_features: Array, residuals: Array, blocks: Labels, signal: float
 ) -> Array:
     """How much of unseen blocks the features predict, summed over components, (repeats,).
 
@@ -104,7 +104,7 @@ def predicted_energy(
 def find_discrepancy(
     evidence: Evidence,
     base: Base,
-    blocks: Array,
+    blocks: Labels,
     repeats: int,
     alpha: float,
     rng: np.random.Generator,

@@ -104,7 +104,7 @@ def possible(base: Base, hypothesis: Hypothesis, inflation: float) -> bool:
 
 
 def joint_fit(evidence: Evidence, hypotheses: list[Hypothesis]) -> tuple[Array, list[Array]]:
-    """Base and effects fitted together.
+    """Fit base and effects together.
 
     Parameters
     ----------

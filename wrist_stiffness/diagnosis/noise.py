@@ -6,20 +6,14 @@ by restricted likelihood, so that slow effects in the catalogue are not taken fo
 """
 
 import numpy as np
-from scipy.linalg import qr
 
+from wrist_stiffness.diagnosis.colour import find_colour
 from wrist_stiffness.diagnosis.observations import Array, Observations
 from wrist_stiffness.diagnosis.projection import orthonormal
-from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors, innovations
+from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors
 
 FEWEST_REPLICATE_DOF = 12
 """Below this the scatter of the replicates is itself too uncertain to be a floor."""
-
-COLOUR_SHARES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97)
-COLOUR_TIMES_IN_STEPS = (1.5, 4.0, 10.0, 30.0)
-
-COLOUR_EVIDENCE = 3.0
-"""Gain of log likelihood that the two numbers of the wander must bring."""
 
 RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
@@ -139,9 +133,7 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
     loss = 1 - basis.shape[1] / measured.sum()
     coupled = residual_covariance(left, loss)
     size = np.sqrt(np.diag(coupled))
-    share, time_constant = colour(
-        everything / size[:, None], measured, observations, basis.shape[1]
-    )
+    share, time_constant = find_colour(everything / size[:, None], observations, basis.shape[1])
     repeated, freedom = replicate_variance(
         everything[:, :, -1], everything[:, :, :-1], observations
     )
@@ -175,63 +167,3 @@ def residual_covariance(left: Array, loss: float) -> Array:
     own = np.diag(np.where(variance > 0, variance, 1.0))
     shrink = len(own) / (len(own) + pairs.max())
     return (1 - shrink) * covariance + shrink * own
-
-
-def colour(
-    everything: Array, measured: Array, observations: Observations, n_rich: int
-) -> tuple[float, float]:
-    """Share and correlation time of the slow wander, by restricted likelihood on a grid.
-
-    Parameters
-    ----------
-    everything : (n, m, q + 1) array
-        Base and candidates in components of equal scatter; the observations are the last column.
-    measured : (n, m) array of bool
-        Entries that take part.
-    observations : Observations
-        Times and sessions.
-    n_rich : int
-        Rank of base and candidates together.
-
-    Returns
-    -------
-    float, float
-        Share in [0, 1) and time, share 0 if white noise does as well.
-    """
-    times = observations.times
-    steps = np.diff(times)[np.diff(observations.sessions) == 0]
-    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    models = [(0.0, step)] + [
-        (share, factor * step) for share in COLOUR_SHARES[1:] for factor in COLOUR_TIMES_IN_STEPS
-    ]
-    design = everything[:, :, :-1]
-    norm = np.linalg.norm(design.reshape(-1, design.shape[2]), axis=0)
-    flat = (design / np.where(norm > 0, norm, 1.0)).reshape(-1, design.shape[2])
-    _, triangle, order = qr(flat, mode="economic", pivoting=True)
-    independent = np.abs(np.diag(triangle)) > 1e-6 * abs(triangle[0, 0])
-    chosen = order[: min(int(independent.sum()), n_rich)]
-    reduced = np.concatenate(
-        [flat[:, chosen].reshape(*measured.shape, -1), everything[:, :, -1:]], axis=2
-    )
-    n_measured, p = int(measured.sum()), len(chosen)
-    likelihoods = []
-    for share, time_constant in models:
-        white, log_sum = innovations(
-            reduced,
-            measured,
-            times,
-            observations.sessions,
-            np.array([share]),
-            np.array([time_constant]),
-        )
-        rows = white[0].reshape(-1, p + 1)
-        r = np.linalg.qr(rows, mode="r")
-        log_information = 2 * np.log(np.abs(np.diag(r)[:p]) + 1e-300).sum()
-        freedom = n_measured - p
-        likelihoods.append(
-            -0.5 * (log_sum[0] + log_information + freedom * np.log(r[p, p] ** 2 / freedom))
-        )
-    best = int(np.argmax(likelihoods))
-    if likelihoods[best] < likelihoods[0] + COLOUR_EVIDENCE:
-        return 0.0, step
-    return models[best]

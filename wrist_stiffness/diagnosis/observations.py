@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import InputError
 
 Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,8 @@ class Observations:
     covariates: Mapping[str, Array]
     covariance: Array | None = None
     time_s: Array | None = None
-    session: NDArray[np.int64] | None = None
-    replicate: NDArray[np.int64] | None = None
+    session: Labels | None = None
+    replicate: Labels | None = None
     samples: Array | None = None
     quantities: tuple[Quantity, ...] = field(default=())
 
@@ -117,12 +119,12 @@ class Observations:
         return self.values.shape[1]
 
     @property
-    def measured(self) -> NDArray[np.bool_]:
+    def measured(self) -> Mask:
         """Which entries of `values` were measured, (n, m)."""
         return np.isfinite(self.values)
 
     @property
-    def sessions(self) -> NDArray[np.int64]:
+    def sessions(self) -> Labels:
         """Session of each unit, (n,); one session where none was given."""
         if self.session is None:
             return np.zeros(self.values.shape[0], dtype=np.int64)
@@ -149,7 +151,7 @@ class Observations:
             known = ", ".join(sorted(self.covariates))
             raise InputError(f"no covariate {name!r} in the table, only {known}") from None
 
-    def take(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> "Observations":
+    def take(self, rows: Mask | Labels) -> "Observations":
         """Those units only, in the order given by `rows`."""
 
         def some(column: NDArray | None) -> NDArray | None:

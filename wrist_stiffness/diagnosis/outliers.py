@@ -1,9 +1,8 @@
 """Units that no model explains: lost beams and dropouts, found before anything is fitted."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.observations import Array, Mask, Observations
 
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
@@ -22,7 +21,7 @@ def robust_scale(values: Array) -> Array:
     return scale
 
 
-def lost_units(observations: Observations, columns: Array, limit: float) -> NDArray[np.bool_]:
+def lost_units(observations: Observations, columns: Array, limit: float) -> Mask:
     """Which units lie far from a model with everything in it.
 
     Iteratively reweighted least squares with Tukey's biweight on the distance of the whole unit,

@@ -8,13 +8,15 @@ their session, so that wander which the noise model missed stays in place.
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.observations import Array, Labels
 
 STRETCH = 3
 """Units that move together."""
 
 
-def rearrangements(sessions: Array, repeats: int, rng: np.random.Generator) -> tuple[Array, Array]:
+def rearrangements(
+    sessions: Labels, repeats: int, rng: np.random.Generator
+) -> tuple[Labels, Array]:
     """Random rearrangements of units.
 
     Parameters
@@ -47,7 +49,7 @@ def rearrangements(sessions: Array, repeats: int, rng: np.random.Generator) -> t
     return order, sign
 
 
-def rearranged(residual: Array, n_components: int, order: Array, sign: Array) -> Array:
+def rearranged(residual: Array, n_components: int, order: Labels, sign: Array) -> Array:
     """Rearranged residuals, (N, repeats); the rows of the priors stay.
 
     Parameters

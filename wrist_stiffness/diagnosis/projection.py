@@ -1,4 +1,4 @@
-"""Linear algebra of one question: what do these columns explain beyond the base?
+"""Linear algebra of one question: what columns explain beyond the base.
 
 Everything is whitened, so sums of squares are chi-square.  A Gaussian prior on a parameter is a
 row of its own (augmented least squares); projections then honour priors without special cases.

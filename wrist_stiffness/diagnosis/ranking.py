@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from wrist_stiffness.diagnosis.estimates import possible
 from wrist_stiffness.diagnosis.hypotheses import Hypothesis
-from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.observations import Array, Labels
 from wrist_stiffness.diagnosis.permutation import rearranged
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.structure import background, lack_of_fit
@@ -44,13 +44,13 @@ class Ranked:
         return self.hypothesis.candidate.name
 
 
-def rank(
+def scored(
     base: Base,
     hypotheses: list[Hypothesis],
     dimension: float,
     noise_dof: float,
 ) -> list[Ranked]:
-    """Score every hypothesis that adds something; physically possible ones, best first.
+    """Score every hypothesis that adds something, best first.
 
     Parameters
     ----------
@@ -78,12 +78,25 @@ def rank(
     ranked = [
         Ranked(*entry, entry[2] / scale - entry[0].candidate.freedom * price) for entry in found
     ]
-    ranked.sort(key=lambda each: -each.score)
+    return sorted(ranked, key=lambda each: -each.score)
+
+
+def rank(
+    base: Base,
+    hypotheses: list[Hypothesis],
+    dimension: float,
+    noise_dof: float,
+) -> list[Ranked]:
+    """Score as `scored` does, without those whose estimates are physically impossible."""
+    ranked = scored(base, hypotheses, dimension, noise_dof)
+    if not ranked:
+        return []
+    scale = float(background(min(each.remaining for each in ranked), dimension))
     return [each for each in ranked if possible(base, each.hypothesis, scale)]
 
 
 def chance_of_best(
-    base: Base, ranked: list[Ranked], n_components: int, order: Array, sign: Array
+    base: Base, ranked: list[Ranked], n_components: int, order: Labels, sign: Array
 ) -> float:
     """Probability that the best of all candidates looks this good by chance (max-statistic).
 

@@ -7,14 +7,14 @@ again costs nothing in the number of units.
 import numpy as np
 
 from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
-from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.observations import Array, Labels, Mask
 from wrist_stiffness.diagnosis.projection import Base
 
 RIDGE = 1e-9
 """Keeps a resample solvable in which a parameter is not seen."""
 
 
-def time_blocks(sessions: Array, wanted: int) -> Array:
+def time_blocks(sessions: Labels, wanted: int) -> Labels:
     """Cut the units into blocks of neighbours that never span two sessions, (n,)."""
     blocks = np.empty(len(sessions), dtype=np.int64)
     names = np.unique(sessions)
@@ -44,7 +44,7 @@ class BlockGrams:
     """
 
     def __init__(
-        self, evidence: Evidence, base: Base, hypotheses: list[Hypothesis], blocks: Array
+        self, evidence: Evidence, base: Base, hypotheses: list[Hypothesis], blocks: Labels
     ) -> None:
         beyond = [base.beyond(each.columns) for each in hypotheses]
         stacked = np.hstack([base.basis, *beyond, base.residual[:, None]])
@@ -71,7 +71,7 @@ class BlockGrams:
         return len(self._grams)
 
     def gains(self, weights: Array) -> Array:
-        """What each hypothesis explains beyond the base when blocks count so often, (h,).
+        """Give what each hypothesis explains when blocks count so often, (h,).
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class BlockGrams:
         )
 
     def heldout_gains(self) -> Array:
-        """What each hypothesis gains on every block when fitted to the others, (h, b)."""
+        """Give what each hypothesis gains on every block when fitted to the others, (h, b)."""
         total = self._grams.sum(axis=0) + self._priors
         gains = np.empty((len(self._members), self.n_blocks))
         for number, own in enumerate(self._grams):
@@ -96,24 +96,24 @@ class BlockGrams:
                 gains[which, number] = plain - self._loss(total - own, own, self._with(member))
         return gains
 
-    def _with(self, member: Array) -> Array:
+    def _with(self, member: Labels) -> Labels:
         return np.concatenate([self._base, member])
 
-    def _weights(self, gram: Array, columns: Array) -> Array:
+    def _weights(self, gram: Array, columns: Labels) -> Array:
         system = gram[np.ix_(columns, columns)] + RIDGE * np.eye(len(columns))
         return np.linalg.solve(system, gram[columns, -1])
 
-    def _energy(self, gram: Array, columns: Array) -> float:
+    def _energy(self, gram: Array, columns: Labels) -> float:
         return self._scale * float(gram[-1, -1] - gram[columns, -1] @ self._weights(gram, columns))
 
-    def _loss(self, training: Array, own: Array, columns: Array) -> float:
+    def _loss(self, training: Array, own: Array, columns: Labels) -> float:
         weights = self._weights(training, columns)
         fit = own[np.ix_(columns, columns)] @ weights
         loss = own[-1, -1] - 2 * weights @ own[columns, -1] + weights @ fit
         return self._scale * float(loss)
 
 
-def stability(grams: BlockGrams, inside: Array, prices: Array, rng: np.random.Generator) -> float:
+def stability(grams: BlockGrams, inside: Mask, prices: Array, rng: np.random.Generator) -> float:
     """Share of block resamples whose best candidate is one of a class.
 
     Parameters

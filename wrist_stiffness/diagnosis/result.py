@@ -90,7 +90,7 @@ class NotExcited:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Answer to: which physical effect is missing?
+    """Answer to the question which physical effect is missing.
 
     Parameters
     ----------

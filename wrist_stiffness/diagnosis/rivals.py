@@ -17,7 +17,7 @@ MISFIT_RATIO = 2.0
 def indistinguishable(
     base: Base, ranked: list[Ranked], dimension: float, settings: Settings
 ) -> list[Ranked]:
-    """The best candidate and all that explain the observations about as well, best first.
+    """List the best candidate and all that explain the observations about as well.
 
     Against noise alone a rival falls behind by the usual criterion.  Where even the best leaves
     structure, no law is exact: then a rival stays as long as what it leaves is of the size that

@@ -7,17 +7,16 @@ improves every cross-validation and fails the day after.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.diagnosis.fitted import FittedModel
-from wrist_stiffness.diagnosis.observations import Array, Observations, Quantity
+from wrist_stiffness.diagnosis.observations import Array, Mask, Observations, Quantity
 from wrist_stiffness.diagnosis.resampling import time_blocks
 
 JUDGES = 8
 """Blocks of the sealed part from which the uncertainty of a gain is taken."""
 
 
-def sealed_units(observations: Observations, share: float) -> NDArray[np.bool_]:
+def sealed_units(observations: Observations, share: float) -> Mask:
     """Which units are put aside: the last session, or the end of the only one, (n,)."""
     sessions = observations.sessions
     names = np.unique(sessions)

@@ -153,7 +153,7 @@ def _swapped(
 
 
 def marginal_gains(base: Base, entered: tuple[Entered, ...]) -> list[tuple[float, int]]:
-    """What each effect explains beyond all the others, and with how many directions."""
+    """Tell what each effect explains beyond all the others, and with how many directions."""
     gains = []
     for which in range(len(entered)):
         others = base_with(base, entered[:which] + entered[which + 1 :])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.observations import Array, Labels, Mask, Observations
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,19 +67,19 @@ class NoiseModel:
         always = np.ones((len(columns), 1), dtype=bool)
         return self._filter(observations, columns[:, None, :], always)[:, 0]
 
-    def _filter(self, observations: Observations, columns: Array, measured: Array) -> Array:
+    def _filter(self, observations: Observations, columns: Array, measured: Mask) -> Array:
         white, _ = innovations(
             columns,
             measured,
             observations.times,
             observations.sessions,
-            np.array([self.colour_share]),
-            np.array([self.colour_time]),
+            self.colour_share,
+            self.colour_time,
         )
-        return white[0]
+        return white
 
 
-def component_factors(covariance: Array, measured: Array) -> Array:
+def component_factors(covariance: Array, measured: Mask) -> Array:
     """Inverse Cholesky factors of each unit's covariance over its measured components.
 
     Parameters
@@ -97,18 +97,18 @@ def component_factors(covariance: Array, measured: Array) -> Array:
     m = covariance.shape[1]
     both = measured[:, :, None] & measured[:, None, :]
     safe = np.where(both, covariance, np.eye(m))
-    return np.linalg.inv(np.linalg.cholesky(safe))
+    return np.linalg.inv(np.linalg.cholesky(safe)).astype(np.float64)
 
 
 def innovations(
     columns: Array,
-    measured: Array,
+    measured: Mask,
     times: Array,
-    sessions: Array,
-    share: Array,
-    time_constant: Array,
-) -> tuple[Array, Array]:
-    """Standardised innovations of white noise plus slow wander, for several noise models at once.
+    sessions: Labels,
+    share: float,
+    time_constant: float,
+) -> tuple[Array, float]:
+    """Standardised innovations of white noise plus slow wander of unit variance together.
 
     Parameters
     ----------
@@ -118,36 +118,33 @@ def innovations(
         Entries that take part.
     times, sessions : (n,) arrays
         The wander starts afresh in every session.
-    share, time_constant : (g,) arrays
-        Share of the wander in the variance and its correlation time, for g models.
+    share, time_constant : float
+        Share of the wander in the variance and its correlation time.
 
     Returns
     -------
-    (g, n, m, k) array
+    (n, m, k) array
         Innovations divided by their standard deviation; zero where not measured.
-    (g,) array
+    float
         Sum of the logarithms of the innovation variances.
     """
-    n, m, k = columns.shape
-    g = len(share)
-    if not share.any():
-        return np.where(measured[:, :, None], columns, 0.0)[None].repeat(g, axis=0), np.zeros(g)
-    white, wander = (1 - share)[:, None], share[:, None]
+    if share == 0:
+        return np.where(measured[:, :, None], columns, 0.0), 0.0
     gap = np.diff(times, prepend=times[0])
     fresh = np.diff(sessions, prepend=sessions[0] - 1) != 0
-    memory = np.where(fresh, 0.0, np.exp(-gap / time_constant[:, None]))
-    state, variance = np.zeros((g, m, k)), np.zeros((g, m))
-    result, log_sum = np.zeros((g, n, m, k)), np.zeros(g)
-    for i in range(n):
-        a = memory[:, i, None]
-        state = a[:, :, None] * state
-        variance = a**2 * variance + wander * (1 - a**2)
+    memory = np.where(fresh, 0.0, np.exp(-gap / time_constant))
+    n, m, k = columns.shape
+    state, variance = np.zeros((m, k)), np.zeros(m)
+    result, log_sum = np.zeros((n, m, k)), 0.0
+    for i, a in enumerate(memory):
         seen = measured[i]
-        total = variance + white
-        surprise = columns[i] - state
-        result[:, i] = np.where(seen[:, None], surprise / np.sqrt(total)[:, :, None], 0.0)
-        log_sum += np.log(total) @ seen
+        state = a * state
+        variance = a**2 * variance + share * (1 - a**2)
+        total = variance + (1 - share)
+        surprise = np.where(seen[:, None], columns[i] - state, 0.0)
+        result[i] = surprise / np.sqrt(total)[:, None]
+        log_sum += float(np.log(total) @ seen)
         gain = np.where(seen, variance / total, 0.0)
-        state = state + gain[:, :, None] * surprise
+        state = state + gain[:, None] * surprise
         variance = variance * (1 - gain)
     return result, log_sum

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.diagnosis.noise import estimate_noise
+
+NOTHING = (60, 2, 0)
+
+
+def wander(rng, n, time_constant):
+    state = np.empty(n)
+    state[0] = rng.normal()
+    keep = np.exp(-1 / time_constant)
+    for k in range(1, n):
+        state[k] = keep * state[k - 1] + np.sqrt(1 - keep**2) * rng.normal()
+    return state
+
+
+def total_variance(noise, table):
+    inverse = np.linalg.inv(noise.factors(table))
+    return np.einsum("nij,nij->ni", inverse, inverse).mean(axis=0)
+
+
+def test_white_noise_is_given_no_colour(rng):
+    table = Observations(rng.normal(size=(200, 3)), {})
+    constant = np.broadcast_to(np.eye(3), (200, 3, 3))
+    noise = estimate_noise(table, constant, np.empty((200, 3, 0)))
+    assert noise.colour_share == 0
+    assert noise.source == "residual"
+    # 200 numbers per component: standard deviation of a variance 10 %.
+    np.testing.assert_allclose(total_variance(noise, table), 1, atol=0.35)
+
+
+def test_wander_is_recognised_beside_white_noise(rng):
+    n = 400
+    values = np.column_stack([wander(rng, n, 10) for _ in range(3)]) * np.sqrt(0.6)
+    values += rng.normal(0, np.sqrt(0.4), (n, 3))
+    constant = np.broadcast_to(np.eye(3), (n, 3, 3))
+    noise = estimate_noise(Observations(values, {}), constant, np.empty((n, 3, 0)))
+    assert 0.4 <= noise.colour_share <= 0.8
+    assert 4 <= noise.colour_time <= 30
+
+
+def test_structure_between_conditions_does_not_reach_the_replicate_floor(rng):
+    n = 120
+    condition = np.repeat(np.arange(40), 3)
+    order = rng.permutation(n)
+    structure = rng.normal(0, 50, (40, 2))[condition[order]]
+    values = structure + rng.normal(0, 2.0, (n, 2))
+    table = Observations(values, {}, replicate=condition[order])
+    constant = np.broadcast_to(np.eye(2), (n, 2, 2))
+    noise = estimate_noise(table, constant, np.empty((n, 2, 0)))
+    assert noise.source == "replicates"
+    # 80 degrees of freedom: the variance is known to 16 %.
+    np.testing.assert_allclose(total_variance(noise, table), 4.0, rtol=0.5)
+
+
+def test_a_drift_in_the_catalogue_does_not_widen_the_replicate_floor(rng):
+    n = 120
+    table = Observations(
+        np.zeros((n, 1)), {}, time_s=np.arange(float(n)), replicate=rng.integers(0, 30, n)
+    )
+    drift = np.arange(float(n))[:, None, None]
+    values = 3 * drift[:, :, 0] + rng.normal(size=(n, 1))
+    noise = estimate_noise(table.with_values(values), np.ones((n, 1, 1)), drift)
+    np.testing.assert_allclose(total_variance(noise, table), 1.0, rtol=0.5)
+
+
+def test_stated_scatter_is_believed_without_replicates(rng):
+    table = Observations(rng.normal(0, 5, (60, 2)), {}, np.eye(2))
+    noise = estimate_noise(table, np.empty(NOTHING), np.empty(NOTHING))
+    assert noise.source == "given"
+    np.testing.assert_allclose(total_variance(noise, table), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("spacing", [1, 20])
+def test_replicates_close_in_time_are_corrected_for_the_wander_they_share(rng, spacing):
+    n = 240
+    ratios = []
+    label = np.full(n, -1)
+    starts = np.arange(0, n - spacing, 2 * spacing if spacing > 1 else 4)
+    label[starts] = np.arange(len(starts))
+    label[starts + spacing] = np.arange(len(starts))
+    for _ in range(8):
+        values = np.column_stack([wander(rng, n, 10) * 0.8 + rng.normal(0, 0.6, n)])
+        table = Observations(values, {}, replicate=label)
+        noise = estimate_noise(table, np.ones((n, 1, 1)), np.empty((n, 1, 0)))
+        ratios.append(total_variance(noise, table)[0])
+    # Without the correction neighbours show 0.42 of the variance.
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.25)

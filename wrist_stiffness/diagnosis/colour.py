@@ -1,0 +1,87 @@
+"""How much of the scatter wanders slowly, and how slowly: restricted likelihood.
+
+Base and candidates are projected out inside the likelihood (REML), so slow effects in the
+catalogue are not taken for wander, nor does fitting them make the wander look small.
+"""
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.optimize import minimize_scalar
+
+from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.whitening import innovations
+
+SHARES = (0.1, 0.25, 0.5, 0.75, 0.95)
+TIMES_IN_STEPS = (1.5, 4.0, 10.0, 30.0)
+LARGEST_SHARE = 0.98
+
+EVIDENCE = 3.0
+"""Gain of log likelihood that the two numbers of the wander must bring."""
+
+
+def find_colour(everything: Array, observations: Observations, n_rich: int) -> tuple[float, float]:
+    """Share and correlation time of the slow wander.
+
+    Parameters
+    ----------
+    everything : (n, m, q + 1) array
+        Base and candidates in components of equal scatter; the observations are the last column.
+    observations : Observations
+        Tells what was measured, and when.
+    n_rich : int
+        Rank of base and candidates together.
+
+    Returns
+    -------
+    float, float
+        Share in [0, 1) and time, share 0 if white noise does as well.
+    """
+    steps = np.diff(observations.times)[np.diff(observations.sessions) == 0]
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    reduced = _independent(everything, n_rich)
+
+    def unlikely(share: float, time_constant: float) -> float:
+        return -_restricted_likelihood(reduced, observations, share, time_constant)
+
+    grid = [(share, step * factor) for share in SHARES for factor in TIMES_IN_STEPS]
+    share, time_constant = min(grid, key=lambda model: unlikely(*model))
+    finer = minimize_scalar(
+        unlikely,
+        bounds=(0.0, LARGEST_SHARE),
+        args=(time_constant,),
+        method="bounded",
+        options={"maxiter": 10, "xatol": 0.01},
+    )
+    if finer.fun > unlikely(0.0, step) - EVIDENCE:
+        return 0.0, step
+    return float(finer.x), time_constant
+
+
+def _independent(everything: Array, n_rich: int) -> Array:
+    """Leading independent columns and the observations, (n, m, p + 1)."""
+    n, m, q = everything.shape
+    flat = everything.reshape(n * m, q)
+    design = flat[:, :-1]
+    norm = np.linalg.norm(design, axis=0)
+    design = design[:, norm > 0] / norm[norm > 0]
+    if design.shape[1] == 0:
+        return everything[:, :, -1:]
+    triangle, order = qr(design, mode="r", pivoting=True)
+    size = np.abs(np.diagonal(triangle))
+    chosen = order[: min(int((size > 1e-6 * size[0]).sum()), n_rich)]
+    return np.hstack([design[:, chosen], flat[:, -1:]]).reshape(n, m, -1)
+
+
+def _restricted_likelihood(
+    reduced: Array, observations: Observations, share: float, time_constant: float
+) -> float:
+    measured = observations.measured
+    white, log_sum = innovations(
+        reduced, measured, observations.times, observations.sessions, share, time_constant
+    )
+    p = reduced.shape[2] - 1
+    size = np.abs(np.diagonal(np.linalg.qr(white.reshape(-1, p + 1), mode="r")))
+    freedom = int(measured.sum()) - p
+    log_information = 2 * np.log(size[:p] + 1e-300).sum()
+    variance = size[p] ** 2 / freedom
+    return -0.5 * float(log_sum + log_information + freedom * np.log(variance + 1e-300))
