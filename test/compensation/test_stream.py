@@ -40,12 +40,18 @@ class Driver:
         return command
 
 
+def corrected(model, theta, load, objective):
+    return correct(
+        lambda angles: model.predict(angles, load), model.table.mechanism, theta, objective
+    )
+
+
 def corrector(model, enabled=True, settings=EVERY_LOAD):
     return Driver(CorrectionStream(model, settings, enabled))
 
 
 def target(model, objective, theta=THETA, load=DOWN):
-    return correct(model, np.asarray(theta), Load(load), objective("pointing")).delta
+    return corrected(model, np.asarray(theta), Load(load), objective("pointing")).delta
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +171,7 @@ def test_residual_is_that_of_what_is_applied(model, objective):
     driver = corrector(model)
     driver.send()
     desired = model.table.mechanism.forward(THETA).platform
-    before = correct(model, THETA, Load(DOWN), objective("pointing")).before
+    before = corrected(model, THETA, Load(DOWN), objective("pointing")).before
     for seconds in (0.01, 0.01, 0.1):
         correction = driver.send(seconds=seconds).correction
         wanted = residual_twist(model.predict(THETA + correction.delta, Load(DOWN)), desired)

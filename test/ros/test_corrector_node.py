@@ -77,7 +77,13 @@ def send_load(graph, node, stamp_ns, wrench=DOWN):
 def expected(model, theta=THETA, name="pointing"):
     platform = model.table.geometry.platform
     objective = Objective(name, platform.normal, platform.tool_point)
-    return correct(model, np.array(theta), Load(np.array(DOWN)), objective)
+    load = Load(np.array(DOWN))
+    return correct(
+        lambda angles: model.predict(angles, load),
+        model.table.mechanism,
+        np.array(theta),
+        objective,
+    )
 
 
 def test_an_enabled_corrector_corrects_as_the_core_does(graph, corrector, model):

@@ -44,7 +44,12 @@ def test_the_worked_case_is_what_the_shipped_model_gives(model):
     platform = model.table.geometry.platform
     objective = Objective("pointing", platform.normal, platform.tool_point)
     load = Load(np.array([0.0, 0.0, -3.0, 0.0, 0.0, 0.0]))
-    found = correct(model, np.radians([20.0, -10.0]), load, objective)
+    found = correct(
+        lambda theta: model.predict(theta, load),
+        model.table.mechanism,
+        np.radians([20.0, -10.0]),
+        objective,
+    )
     for line, twist in (("| before", found.before), ("| after", found.after)):
         wanted = [*(1e6 * twist[:3]), *(1e3 * np.degrees(twist[3:]))]
         assert numbers(line) == pytest.approx(wanted, abs=LAST_DIGIT)

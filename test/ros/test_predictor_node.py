@@ -2,12 +2,16 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.parameter import Parameter
+from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
-from wrist_stiffness.ros.conversions import nanoseconds
+from wrist_stiffness.model.model_file import save_model
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.ros.conversions import nanoseconds, time_message
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 
 SECOND = 1_000_000_000
@@ -180,3 +184,26 @@ def test_without_a_model_nothing_is_predicted_until_one_is_loaded(graph, tmp_pat
     graph.connected("/pose_error_predicted")
     graph.joints("/joint_states", SECOND)
     wait_for_predictions(graph, 1)
+
+
+def test_a_temperature_reaches_the_model_and_a_missing_one_is_reported(graph, model, tmp_path):
+    path = tmp_path / "warm.yaml"
+    growth = Effect(find_law("thermal_expansion"), "link_1", {})
+    save_model(model.with_effects(growth), path)
+    node = graph.add(PoseErrorPredictor, model_file=str(path))
+    graph.listen(PoseWithCovarianceStamped, "/pose_error_predicted")
+    graph.connected("/pose_error_predicted")
+    graph.load(SECOND)
+    wait_for_load(graph, node, SECOND)
+    graph.joints("/joint_states", SECOND)
+    status, _ = graph.status(NAME, lambda status, values: "temperature" in status.message)
+    assert status.level == status.WARN
+    message = Temperature(temperature=60.0)
+    message.header.frame_id = "link_1"
+    message.header.stamp = time_message(SECOND)
+    graph.publish("/temperatures", message)
+    graph.until(lambda: node.stream.temperatures.at(SECOND), "temperature")
+    graph.joints("/joint_states", SECOND)
+    wait_for_predictions(graph, 2)
+    cold, hot = (np.array(numbers(message)[:3]) for message in predictions(graph))
+    assert np.linalg.norm(hot - cold) > 1e-6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import log_motion
-from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
+from wrist_stiffness.model.error_model import Prediction
 
 TOLERANCE = 1e-10
 """The search ends where the angles are known to this [rad]; 1e-6 of an encoder step."""
@@ -38,7 +40,12 @@ class Correction:
     prediction: Prediction
 
 
-def correct(model: ErrorModel, command: Array, load: Load, objective: Objective) -> Correction:
+def correct(
+    predict: Callable[[Array], Prediction],
+    mechanism: Mechanism,
+    command: Array,
+    objective: Objective,
+) -> Correction:
     """Find the angles at which the predicted pose meets the objective of the commanded one.
 
     The error depends on the corrected angles, so this is a fixed point: task(T_pred(theta + delta)
@@ -46,12 +53,13 @@ def correct(model: ErrorModel, command: Array, load: Load, objective: Objective)
 
     Parameters
     ----------
-    model : ErrorModel
-        Predicts the error.
+    predict : callable
+        The pose error at motor angles (2,) [rad], under the load of the moment.  A load in F stays
+        fixed while the angles are iterated, one in U turns with them.
+    mechanism : Mechanism
+        The rigid wrist.
     command : (2,) float
         Commanded motor angles [rad].
-    load : Load
-        A load in F stays fixed while the angles are iterated, one in U turns with them.
     objective : Objective
         What to make right.
 
@@ -67,10 +75,10 @@ def correct(model: ErrorModel, command: Array, load: Load, objective: Objective)
     InputError
         If the fixed point is not reached.
     """
-    prediction = model.predict(command, load)
+    prediction = predict(command)
     desired = prediction.configuration
     task = objective.matrix(desired)
-    step_of_task = np.linalg.pinv(task[:, 3:] @ model.table.mechanism.jacobian(desired))
+    step_of_task = np.linalg.pinv(task[:, 3:] @ mechanism.jacobian(desired))
     before = residual_twist(prediction, desired.platform)
     reached = Correction(np.zeros(2), before, before, prediction)
     size = np.inf
@@ -79,9 +87,9 @@ def correct(model: ErrorModel, command: Array, load: Load, objective: Objective)
         last, size = size, float(np.max(np.abs(step)))
         # The steps shrink by a constant factor, so the last two of them bound what is missing.
         if size < TOLERANCE or (size < last < np.inf and size**2 < TOLERANCE * (last - size)):
-            return as_applied(model, reached, reached.delta + step)
+            return as_applied(mechanism, reached, reached.delta + step)
         delta = reached.delta + step
-        prediction = model.predict(command + delta, load, prediction.active)
+        prediction = predict(command + delta)
         reached = Correction(
             delta, before, residual_twist(prediction, desired.platform), prediction
         )
@@ -91,13 +99,13 @@ def correct(model: ErrorModel, command: Array, load: Load, objective: Objective)
     )
 
 
-def as_applied(model: ErrorModel, correction: Correction, delta: Array) -> Correction:
+def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Correction:
     """Return what a correction leaves where only another one near it is applied.
 
     Parameters
     ----------
-    model : ErrorModel
-        The one that made the correction.
+    mechanism : Mechanism
+        The rigid wrist.
     correction : Correction
         At its fixed point.
     delta : (2,) float
@@ -109,7 +117,7 @@ def as_applied(model: ErrorModel, correction: Correction, delta: Array) -> Corre
         With the residual moved by the rigid Jacobian; the error's own change between the two poses
         is smaller than that by the ratio of error to pose, 1e-3.
     """
-    jacobian = model.table.mechanism.jacobian(correction.prediction.configuration)
+    jacobian = mechanism.jacobian(correction.prediction.configuration)
     after = correction.after.copy()
     after[3:] += jacobian @ (delta - correction.delta)
     return replace(correction, delta=delta, after=after)

@@ -122,16 +122,16 @@ class MonitorStream(Stream):
         if abs(norm - 1.0) > UNIT_TOLERANCE:
             raise InputError(f"measured pose: quaternion has the norm {norm:.4g}, not 1")
         theta = self._angles_at(stamp_ns)
-        model = self.loaded_model()
-        prediction = model.predict(theta, self.loads.at(stamp_ns)[1])
+        running = self.running_model()
+        prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1])
         rotation = Rotation.from_quat(numbers[3:]).as_matrix()
         residual = residual_of_pose(rotation, numbers[:3], prediction)
         noise = self._monitoring.noise**2
         if variance is not None:
             residual = np.where(variance < NOT_MEASURED, residual, np.nan)
             noise = np.maximum(noise, variance)
-        if model is not self._judged:
-            self._judged, self.monitor = model, ResidualMonitor(self._monitoring)
+        if running.model is not self._judged:
+            self._judged, self.monitor = running.model, ResidualMonitor(self._monitoring)
         excess = noise - self._monitoring.noise**2
         self.monitor.add(residual, np.diag(prediction.covariance) + excess)
         return MonitoredPose(residual, prediction.covariance + np.diag(noise))

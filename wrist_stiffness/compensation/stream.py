@@ -12,9 +12,11 @@ import numpy as np
 
 from wrist_stiffness.compensation.contact_policy import ContactGuard
 from wrist_stiffness.compensation.correction import Correction, as_applied, correct
+from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.intake import CORRECTED_FRAME
 from wrist_stiffness.compensation.load_history import LoadIntake
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import (
     AppliedCorrection,
     guard_weight,
@@ -29,7 +31,7 @@ TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected
 
 
 class Stream:
-    """What all streams share: a model, the loads and the settings.
+    """What all streams share: a model, the signals it needs and the settings.
 
     Parameters
     ----------
@@ -37,12 +39,33 @@ class Stream:
         May be replaced between samples.
     settings : StreamSettings
         Names, frames, limits.
+
+    Attributes
+    ----------
+    loads : LoadIntake
+        Loads by stamp, tared.
+    temperatures : HeldSignals
+        By component or `ambient` [degC].
+    covariates : HeldSignals
+        By name, in their own units.
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings) -> None:
-        self.model = model
         self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)
+        self.temperatures, self.covariates = HeldSignals(), HeldSignals()
         self._settings = settings
+        self.model = model
+
+    @property
+    def model(self) -> ErrorModel | None:
+        """The model; one that is put in its place remembers nothing yet."""
+        return self._running.model if self._running else None
+
+    @model.setter
+    def model(self, model: ErrorModel | None) -> None:
+        self._running = (
+            None if model is None else RunningModel(model, self.temperatures, self.covariates)
+        )
 
     @property
     def settings(self) -> StreamSettings:
@@ -59,11 +82,11 @@ class Stream:
         """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
         return self.loads.tare()
 
-    def loaded_model(self) -> ErrorModel:
-        """Return the model, or raise InputError where there is none."""
-        if self.model is None:
+    def running_model(self) -> RunningModel:
+        """Return the model with its memory, or raise InputError where there is none."""
+        if self._running is None:
             raise InputError("no model is loaded")
-        return self.model
+        return self._running
 
 
 @dataclass(frozen=True)
@@ -118,7 +141,8 @@ class PredictionStream(Stream):
         """
         theta = self.settings.motors.angles(names, positions)
         load_stamp_ns, load = self.loads.at(stamp_ns)
-        return PredictedSample(stamp_ns, load_stamp_ns, self.loaded_model().predict(theta, load))
+        prediction = self.running_model().advance(stamp_ns, theta, load)
+        return PredictedSample(stamp_ns, load_stamp_ns, prediction)
 
 
 @dataclass(frozen=True)
@@ -136,7 +160,8 @@ class CorrectedCommand:
     correction : Correction or None
         As it is applied, with the residual that remains; None while none can be had.
     fault : WristError or None
-        Why none can be had although correction is on; what was applied before fades out.
+        Why none can be had although correction is on (what was applied before then fades out), or
+        why the model could not remember the command.
     """
 
     frame_id: str
@@ -239,12 +264,19 @@ class CorrectionStream(Stream):
         fault: WristError | None = None
         if self.enabled:
             try:
-                correction = self._correction(self._load(stamp_ns), theta)
+                load = self._load(stamp_ns)
+                correction = self._correction(stamp_ns, load, theta)
             except WristError as error:
                 fault = error
         delta = self._advance(stamp_ns, theta, correction)
         if correction is not None:
-            correction = as_applied(self.loaded_model(), correction, delta)
+            running = self.running_model()
+            correction = as_applied(running.model.table.mechanism, correction, delta)
+            try:
+                # History follows what the motors were told.
+                running.remember(stamp_ns, theta + delta, load)
+            except WristError as error:
+                fault = error
         sent[list(self.settings.motors.places(names))] = theta + delta
         marked = self.enabled or bool(np.any(delta))
         return CorrectedCommand(
@@ -291,7 +323,7 @@ class CorrectionStream(Stream):
             if frame_id == CORRECTED_FRAME:
                 raise InputError(TWICE)
             load = self._load(stamp_ns)
-            corrected = [self._within_limits(load, theta) for theta in angles]
+            corrected = [self._within_limits(stamp_ns, load, theta) for theta in angles]
         except WristError as error:
             return CorrectedTrajectory(CORRECTED_FRAME, sent, error)
         sent[:, list(self.settings.motors.places(names))] = np.reshape(corrected, (-1, 2))
@@ -307,12 +339,13 @@ class CorrectionStream(Stream):
         _, measured = self.loads.at(stamp_ns)
         return self.contact.load(stamp_ns, measured, self.settings.contact)
 
-    def _correction(self, load: Load, theta: Array) -> Correction:
+    def _correction(self, stamp_ns: int, load: Load, theta: Array) -> Correction:
         """Return the correction that is wanted: faded by the guards, refused beyond the limit."""
-        model = self.loaded_model()
-        platform = model.table.geometry.platform
+        running = self.running_model()
+        table = running.model.table
+        platform = table.geometry.platform
         objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
-        correction = correct(model, theta, load, objective)
+        correction = correct(running.preview(stamp_ns, load), table.mechanism, theta, objective)
         largest = float(np.max(np.abs(correction.delta)))
         if largest > self.settings.correction_limit:
             raise InputError(
@@ -320,9 +353,9 @@ class CorrectionStream(Stream):
                 f"{np.degrees(self.settings.correction_limit):g} deg"
             )
         weight = guard_weight(
-            model.table.workspace, correction.prediction.configuration, self.settings.safety
+            table.workspace, correction.prediction.configuration, self.settings.safety
         )
-        return as_applied(model, correction, weight * correction.delta)
+        return as_applied(table.mechanism, correction, weight * correction.delta)
 
     def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
         if self.model is None:
@@ -331,6 +364,6 @@ class CorrectionStream(Stream):
         limits = self.model.table.geometry.limits
         return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
 
-    def _within_limits(self, load: Load, theta: Array) -> Array:
-        limits = self.loaded_model().table.geometry.limits
-        return within_joint_limits(theta, self._correction(load, theta).delta, limits)
+    def _within_limits(self, stamp_ns: int, load: Load, theta: Array) -> Array:
+        limits = self.running_model().model.table.geometry.limits
+        return within_joint_limits(theta, self._correction(stamp_ns, load, theta).delta, limits)

@@ -122,7 +122,7 @@ class AngleCorrector(WristNode):
     def _publish_residual(self, stamp_ns: int, correction: Correction) -> None:
         twist, prediction = correction.after, correction.prediction
         self._residual.publish(error_message(stamp_ns, twist, prediction.covariance))
-        tool_point = self.stream.loaded_model().table.geometry.platform.tool_point
+        tool_point = self.stream.running_model().model.table.geometry.platform.tool_point
         if not tool_point.any():
             return
         there = seen_from(prediction.configuration.platform @ tool_point)

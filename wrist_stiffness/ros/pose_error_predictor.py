@@ -42,6 +42,7 @@ class PoseErrorPredictor(WristNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
         self._drawn_ns = -NANOSECONDS
+        self._warnings: tuple[str, ...] = ()
         wait_s = self.get_parameter("load_wait_s").value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.waiting = LoadWait(wait_s, lambda: steady.now().nanoseconds)
@@ -52,6 +53,10 @@ class PoseErrorPredictor(WristNode):
     def make_stream(self, settings: StreamSettings) -> PredictionStream:
         """Return the prediction stream."""
         return PredictionStream(None, settings)
+
+    def restriction(self) -> str:
+        """Return what the model left out of the last prediction."""
+        return "; ".join(self._warnings)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the outputs and load the model."""
@@ -101,6 +106,7 @@ class PoseErrorPredictor(WristNode):
         self._s_um.publish(Float64(data=hypot(shift.x, shift.y, shift.z) * MICROMETRES))
         self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
         self.health.good()
+        self._warnings = prediction.warnings
         self._draw(stamp_ns, prediction)
 
     def _draw(self, stamp_ns: int, prediction: Prediction) -> None:
@@ -111,7 +117,7 @@ class PoseErrorPredictor(WristNode):
             return
         self._drawn_ns = stamp_ns
         exaggeration = self.get_parameter("marker_exaggeration").value
-        table = self.stream.loaded_model().table
+        table = self.stream.running_model().model.table
         self._markers.publish(wrist_markers(stamp_ns, table, prediction, exaggeration))
 
 

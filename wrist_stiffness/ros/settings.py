@@ -35,6 +35,9 @@ COMMON = (
         "position_mm: [x, y, z], rpy_deg: [r, p, y], acts_on: platform | environment}}",
     ),
     ParameterEntry(
+        "covariates", "", "names of /covariates/NAME that the model uses, with blanks", fixed=True
+    ),
+    ParameterEntry(
         "load_age_limit_s", 0.5, "oldest load that is still used [s]", lower=0.001, upper=3600.0
     ),
 )

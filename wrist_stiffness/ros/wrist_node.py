@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -16,6 +17,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.task import Future
+from sensor_msgs.msg import Temperature
+from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -115,8 +118,18 @@ class WristNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to listen; the load first, so that it is taken before a joint state that waits."""
+        covariates = self.get_parameter("covariates").value.split()
         self._inputs = [
             self.create_subscription(WrenchStamped, "/load_estimate", self._on_load, SENSOR_QOS),
+            self.create_subscription(
+                Temperature, "/temperatures", self._on_temperature, SENSOR_QOS
+            ),
+            *(
+                self.create_subscription(
+                    Float64, f"/covariates/{name}", partial(self._on_covariate, name), SENSOR_QOS
+                )
+                for name in covariates
+            ),
             *self.make_inputs(),
         ]
         return super().on_activate(state)
@@ -145,6 +158,21 @@ class WristNode(LifecycleNode):
             self.warn(error)
         else:
             self.after_load()
+
+    def _on_temperature(self, message: Temperature) -> None:
+        try:
+            self.stream.temperatures.add(
+                message.header.frame_id, nanoseconds(message.header.stamp), message.temperature
+            )
+        except WristError as error:
+            self.warn(error)
+
+    def _on_covariate(self, name: str, message: Float64) -> None:
+        # The message has no stamp of its own.
+        try:
+            self.stream.covariates.add(name, self.get_clock().now().nanoseconds, message.data)
+        except WristError as error:
+            self.warn(error)
 
     def after_load(self) -> None:
         """Do what waited for a load."""

@@ -1,0 +1,131 @@
+"""Models with a memory in the streams, and the slow signals that effects need."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wrist_stiffness.compensation.contact_policy import ContactSettings
+from wrist_stiffness.compensation.correction import residual_twist
+from wrist_stiffness.compensation.held_signals import HeldSignals
+from wrist_stiffness.compensation.safety import SafetySettings
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.block import Block, Sample
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law
+
+SECOND = 1_000_000_000
+NAMES = ("motor_1_joint", "motor_2_joint")
+DOWN = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+BACKLASH_MDEG = 40.0
+
+
+@pytest.fixture(scope="module")
+def loose(model):
+    width = {"width_mdeg": Estimate(BACKLASH_MDEG)}
+    return model.with_effects(Effect(find_law("backlash"), "motor_1", width))
+
+
+@pytest.fixture(scope="module")
+def warm(model):
+    return model.with_effects(Effect(find_law("thermal_expansion"), "link_1", {}))
+
+
+def predict_all(stream, stamps, thetas):
+    twists = []
+    for stamp, theta in zip(stamps, thetas, strict=True):
+        stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
+        twists.append(stream.on_joint_state(stamp, NAMES, theta).prediction.twist)
+    return np.array(twists)
+
+
+def there_and_back(n=20):
+    first = np.radians(np.concatenate([np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)]))
+    return np.stack([first, np.zeros(2 * n)], axis=1)
+
+
+def test_a_stream_remembers_as_a_whole_recording_does(loose):
+    thetas = there_and_back()
+    stamps = [SECOND + i * SECOND // 100 for i in range(len(thetas))]
+    live = predict_all(PredictionStream(loose, StreamSettings()), stamps, thetas)
+    block = Block(np.array(stamps) / SECOND, thetas, np.tile(DOWN, (len(thetas), 1)))
+    assert np.allclose(live, loose.batch(block).twist, rtol=1e-9, atol=1e-15)
+    # On the way back the backlash is on the other side.
+    assert np.max(np.abs(live[10, 3:] - live[-11, 3:])) > 0.5 * np.radians(1e-3 * BACKLASH_MDEG)
+
+
+def test_a_sample_before_the_last_one_is_refused_and_a_jump_begins_anew(loose):
+    stream = PredictionStream(loose, StreamSettings())
+    thetas = there_and_back(3)
+    fresh = predict_all(stream, [100 * SECOND + i for i in range(6)], thetas)
+    with pytest.raises(InputError, match="before the last one"):
+        stream.on_joint_state(100 * SECOND + 3, NAMES, thetas[0])
+    again = predict_all(stream, [SECOND + i for i in range(6)], thetas)
+    assert np.array_equal(fresh, again)
+
+
+def test_a_replaced_model_remembers_nothing(loose):
+    stream = PredictionStream(loose, StreamSettings())
+    thetas = there_and_back(3)
+    fresh = predict_all(stream, [SECOND + i for i in range(6)], thetas)
+    stream.model = loose
+    assert np.array_equal(fresh, predict_all(stream, [SECOND + i for i in range(6)], thetas))
+
+
+def test_temperatures_reach_the_model_by_their_stamps(warm, model):
+    stream = PredictionStream(warm, StreamSettings())
+    cold = predict_all(stream, [SECOND], [[0.1, 0.2]])
+    stream.temperatures.add("link_1", SECOND + 10, 60.0)
+    earlier = predict_all(stream, [SECOND + 5], [[0.1, 0.2]])
+    hot = predict_all(stream, [SECOND + 10], [[0.1, 0.2]])
+    assert np.array_equal(cold, earlier)
+    sample = Sample(1.0, np.array([0.1, 0.2]), Load(DOWN), temperatures={"link_1": 60.0})
+    assert np.array_equal(hot[0], warm.session().advance(sample).twist)
+    assert not np.allclose(hot, cold, rtol=1e-3)
+
+
+def test_commands_are_corrected_from_the_commanded_history(loose):
+    """What is sent takes up the backlash on the side on which the motor comes to rest."""
+    settings = StreamSettings(
+        contact=ContactSettings("gain", gain=1.0),
+        safety=SafetySettings(slew=1e3, deadband_steps=0.0),
+    )
+    stream = CorrectionStream(loose, settings, enabled=True)
+    truth = loose.session()
+    normal = loose.table.geometry.platform.normal
+    missed, added = [], []
+    for i, theta in enumerate(there_and_back(10)):
+        stamp = SECOND + i * SECOND // 10
+        stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
+        command = stream.on_command(stamp, "", NAMES, theta)
+        prediction = truth.advance(Sample(stamp / SECOND, command.theta, Load(DOWN)))
+        desired = loose.table.mechanism.forward(theta).platform
+        twist = residual_twist(prediction, desired)
+        missed.append(np.linalg.norm(np.cross(twist[3:], desired @ normal)))
+        added.append(command.theta[0] - theta[0])
+    half = 0.5 * np.radians(1e-3 * BACKLASH_MDEG)
+    # The first command cannot be corrected yet, and at the reversal the slide across takes a step.
+    assert max(missed[1:10]) < 1e-9
+    assert max(missed[12:]) < 1e-9
+    assert added[5] - added[15] == pytest.approx(2.0 * half, rel=0.05)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 50), st.floats(-1e3, 1e3)), max_size=20), st.integers(0, 60)
+)
+def test_the_newest_value_that_is_not_younger_is_held(arriving, asked):
+    signals, kept = HeldSignals(), {}
+    for stamp, value in arriving:
+        signals.add("ambient", stamp, value)
+        kept = {other: v for other, v in kept.items() if other < stamp} | {stamp: value}
+    older = [stamp for stamp in kept if stamp <= asked]
+    assert signals.at(asked) == ({"ambient": kept[max(older)]} if older else {})
+
+
+def test_a_signal_that_is_not_finite_is_refused():
+    with pytest.raises(InputError, match="ambient: nan"):
+        HeldSignals().add("ambient", 0, float("nan"))

@@ -1,0 +1,54 @@
+"""Temperatures and covariates: slow signals, held from stamp to stamp."""
+
+from __future__ import annotations
+
+import bisect
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+
+
+class HeldSignals:
+    """To a sample belongs, of every name, the newest value whose stamp is not younger."""
+
+    CAPACITY = 1024
+
+    def __init__(self) -> None:
+        self._stamps: dict[str, list[int]] = {}
+        self._values: dict[str, list[float]] = {}
+
+    def add(self, name: str, stamp_ns: int, value: float) -> None:
+        """Keep a value; a stamp before others says that these are of another time.
+
+        Parameters
+        ----------
+        name : str
+            Of the component or of the covariate.
+        stamp_ns : int
+            [ns].
+        value : float
+            In the signal's unit.
+
+        Raises
+        ------
+        InputError
+            If the value is not finite.
+        """
+        if not np.isfinite(value):
+            raise InputError(f"{name}: {value} is not finite")
+        stamps = self._stamps.setdefault(name, [])
+        values = self._values.setdefault(name, [])
+        place = bisect.bisect_left(stamps, stamp_ns)
+        stamps[place:], values[place:] = [stamp_ns], [value]
+        if len(stamps) > self.CAPACITY:
+            del stamps[0], values[0]
+
+    def at(self, stamp_ns: int) -> dict[str, float]:
+        """Return the values that belong to a stamp [ns] by name; those without one are absent."""
+        found = {}
+        for name, stamps in self._stamps.items():
+            place = bisect.bisect_right(stamps, stamp_ns) - 1
+            if place >= 0:
+                found[name] = self._values[name][place]
+        return found

@@ -1,0 +1,92 @@
+"""A model with the memory of one stream: backlash, creep and heat depend on what was before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from wrist_stiffness.compensation.held_signals import HeldSignals
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Sample
+from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction, Session
+
+JUMP_S = 1.0
+"""A stamp this much before the last one says that the clock jumped back: the memory begins anew."""
+
+
+class RunningModel:
+    """One model and one stream of samples.
+
+    Without effects there is nothing to remember, and samples may come in any order.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Predicts.
+    temperatures, covariates : HeldSignals
+        What the stream has heard of them.
+    """
+
+    def __init__(
+        self, model: ErrorModel, temperatures: HeldSignals, covariates: HeldSignals
+    ) -> None:
+        self.model = model
+        self._temperatures = temperatures
+        self._covariates = covariates
+        self._session: Session | None = model.session() if model.effects else None
+        self._last_ns = 0
+
+    def advance(self, stamp_ns: int, theta: Array, load: Load) -> Prediction:
+        """Predict a sample and remember it.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            [ns].
+        theta : (2,) float
+            Motor angles [rad].
+        load : Load
+            What acts on the platform.
+
+        Returns
+        -------
+        Prediction
+            The pose error.
+
+        Raises
+        ------
+        WristError
+            If the sample is out of range or, with effects, before the last one.
+        """
+        session = self._session_at(stamp_ns)
+        if session is None:
+            return self.model.predict(theta, load)
+        prediction = session.advance(self._sample(stamp_ns, theta, load))
+        self._last_ns = stamp_ns
+        return prediction
+
+    def remember(self, stamp_ns: int, theta: Array, load: Load) -> None:
+        """Take in what the motors were told; as `advance`, where there is something to remember."""
+        if self._session is not None:
+            self.advance(stamp_ns, theta, load)
+
+    def preview(self, stamp_ns: int, load: Load) -> Callable[[Array], Prediction]:
+        """Return the prediction as a function of the motor angles, to be tried and forgotten."""
+        session = self._session_at(stamp_ns)
+        if session is None:
+            return lambda theta: self.model.predict(theta, load)
+        return lambda theta: session.preview(self._sample(stamp_ns, theta, load))
+
+    def _session_at(self, stamp_ns: int) -> Session | None:
+        if self._session is not None and stamp_ns < self._last_ns - JUMP_S * NANOSECONDS:
+            self._session = self.model.session()
+        return self._session
+
+    def _sample(self, stamp_ns: int, theta: Array, load: Load) -> Sample:
+        return Sample(
+            stamp_ns / NANOSECONDS,
+            theta,
+            load,
+            temperatures=self._temperatures.at(stamp_ns),
+            covariates=self._covariates.at(stamp_ns),
+        )
