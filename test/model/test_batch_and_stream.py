@@ -59,7 +59,7 @@ def test_any_split_gives_the_same(whole, cuts):
 def test_session_is_the_batch_sample_by_sample(model, make, name, place):
     """Every law at every place; and none is without effect."""
     loaded = model.with_effects(plausible(name, place))
-    block = make.block(16)
+    block = make.block(10)
     at_once, plain = loaded.batch(block), model.batch(block)
     assert np.abs(at_once.measured - plain.measured).max() > 1e-13
     session = loaded.session()
@@ -75,7 +75,7 @@ def test_session_is_the_batch_sample_by_sample(model, make, name, place):
 def test_preview_leaves_no_trace(whole):
     loaded, block, at_once = whole
     session = loaded.session()
-    for row in range(12):
+    for row in range(5):
         sample = sample_of(block, row)
         session.preview(replace(sample, theta=sample.theta + 0.2))
         preview = session.preview(sample)

@@ -17,7 +17,7 @@ from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.contacts import forces_of
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.evaluation import evaluate, parameter_changes
+from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.law import Contribution
 from wrist_stiffness.model.situation import Situation
 
@@ -33,7 +33,7 @@ class Share:
     twist : (6,) float
         At O in F [m, rad].
     spread : (p, 6) float
-        Twist of one standard uncertainty of each uncertain parameter [m, rad].
+        What one standard uncertainty of each uncertain parameter moves the whole [m, rad].
     """
 
     name: str
@@ -98,7 +98,8 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     model = model.with_evaluation("closed_form")
     configuration = model.table.workspace.configuration(sample.theta)
     model.table.check_load(sample.load.wrench)
-    result, _ = evaluate(model, sample.block, None)
+    block = sample.block
+    result, _ = evaluate(model, block, None)
     at = result.situation
     force = forces_of(at.operators.approach, at.told[1], result.active)
     through = at.own_weight + component_wrenches(configuration, at.parts, at.load, force)
@@ -106,14 +107,19 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     carried = block_diagonal(at.influence.of_components()) @ screws[..., None]
     twists = carried[0, :, :, 0]
     effects = []
-    for effect, added in zip(model.effects, result.contributions, strict=True):
+    for number, (effect, added) in enumerate(zip(model.effects, result.contributions, strict=True)):
+        before, after = model.effects[:number], model.effects[number + 1 :]
         if effect.stage == "parts":
             k = ELASTIC.index(effect.component)
             nominal = twists[k] / effect.law.part_factor(effect.si)
             twist, twists[k] = twists[k] - nominal, nominal
         else:
             twist = _felt(at, added, result.active)
-        spread = [_felt(at, c, result.active) for c in parameter_changes(effect, at, None)]
+        spread = [
+            evaluate(model.with_effects(*before, other, *after), block, None, at)[0].measured[0]
+            - result.measured[0]
+            for other in effect.varied
+        ]
         effects.append(Share(effect.name, twist, np.reshape(spread, (-1, 6))))
     elastic = [Share(name, twists[k], np.empty((0, 6))) for k, name in enumerate(ELASTIC)]
     total = twists.sum(axis=0) + sum((share.twist for share in effects), np.zeros(6))

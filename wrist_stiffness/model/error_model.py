@@ -17,7 +17,7 @@ from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import Memory, evaluate, parameter_changes
+from wrist_stiffness.model.evaluation import Memory, evaluate
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.situation import lengths
 
@@ -151,6 +151,15 @@ class ErrorModel:
             parts = effect.law.changed(parts, self.table.geometry, effect.component, effect.si)
         return parts
 
+    @cached_property
+    def variations(self) -> tuple[ErrorModel, ...]:
+        """The model with each uncertain parameter moved by its standard uncertainty."""
+        return tuple(
+            self.with_effects(*self.effects[:number], other, *self.effects[number + 1 :])
+            for number, effect in enumerate(self.effects)
+            for other in effect.varied
+        )
+
     def session(self) -> Session:
         """Return a fresh memory for a stream of samples."""
         return Session(self)
@@ -260,6 +269,9 @@ class ErrorModel:
 class Session:
     """A model with the memory of a stream of samples.
 
+    Each uncertain parameter has a memory of its own, moved by one standard uncertainty: so the
+    covariance knows the history.  Models without uncertainties cost one evaluation a sample.
+
     Parameters
     ----------
     model : ErrorModel
@@ -269,6 +281,7 @@ class Session:
     def __init__(self, model: ErrorModel) -> None:
         self.model = model
         self._memory: Memory | None = None
+        self._others: list[Memory] | None = None
 
     def advance(self, sample: Sample) -> Prediction:
         """Predict one sample and remember it.
@@ -289,7 +302,7 @@ class Session:
             If the sample is out of range, not finite or earlier than the one before; it is not
             remembered.
         """
-        prediction, self._memory = self._predicted(sample)
+        prediction, self._memory, self._others = self._predicted(sample)
         return prediction
 
     def preview(self, sample: Sample) -> Prediction:
@@ -312,7 +325,7 @@ class Session:
         """
         return self._predicted(sample)[0]
 
-    def _predicted(self, sample: Sample) -> tuple[Prediction, Memory]:
+    def _predicted(self, sample: Sample) -> tuple[Prediction, Memory, list[Memory]]:
         model, memory = self.model, self._memory
         if not np.isfinite(sample.time):
             raise InputError(f"sample: time {sample.time} is not finite")
@@ -325,16 +338,16 @@ class Session:
         result, later = evaluate(model, sample.block, memory)
         twist = result.twist[0]
         covariance = model.table_covariance(configuration, twist)
-        states = memory.states if memory else (None,) * len(model.effects)
-        at = result.situation
-        for effect, state in zip(model.effects, states, strict=True):
-            for change in parameter_changes(effect, at, state):
-                moved = at.with_contact(*at.carried(change), result.active)[0]
-                covariance += np.outer(moved, moved)
+        others = []
+        for number, other in enumerate(model.variations):
+            before = None if self._others is None else self._others[number]
+            moved, after = evaluate(other, sample.block, before, result.situation)
+            others.append(after)
+            covariance += np.outer(moved.twist[0] - twist, moved.twist[0] - twist)
         prediction = Prediction(
             twist, covariance, configuration, result.active[0], result.measured[0], result.warnings
         )
-        return prediction, later
+        return prediction, later, others
 
 
 __all__ = ["BlockPrediction", "ErrorModel", "Load", "Prediction", "Session"]

@@ -83,7 +83,9 @@ class Evaluated:
     warnings: tuple[str, ...]
 
 
-def evaluate(model: ErrorModel, block: Block, memory: Memory | None) -> tuple[Evaluated, Memory]:
+def evaluate(
+    model: ErrorModel, block: Block, memory: Memory | None, like: Situation | None = None
+) -> tuple[Evaluated, Memory]:
     """Evaluate a model over a block.
 
     Parameters
@@ -94,6 +96,8 @@ def evaluate(model: ErrorModel, block: Block, memory: Memory | None) -> tuple[Ev
         n > 0 samples inside the table's domain and load range.
     memory : Memory or None
         What the block before left, None at the start.
+    like : Situation, optional
+        Of another model at the same block; what it found out is used where the parts are the same.
 
     Returns
     -------
@@ -102,8 +106,11 @@ def evaluate(model: ErrorModel, block: Block, memory: Memory | None) -> tuple[Ev
     Memory
         For the next block.
     """
-    block = with_speeds(block, memory)
-    at = situation_of(model, block, None if memory is None else memory.active)
+    if like is not None and like.parts is model.parts:
+        at = advanced(like, NOTHING)
+    else:
+        block = with_speeds(block, memory)
+        at = situation_of(model, block, None if memory is None else memory.active)
     states = list(memory.states) if memory else [None] * len(model.effects)
     added = [NOTHING] * len(model.effects)
     warnings = []
@@ -178,32 +185,6 @@ def with_speeds(block: Block, memory: Memory | None) -> Block:
     step = np.diff(block.theta, axis=0, prepend=first[1][None])
     speed = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
     return replace(block, theta_dot=speed)
-
-
-def parameter_changes(effect: Effect, at: Situation, state: Any) -> list[Contribution]:
-    """Return what one standard uncertainty of each uncertain parameter of an effect adds.
-
-    Parameters
-    ----------
-    effect : Effect
-        One of the evaluated model.
-    at : Situation
-        As the evaluation left it.
-    state : object
-        The effect's state before the block.
-
-    Returns
-    -------
-    list of Contribution
-        Empty where the effect lacks a signal.
-    """
-    try:
-        return [
-            effect.law.changed_contribution(at, effect.component, effect.si, other.si, state)
-            for other in effect.varied
-        ]
-    except MissingSignalError:
-        return []
 
 
 def _first_order(effect: Effect, added: Contribution) -> list[str]:

@@ -161,40 +161,6 @@ class Law(ABC):
         """Return what the law changes at a place."""
         return self.stage
 
-    def changed_contribution(
-        self,
-        at: Situation,
-        place: str,
-        values: Mapping[str, float],
-        others: Mapping[str, float],
-        state: Any,
-    ) -> Contribution:
-        """Return what the effect adds more with other values, from the same state.
-
-        Parameters
-        ----------
-        at : Situation
-            n samples, the effect with `values` included where it changes the parts.
-        place : str
-            One of `places`.
-        values, others : dict of str to float
-            Parameters in SI units.
-        state : object
-            Before the block.
-
-        Returns
-        -------
-        Contribution
-            To first order.
-
-        Raises
-        ------
-        MissingSignalError
-            If a signal that it needs is absent.
-        """
-        first = self.advance(at, place, values, state)[0]
-        return self.advance(at, place, others, state)[0] - first
-
     def changed(
         self,
         parts: ElasticComponents,

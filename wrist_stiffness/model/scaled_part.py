@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -51,18 +50,6 @@ class ScaledPart(Law):
                 weight_approach=factor * flange.weight_approach,
             )
         return replace(parts, flexibility=flexibility, contact=contact)
-
-    def changed_contribution(
-        self,
-        at: Situation,
-        place: str,
-        values: Mapping[str, float],
-        others: Mapping[str, float],
-        state: Any,
-    ) -> Contribution:
-        """Return the further screw of the part under the wrench that it carries now."""
-        now, then = self.part_factor(values), self.part_factor(others)
-        return Contribution(**{LIMB[place]: (then / now - 1.0) * at.elastic_screw(place)})
 
 
 def extra(at: Situation, place: str, fraction: Array) -> Contribution:

@@ -1,0 +1,146 @@
+"""Why is the platform off?  Shares that add up, uncertainty, the rest, and the command."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Load, Sample
+from wrist_stiffness.model.budget import budget
+from wrist_stiffness.model.model_file import save_model
+from wrist_stiffness.workflows.explain import explain
+
+POSE = np.radians([20.0, -10.0])
+LOAD = Load(np.array([0.4, -0.3, -1.0, 0.01, -0.02, 0.005]))
+
+
+@pytest.fixture(scope="module")
+def loaded(model, make):
+    return model.with_effects(
+        make.effect("link_stiffness@link_1", flexibility_percent=(40.0, 5.0)),
+        make.effect("joint_clearance@joint_3", clearance_um=(8.0, 0.5)),
+        make.effect("axis_misalignment@joint_1", shift_u_um=(20.0, 1.0), tilt_v_mdeg=10.0),
+        make.effect("gravity@link_3", mass_g=30.0, x_mm=20.0),
+        make.effect("load_bias@load_sensor", fx_N=(0.1, 0.01)),
+        make.effect("joint_friction@joint_2", coefficient=0.3),
+    )
+
+
+@pytest.fixture
+def model_path(loaded, tmp_path):
+    save_model(loaded, tmp_path / "m.yaml")
+    return tmp_path / "m.yaml"
+
+
+def test_shares_add_up_to_the_twist_with_flanges_in_contact(model, loaded):
+    for one in (model, loaded):
+        parts = budget(one, Sample(0.0, POSE, LOAD))
+        assert one.predict(POSE, LOAD).active.any()
+        total = sum(share.twist for share in (*parts.elastic, *parts.effects))
+        assert np.allclose(total, parts.twist, rtol=1e-9, atol=1e-16)
+        assert np.allclose(parts.second_order, 0.0, atol=1e-15)
+        assert np.allclose(parts.twist, one.predict(POSE, LOAD).twist, rtol=1e-12)
+
+
+def test_without_flanges_elastic_shares_are_those_of_the_compliance(weightless):
+    parts = budget(weightless, Sample(0.0, POSE, LOAD))
+    configuration = weightless.table.mechanism.forward(POSE)
+    shares = weightless.table.shares(configuration) @ LOAD.wrench
+    found = np.array([share.twist for share in parts.elastic])
+    assert np.allclose(found, shares, rtol=1e-9, atol=1e-18)
+
+
+def test_a_softer_link_keeps_its_modelled_share(weightless, make):
+    """The effect's share is what the change adds, not the part's own flexibility."""
+    softer = weightless.with_effects(make.effect("link_stiffness@link_1", flexibility_percent=40.0))
+    plain, parts = (budget(m, Sample(0.0, POSE, LOAD)) for m in (weightless, softer))
+    assert np.allclose(parts.elastic[0].twist, plain.elastic[0].twist, rtol=1e-9)
+    assert np.allclose(parts.effects[0].twist, 0.4 * plain.elastic[0].twist, rtol=1e-9)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 4])
+def test_spread_is_what_one_sigma_moves(loaded, number):
+    """Against the whole model evaluated again, contact and the other effects included."""
+    effect = loaded.effects[number]
+    parts = budget(loaded, Sample(0.0, POSE, LOAD))
+    (other,) = effect.varied
+    effects = [other if e is effect else e for e in loaded.effects]
+    moved = loaded.with_effects(*effects).predict(POSE, LOAD).twist - parts.twist
+    spread = parts.effects[number].spread[0]
+    assert np.linalg.norm(moved) > 0.0
+    assert np.allclose(spread, moved, rtol=1e-6, atol=1e-14)
+
+
+def test_uncertain_parameters_widen_the_prediction(model, make):
+    sure, unsure = (
+        model.with_effects(
+            make.effect("encoder_offset@motor_1", offset_mdeg=(30.0, sigma))
+        ).predict(POSE, LOAD)
+        for sigma in (0.0, 20.0)
+    )
+    column = model.table.mechanism.jacobian(sure.configuration)[:, 0]
+    added = np.zeros((6, 6))
+    added[3:, 3:] = np.outer(column, column) * np.radians(20e-3) ** 2
+    assert np.allclose(unsure.covariance - sure.covariance, added, rtol=1e-6, atol=1e-16)
+
+
+def test_rows_add_up_to_s_and_phi_and_name_the_rest(model_path, loaded):
+    predicted = loaded.predict(POSE, LOAD).twist
+    rest = np.array([5e-6, 0.0, -2e-6, 1e-5, 0.0, 0.0])
+    rotation, shift = exp_twist(predicted + rest)
+    turned = rotation @ loaded.table.mechanism.forward(POSE).platform
+    pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
+    found = explain(model_path, POSE.tolist(), LOAD, measured=pose)
+    assert found.measured
+    last = found.rows[-1]
+    assert last.kind == "rest"
+    assert np.allclose(last.twist, rest, atol=1e-12)
+    along = np.sum([row.along for row in found.rows], axis=0)
+    total = predicted + rest
+    assert np.allclose(along, [np.linalg.norm(total[:3]), np.linalg.norm(total[3:])], rtol=1e-6)
+    values = found.as_values()
+    assert sum(row["s_um"] for row in values["rows"]) == pytest.approx(values["s_um"], rel=1e-6)
+    play = next(row for row in values["rows"] if row["name"] == "joint_clearance@joint_3")
+    assert "play" in play["meaning"]
+    assert play["s_sigma_um"] > 0.0
+
+
+def test_command_prints_a_table_and_writes_json(model_path, tmp_path, capsys):
+    out = tmp_path / "out.json"
+    angles = ["--angles", "20", "-10", "--load", "0.4", "-0.3", "-1"]
+    assert main(["explain", str(model_path), *angles, "--json", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "joint_3 has play" in printed
+    assert "predicted" in printed
+    values = json.loads(out.read_text())
+    assert len(values["rows"]) == 8 + 6
+    assert main(["explain", *angles, "--temperature", "link_1=25"]) == 0
+    measured = ["--measured", "0.01", "0", "0", "0", "0", "0", "1"]
+    assert main(["explain", "--angles", "0", "0", *measured]) == 0
+    assert "not explained" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("extra", "text"),
+    [
+        (["--load", "1"], "--load takes 3 or 6 numbers, not 1"),
+        (["--measured", "0", "0", "0", "0", "0", "0", "2"], "length 2.0000, not 1"),
+        (["--measured", "nan", "0", "0", "0", "0", "0", "1"], "all finite"),
+        (["--temperature", "link_1=warm"], "--temperature link_1=warm: write NAME=NUMBER"),
+        (["--load", "0", "0", "-9"], "9 N"),
+    ],
+)
+def test_bad_input_is_one_line(model_path, capsys, extra, text):
+    assert main(["explain", str(model_path), "--angles", "0", "0", *extra]) == 2
+    error = capsys.readouterr().err
+    assert text in error
+    assert error.count("\n") == 1
+
+
+def test_measured_pose_needs_seven_numbers(model_path):
+    with pytest.raises(InputError, match="needs x y z qx qy qz qw"):
+        explain(model_path, [0.0, 0.0], LOAD, measured=[0.0, 0.0, 0.0])
