@@ -115,10 +115,10 @@ def draw_hull(experiment: PaperExperiment, path: Path) -> None:
             points[:, 2],
             triangles=ConvexHull(points).simplices,
             color=(0.1, 0.4, 0.8, 0.25),
-            edgecolor="0.4",
-            linewidth=0.3,
+            edgecolor=(0.1, 0.1, 0.1, 0.3),
+            linewidth=0.2,
         )
-        plot.scatter(*points.T, s=3 if len(points) > 100 else 18, color="tab:blue")
+        plot.scatter(*points.T, s=1 if len(points) > 100 else 18, color="tab:blue")
         plot.scatter(0.0, 0.0, 0.0, marker="+", s=60, color="black")
         for start, end in _box_edges(PUBLISHED.operative[1:, :3]):
             plot.plot(*np.stack([start, end], axis=1), color="tab:red", linewidth=0.8)
@@ -126,7 +126,7 @@ def draw_hull(experiment: PaperExperiment, path: Path) -> None:
         plot.set_ylabel("$s_y$ [µm]")
         plot.set_zlabel("$s_z$ [µm]")
         plot.set_title(title, fontsize=9)
-        plot.set_box_aspect((1.0, 1.0, 1.3), zoom=0.85)
+        plot.set_box_aspect((1.0, 1.0, 1.2), zoom=0.95)
     figure.savefig(path, dpi=DPI)
 
 
