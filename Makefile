@@ -38,7 +38,7 @@ lint: $(READY)
 
 tables: $(READY)
 	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015.npz
-	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015_25_poses.npz --grid 5
+	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015_25_poses.npz --grid 5 --kernel sandwell
 
 clean:
 	rm -rf $(VENV) demo build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

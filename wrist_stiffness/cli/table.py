@@ -58,6 +58,12 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
     )
     build.add_argument(
+        "--kernel",
+        choices=("thin_plate", "sandwell"),
+        default="thin_plate",
+        help="of the splines; the paper's is sandwell (default: thin_plate)",
+    )
+    build.add_argument(
         "--interface",
         choices=("rigid", "distributing"),
         default="rigid",
@@ -137,6 +143,7 @@ def _build(arguments: argparse.Namespace) -> int:
         interface=arguments.interface,
         tolerance=arguments.tolerance,
         per_axis=arguments.grid,
+        kernel=arguments.kernel,
         progress=Progress("sweep"),
     )
     _print_facts(built)

@@ -11,6 +11,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.components import Condenser, elastic_components
 from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.solids import MeshSettings
+from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -62,6 +63,7 @@ def mesh_convergence(
     configuration: Configuration,
     sizes: MeshSettings,
     factors: tuple[float, ...],
+    interface: Interface = "rigid",
     condenser: Condenser = condense_solid,
     progress: Callable[[int, int], None] | None = None,
 ) -> Convergence:
@@ -77,6 +79,8 @@ def mesh_convergence(
         Reference element sizes.
     factors : tuple of float
         At least three multiples of them in a falling geometric sequence.
+    interface : {"rigid", "distributing"}
+        How walls follow their frames.
     condenser : callable
         `condense_solid`, or a `CondensedStore` that remembers.
     progress : callable, optional
@@ -98,7 +102,9 @@ def mesh_convergence(
         if progress is not None:
             progress(done, len(factors))
         scaled = MeshSettings(**{name: factor * size for name, size in asdict(sizes).items()})
-        components, provenance = elastic_components(geometry, scaled, condenser=condenser)
+        components, provenance = elastic_components(
+            geometry, scaled, interface, condenser=condenser
+        )
         operators = contact_operators(configuration, components, np.zeros(3))
         # Columns 3 and 4 of the map are |s| and phi.
         s, phi = rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0)
