@@ -333,6 +333,9 @@ class Session:
             raise InputError(
                 f"sample: time {sample.time:.6f} s is before the last one, {memory.time:.6f} s"
             )
+        if not model.effects:
+            plain = model.predict(sample.theta, sample.load, memory.active if memory else None)
+            return plain, Memory((), sample.time, sample.theta, plain.active), []
         configuration = model.table.workspace.configuration(sample.theta)
         model.table.check_load(sample.load.wrench)
         result, later = evaluate(model, sample.block, memory)
