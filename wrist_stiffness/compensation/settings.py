@@ -10,6 +10,7 @@ from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.intake import Frames, MotorNames
 from wrist_stiffness.compensation.objective import ObjectiveName
 from wrist_stiffness.compensation.safety import SafetySettings
+from wrist_stiffness.mechanism.components import Array
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class StreamSettings:
         Frames in which loads arrive.
     load_age_limit_s : float
         Oldest load that is still used [s].
+    load_noise : (6,) float, optional
+        Standard deviation of force and moment at O; None leaves it out of covariances [N, N m].
     objective : str
         What the correction makes right.
     correction_limit : float
@@ -38,6 +41,7 @@ class StreamSettings:
     motors: MotorNames = field(default_factory=MotorNames)
     frames: Frames = field(default_factory=Frames)
     load_age_limit_s: float = 0.5
+    load_noise: Array | None = None
     objective: ObjectiveName = "pointing"
     correction_limit: float = float(np.radians(0.5))
     safety: SafetySettings = field(default_factory=SafetySettings)

@@ -6,7 +6,7 @@ A shell converts a message into numbers, calls one of these methods and converts
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from wrist_stiffness.compensation.contact_policy import ContactGuard
 from wrist_stiffness.compensation.correction import Correction, as_applied, correct
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.intake import CORRECTED_FRAME
+from wrist_stiffness.compensation.load_covariance import load_covariance
 from wrist_stiffness.compensation.load_history import LoadIntake
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.running_model import RunningModel
@@ -141,7 +142,11 @@ class PredictionStream(Stream):
         """
         theta = self.settings.motors.angles(names, positions)
         load_stamp_ns, load = self.loads.at(stamp_ns)
-        prediction = self.running_model().advance(stamp_ns, theta, load)
+        running = self.running_model()
+        prediction = running.advance(stamp_ns, theta, load)
+        if self.settings.load_noise is not None:
+            added = load_covariance(running.model, prediction, load, self.settings.load_noise)
+            prediction = replace(prediction, covariance=prediction.covariance + added)
         return PredictedSample(stamp_ns, load_stamp_ns, prediction)
 
 

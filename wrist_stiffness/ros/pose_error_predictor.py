@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import hypot
 from typing import Any
 
@@ -24,7 +25,7 @@ from wrist_stiffness.ros.load_wait import LoadWait
 from wrist_stiffness.ros.markers import wrist_markers
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
-from wrist_stiffness.ros.settings import PREDICTION
+from wrist_stiffness.ros.settings import PREDICTION, prediction_settings
 from wrist_stiffness.ros.wrist_node import WristNode
 
 MICROMETRES = 1e6
@@ -53,6 +54,10 @@ class PoseErrorPredictor(WristNode):
     def make_stream(self, settings: StreamSettings) -> PredictionStream:
         """Return the prediction stream."""
         return PredictionStream(None, settings)
+
+    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
+        """Check parameters and return the settings that they stand for."""
+        return prediction_settings(values)
 
     def restriction(self) -> str:
         """Return what the model left out of the last prediction."""

@@ -44,6 +44,17 @@ COMMON = (
 
 PREDICTION = (
     ParameterEntry(
+        "load_noise_N",
+        0.0,
+        "standard deviation of a force component; with load_noise_Nm 0 it is left out of the "
+        "covariance [N]",
+        lower=0.0,
+        upper=1000.0,
+    ),
+    ParameterEntry(
+        "load_noise_Nm", 0.0, "the same of a moment component at O [N m]", lower=0.0, upper=100.0
+    ),
+    ParameterEntry(
         "load_wait_s",
         0.0,
         "longest wait for the load of a joint state [s]",
@@ -203,6 +214,28 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
         frames=frames_from_yaml(values["frames"]),
         load_age_limit_s=values["load_age_limit_s"],
     )
+
+
+def prediction_settings(values: Mapping[str, Any]) -> StreamSettings:
+    """Return the settings of the sample path of the predictor.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters of `COMMON` and `PREDICTION` by name.
+
+    Returns
+    -------
+    StreamSettings
+        In SI units.
+
+    Raises
+    ------
+    InputError
+        As `stream_settings`.
+    """
+    noise = np.repeat([values["load_noise_N"], values["load_noise_Nm"]], 3)
+    return replace(stream_settings(values), load_noise=noise if noise.any() else None)
 
 
 def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
