@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from netgen.occ import OCCGeometry, WorkPlane
 
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.fem.components import elastic_components
+from wrist_stiffness.fem.mesh import generate_mesh
 from wrist_stiffness.fem.parts import Placement, wrist_parts
 from wrist_stiffness.fem.solids import bushing_section, link_shape
 from wrist_stiffness.mechanism.components import ELASTIC, LINKS, PASSIVE_JOINTS
@@ -139,6 +141,15 @@ def test_progress_names_every_part(make_wrist, coarse):
     assert seen == [*ELASTIC, "done"]
 
 
+def test_distributing_walls_soften_every_part_in_every_direction(skewed_components, coarse):
+    geometry, rigid = skewed_components
+    distributing, provenance = elastic_components(geometry, coarse, interface="distributing")
+    assert provenance.interface == "distributing"
+    for softer, stiffer in zip(distributing.flexibility, rigid.flexibility, strict=True):
+        scale = np.sqrt(np.diag(stiffer))
+        assert np.linalg.eigvalsh((softer - stiffer) / np.outer(scale, scale))[0] > 0
+
+
 def test_unknown_interface_model_is_refused(make_wrist, coarse):
     with pytest.raises(InputError, match="'glued' is not one of rigid, distributing"):
         elastic_components(make_wrist(), coarse, interface="glued")
@@ -150,6 +161,14 @@ def test_shapes_that_cannot_be_built_are_refused(make_wrist, coarse):
         link_shape(replace(link, motor_bore=11e-3), 1.5, coarse)
     with pytest.raises(GeometryError, match=r"need an angle in \(0, 180\) deg"):
         link_shape(link, 0.0, coarse)
+    with pytest.raises(GeometryError, match="bores 5.600 mm apart .* add up to 6.150 mm"):
+        link_shape(replace(link, motor_bore=6.9e-3), 0.2, coarse)
     bushing = make_wrist().bushings["joint_2"]
     with pytest.raises(GeometryError, match="flange of 6.000 mm is not wider"):
         bushing_section(replace(bushing, flange_diameter=6e-3), coarse)
+
+
+def test_a_shape_that_netgen_cannot_mesh_is_one_clear_error():
+    crossed = WorkPlane().MoveTo(0, 0).LineTo(1, 1).LineTo(1, 0).LineTo(0, 1).Close().Face()
+    with pytest.raises(GeometryError, match="the mesher gave up on a part: OCC-Triangulation"):
+        generate_mesh(OCCGeometry(crossed, dim=2))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from netgen.libngpy._meshing import NgException
 from netgen.meshing import Mesh as NetgenMesh
 from netgen.occ import OCCGeometry
 from numpy.typing import NDArray
 from skfem import MeshTet2
 
+from wrist_stiffness.errors import GeometryError
 from wrist_stiffness.fem.solids import MILLIMETRES
 from wrist_stiffness.mechanism.components import Array
 
@@ -65,13 +67,26 @@ def mesh_solid(shape: OCCGeometry) -> SolidMesh:
     -------
     SolidMesh
         In metres.
+
+    Raises
+    ------
+    GeometryError
+        If the shape cannot be meshed.
     """
-    netgen = shape.GenerateMesh()
+    netgen = generate_mesh(shape)
     netgen.SecondOrder()
     volume = netgen.Elements3D().NumPy()["nodes"][:, list(SKFEM_TET10)].astype(np.int64) - 1
     places = netgen.Coordinates() / MILLIMETRES
     tets = MeshTet2(places.T, volume.T)
     return SolidMesh(tets, _named_surfaces(netgen, volume[:, :4], tets))
+
+
+def generate_mesh(shape: OCCGeometry) -> NetgenMesh:
+    """Let netgen mesh a shape; a `GeometryError` if it cannot."""
+    try:
+        return shape.GenerateMesh()
+    except NgException as error:
+        raise GeometryError(f"the mesher gave up on a part: {error}") from error
 
 
 def match_facets(tets: MeshTet2, triangles: NDArray[np.int64]) -> NDArray[np.int64]:

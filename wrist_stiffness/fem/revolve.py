@@ -12,7 +12,7 @@ from netgen.occ import OCCGeometry
 from numpy.typing import NDArray
 from skfem import MeshTet2
 
-from wrist_stiffness.fem.mesh import SolidMesh, match_facets
+from wrist_stiffness.fem.mesh import SolidMesh, generate_mesh, match_facets
 from wrist_stiffness.fem.solids import FLANGES, MILLIMETRES
 from wrist_stiffness.mechanism.components import Array
 
@@ -43,8 +43,13 @@ def revolve(section: OCCGeometry, arcs_per_sector: int) -> SolidMesh:
     SolidMesh
         In metres, about z.  Surfaces are the section's named edges; those of flanges are split
         into sectors, `inner_0` ... `inner_7`.
+
+    Raises
+    ------
+    GeometryError
+        If the section cannot be meshed.
     """
-    plane = section.GenerateMesh()
+    plane = generate_mesh(section)
     corners = plane.Coordinates()[:, :2] / MILLIMETRES
     triangles = np.sort(plane.Elements2D().NumPy()["nodes"][:, :3].astype(np.int64) - 1, axis=1)
     segments = plane.Elements1D().NumPy()

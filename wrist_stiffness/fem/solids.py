@@ -85,7 +85,7 @@ def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGe
     Raises
     ------
     GeometryError
-        If the bar closes on itself or a bore is wider than the bar.
+        If the bar closes on itself, a bore is wider than the bar or the bores meet.
     """
     radius, radial, axial = (
         MILLIMETRES * v for v in (link.arc_radius, link.section_radial, link.section_axial)
@@ -101,6 +101,12 @@ def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGe
         raise GeometryError(
             f"bore of {widest * 1e3:.3f} mm leaves no wall in a bar "
             f"{link.section_axial * 1e3:.3f} mm wide with {link.overhang * 1e3:.3f} mm overhang"
+        )
+    between = angle * (link.arc_radius - link.section_radial / 2.0)
+    if between <= (link.motor_bore + link.platform_bore) / 2.0:
+        raise GeometryError(
+            f"bores {between * 1e3:.3f} mm apart at the inside of the bar cut into each other: "
+            f"their radii add up to {(link.motor_bore + link.platform_bore) * 5e2:.3f} mm"
         )
     corner = Pnt(radius - radial / 2.0, 0.0, -axial / 2.0)
     section = WorkPlane(Axes(corner, n=-Y, h=X)).Rectangle(radial, axial).Face()
