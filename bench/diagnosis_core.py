@@ -1,4 +1,4 @@
-"""Hidden effects on a made-up machine: how often does the statistical core name the right one?
+"""Hidden effects on a made-up machine: how often the statistical core names the right one.
 
 Usage: ``python bench/diagnosis_core.py [--kind none|single|outside|pair|poor] [--seeds N]``.
 Every score carries its 95 % Wilson interval.  Sizes are in units of the scatter of one dwell.
@@ -85,7 +85,7 @@ def run(case: Case) -> Diagnosis:
 
 
 def scores(case: Case, result: Diagnosis) -> dict[str, float]:
-    """What is counted in one case."""
+    """Count what matters in one case."""
     truths = {name for name, _ in case.effects}
     named = [set(finding.names) for finding in result.findings]
     silent = {f"{each.effect}@{each.component}" for each in result.not_excited}
@@ -122,12 +122,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kind", choices=KINDS, action="append")
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--law-error", type=float, choices=LAW_ERRORS, help="only these cases")
+    parser.add_argument("--every", type=int, default=1, help="only every so manyth case")
     parser.add_argument("--log", help="one JSON line per case")
     arguments = parser.parse_args()
     log = open(arguments.log, "w") if arguments.log else None  # noqa: SIM115
     for kind in arguments.kind or KINDS:
         rows: dict[str, list[dict[str, float]]] = defaultdict(list)
-        for case in cases(kind, arguments.seeds):
+        chosen = [
+            case
+            for case in cases(kind, arguments.seeds)
+            if arguments.law_error in (None, case.law_error)
+        ]
+        for case in chosen[:: arguments.every]:
             result = run(case)
             rows[case.label].append(scores(case, result))
             if log:

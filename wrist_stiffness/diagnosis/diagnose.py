@@ -10,6 +10,7 @@ from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
     all_hypotheses,
+    gain,
     make_evidence,
 )
 from wrist_stiffness.diagnosis.identifiability import excited
@@ -17,6 +18,7 @@ from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Array, Observations
 from wrist_stiffness.diagnosis.outliers import lost_units
+from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.diagnosis.result import Diagnosis, NotExcited, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut, held_out, refuted, sealed_units
@@ -97,8 +99,8 @@ def diagnose(
         verdict,
         "sample" if observations.samples is None else "dwell",
         _floor(evidence),
-        {q.key: stages[0].rmse(q) for q in observations.quantities},
-        {q.key: stages[-1].rmse(q) for q in observations.quantities},
+        {q.key: stages[0].rmse(q) for q in observations.reported},
+        {q.key: stages[-1].rmse(q) for q in observations.reported},
         _absorbed(evidence, kept),
         findings,
         unexplained,
@@ -163,8 +165,12 @@ def _opened(
     """Judge each effect, in the order of entry, on the sealed part."""
     kept: list[Entered] = []
     stages = [held_out(fit_to(evidence, [], nuisances), sealed)]
-    broken = []
+    broken: list[str] = []
     for each in entered:
+        alone = base_with(evidence.base, tuple(kept))
+        if broken and gain(alone, each.hypothesis) < _price(alone, each):
+            # It entered only beside an effect that did not hold.
+            continue
         trial = [other.hypothesis for other in kept] + [each.hypothesis]
         stage = held_out(fit_to(evidence, trial, nuisances), sealed)
         if refuted(stages[-1], stage):
@@ -173,6 +179,11 @@ def _opened(
             kept.append(each)
             stages.append(stage)
     return tuple(kept), stages, broken
+
+
+def _price(base: Base, entered: Entered) -> float:
+    """Sum of squares that the information criterion asks of an effect."""
+    return entered.hypothesis.candidate.freedom * float(np.log(base.freedom))
 
 
 def _unexplained(
@@ -198,10 +209,12 @@ def _unexplained(
 
 def _floor(evidence: Evidence) -> dict[str, float]:
     inverse = np.linalg.inv(evidence.noise.factors(evidence.observations))
-    variance = np.einsum("nij,nij->ni", inverse, inverse).mean(axis=0)
+    measured = evidence.observations.measured
+    variance = np.einsum("nij,nij->ni", inverse, inverse)
+    variance = np.sum(variance * measured, axis=0) / np.maximum(measured.sum(axis=0), 1)
     return {
         q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
-        for q in evidence.observations.quantities
+        for q in evidence.observations.reported
     }
 
 
@@ -216,7 +229,7 @@ def _absorbed(evidence: Evidence, kept: tuple[Entered, ...]) -> tuple[str, ...]:
         sizes = [
             f"{np.sqrt(np.mean(np.sum(taken[:, list(q.components)] ** 2, axis=1))) * q.per_si:.3g}"
             f" {q.unit} of {q.name}"
-            for q in evidence.observations.quantities
+            for q in evidence.observations.reported
         ]
         sentences.append(f"{group}: {', '.join(sizes)}")
     return tuple(sentences)

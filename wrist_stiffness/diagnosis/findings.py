@@ -84,7 +84,7 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
         own.score,
         entered.p_value,
         _stability(model, others, ranked, {m.name for m in members}, scale, rng),
-        {q.key: bought(before, after, q) for q in model.evidence.observations.quantities},
+        {q.key: bought(before, after, q) for q in model.evidence.observations.reported},
         candidate.compensable,
         _told(own),
         candidate.check,

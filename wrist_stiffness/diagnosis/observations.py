@@ -137,6 +137,12 @@ class Observations:
             return np.arange(self.n_units, dtype=np.float64)
         return self.time_s
 
+    @property
+    def reported(self) -> tuple[Quantity, ...]:
+        """Quantities of which anything was measured."""
+        seen = self.measured.sum(axis=0) > 0
+        return tuple(q for q in self.quantities if seen[list(q.components)].any())
+
     def covariate(self, name: str) -> Array:
         """One condition by name, (n,).
 

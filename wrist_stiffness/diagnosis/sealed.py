@@ -42,12 +42,19 @@ class HeldOut:
     white: Array
 
     def rmse(self, quantity: Quantity) -> float:
-        """Root mean square of the vector norm of a quantity."""
-        return float(np.sqrt(np.nanmean(self.squares(quantity)))) * quantity.per_si
+        """Root mean square of the vector norm of a quantity; blanks do not count."""
+        columns = self.residual[:, list(quantity.components)]
+        measured = np.isfinite(columns)
+        total = np.sum(np.where(measured, columns, 0.0) ** 2, axis=0)
+        mean = total / np.maximum(measured.sum(axis=0), 1)
+        return float(np.sqrt(mean.sum())) * quantity.per_si
 
     def squares(self, quantity: Quantity) -> Array:
-        """Squared vector norm of each unit, (n,); NaN where a component was not measured."""
-        return np.sum(self.residual[:, list(quantity.components)] ** 2, axis=1)
+        """Squared vector norm of each unit, (n,); NaN where no component was measured."""
+        columns = self.residual[:, list(quantity.components)]
+        measured = np.isfinite(columns)
+        total = np.sum(np.where(measured, columns, 0.0) ** 2, axis=1)
+        return np.where(measured.any(axis=1), total, np.nan)
 
 
 def held_out(model: FittedModel, sealed: Observations) -> HeldOut:

@@ -20,6 +20,9 @@ from wrist_stiffness.diagnosis.structure import lack_of_fit
 
 SWAP_ROUNDS = 3
 
+CONTENDERS = 3
+"""So many candidates get their shape refined before one is chosen."""
+
 
 @dataclass(frozen=True, eq=False)
 class Entered:
@@ -90,21 +93,18 @@ def select(
     rng : numpy.random.Generator
         For the permutations.
     """
-    noise_dof = evidence.noise.dof
     entered: tuple[Entered, ...] = ()
     chance = 1.0
     while len(entered) < settings.most_findings:
         base = base_with(evidence.base, entered)
-        free = _others(hypotheses, entered)
-        ranked = rank(base, free, dimension, noise_dof)
+        ranked = _sharpened(evidence, base, _others(hypotheses, entered), dimension)
         if not ranked:
             break
         order, sign = rearrangements(evidence.observations.sessions, settings.permutations, rng)
         chance = chance_of_best(base, ranked, evidence.observations.n_components, order, sign)
         if chance > settings.alpha:
             break
-        best = refined(evidence, ranked[0].hypothesis, base)
-        entered = (*entered, Entered(best, chance))
+        entered = (*entered, Entered(ranked[0].hypothesis, chance))
         entered = _swapped(evidence, hypotheses, entered, dimension)
     return Selection(_pruned(evidence, hypotheses, entered, dimension, settings), chance, dimension)
 
@@ -120,7 +120,22 @@ def rivals_of(
     others = entered[:which] + entered[which + 1 :]
     base = base_with(evidence.base, others)
     free = [*_others(hypotheses, others), entered[which].hypothesis]
-    return rank(base, free, dimension, evidence.noise.dof)
+    return _sharpened(evidence, base, free, dimension)
+
+
+def _sharpened(
+    evidence: Evidence, base: Base, hypotheses: list[Hypothesis], dimension: float
+) -> list[Ranked]:
+    """Rank after the best contenders with a shape have had it refined."""
+    ranked = rank(base, hypotheses, dimension, evidence.noise.dof)
+    contenders: dict[str, Hypothesis] = {}
+    for each in ranked:
+        if each.hypothesis.candidate.shape and len(contenders) < CONTENDERS:
+            contenders.setdefault(each.name, each.hypothesis)
+    if not contenders:
+        return ranked
+    finer = [refined(evidence, each, base) for each in contenders.values()]
+    return rank(base, [*hypotheses, *finer], dimension, evidence.noise.dof)
 
 
 def _others(hypotheses: list[Hypothesis], entered: tuple[Entered, ...]) -> list[Hypothesis]:
@@ -139,14 +154,9 @@ def _swapped(
         before = [each.name for each in entered]
         for which in range(len(entered)):
             ranked = rivals_of(evidence, hypotheses, entered, which, dimension)
-            if ranked and ranked[0].hypothesis is not entered[which].hypothesis:
-                others = base_with(evidence.base, entered[:which] + entered[which + 1 :])
-                best = refined(evidence, ranked[0].hypothesis, others)
-                entered = (
-                    *entered[:which],
-                    replace(entered[which], hypothesis=best),
-                    *entered[which + 1 :],
-                )
+            if ranked:
+                better = replace(entered[which], hypothesis=ranked[0].hypothesis)
+                entered = (*entered[:which], better, *entered[which + 1 :])
         if [each.name for each in entered] == before:
             break
     return entered

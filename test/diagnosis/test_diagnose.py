@@ -1,0 +1,211 @@
+"""Hidden truths on the made-up arm, and on plain tables where every answer is known."""
+
+import json
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.diagnosis import (
+    Candidate,
+    Nuisance,
+    Observations,
+    Parameter,
+    Settings,
+    ShapeParameter,
+    diagnose,
+)
+from wrist_stiffness.errors import InputError
+
+QUICK = Settings(permutations=999)
+
+
+def line(covariate, lower=-np.inf, plausible=None):
+    """The same slope over one condition in every component."""
+
+    def columns(table, _):
+        return np.stack([table.covariate(covariate)] * table.n_components, axis=1)[:, :, None]
+
+    return Candidate("line", covariate, (Parameter("slope", lower, plausible=plausible),), columns)
+
+
+def offset():
+    def columns(table):
+        return np.broadcast_to(
+            np.eye(table.n_components), (*table.values.shape, table.n_components)
+        )
+
+    return Nuisance("offset", columns)
+
+
+def plain(rng, n=120, m=2):
+    conditions = {name: rng.uniform(-1, 1, n) for name in ("x", "z", "w")}
+    return Observations(rng.normal(size=(n, m)), conditions)
+
+
+def by_name(arm, name):
+    return next(candidate for candidate in arm.catalogue() if candidate.name == name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [1.0, 30.0])
+def test_a_hidden_effect_with_an_inexact_law_is_named_alone(arm, rng, size):
+    truth = by_name(arm, "compliance@joint_2")
+    table = arm.hide(arm.campaign(rng), [(truth, size)], rng, law_error=0.05)
+    result = diagnose(table, arm.catalogue(), arm.base(), rng, QUICK)
+    assert result.verdict == "effect"
+    assert [truth.name in finding.names for finding in result.findings] == [True]
+    assert result.findings[0].heldout_rmse_ratio < 1
+    assert result.after["s_um"] < result.before["s_um"]
+
+
+@pytest.mark.slow
+def test_an_effect_outside_the_catalogue_is_unknown(arm, rng):
+    table = arm.hide(arm.campaign(rng), [(arm.outsiders()["cable"], 10.0)], rng)
+    result = diagnose(table, arm.catalogue(), arm.base(), rng, QUICK)
+    assert result.verdict == "unknown"
+    assert result.unexplained.energy_share >= 0.10
+    assert result.unexplained.depends_on
+
+
+def test_noise_alone_misses_nothing(rng):
+    result = diagnose(plain(rng), (line("x"), line("z"), line("w")), (offset(),), rng, QUICK)
+    assert result.verdict == "none"
+    assert result.findings == ()
+
+
+def test_two_effects_are_found_one_after_the_other_and_refitted_together(rng):
+    table = plain(rng)
+    hidden = np.outer(3 * table.covariate("x") + 1.5 * table.covariate("z"), [1, 1])
+    table = table.with_values(table.values + hidden)
+    result = diagnose(table, (line("x"), line("z"), line("w")), (offset(),), rng, QUICK)
+    assert [finding.name for finding in result.findings] == ["line@x", "line@z"]
+    for finding, truth in zip(result.findings, (3.0, 1.5), strict=True):
+        value, error = finding.parameters["slope"]
+        assert abs(value - truth) < 4 * error
+        # 96 training units of 2 components over a uniform condition: 1 / sqrt(192 / 3).
+        assert error == pytest.approx(0.125, rel=0.3)
+
+
+def test_twins_share_a_class(rng):
+    table = plain(rng)
+    table = table.with_values(table.values + np.outer(2 * table.covariate("x"), [1, 1]))
+    twin = Candidate(
+        "twin",
+        "x",
+        (Parameter("slope"),),
+        lambda t, _: 3.0 * np.stack([t.covariate("x")] * 2, axis=1)[:, :, None],
+    )
+    result = diagnose(table, (line("z"), line("x"), twin), (offset(),), rng, QUICK)
+    assert set(result.findings[0].names) == {"line@x", "twin@x"}
+    assert result.findings[0].stability == 1
+
+
+def test_a_shape_is_found_between_the_points_of_its_grid(rng):
+    table = plain(rng)
+    saturation = Candidate(
+        "saturation",
+        "spring",
+        (Parameter("size"),),
+        lambda t, s: np.stack([np.tanh(t.covariate("x") / s[0])] * 2, axis=1)[:, :, None],
+        (ShapeParameter("knee", (0.05, 0.2, 0.8)),),
+    )
+    truth = 20 * np.tanh(table.covariate("x") / 0.35)
+    table = table.with_values(table.values + truth[:, None])
+    result = diagnose(table, (line("x"), saturation), (offset(),), rng, QUICK)
+    assert result.findings[0].name == "saturation@spring"
+    value, error = result.findings[0].parameters["knee"]
+    assert abs(value - 0.35) < 4 * error < 0.1
+
+
+def test_an_impossible_sign_is_not_named(rng):
+    table = plain(rng)
+    table = table.with_values(table.values - np.outer(3 * table.covariate("x"), [1, 1]))
+    softer = line("x", lower=0.0)
+    result = diagnose(table, (softer, line("z")), (offset(),), rng, QUICK)
+    assert result.verdict == "unknown"
+    assert result.findings == ()
+    assert result.unexplained.depends_on[0] == "x"
+
+
+def test_what_the_base_absorbs_is_not_excited(rng):
+    constant = Candidate(
+        "offset",
+        "sensor",
+        (Parameter("size"),),
+        lambda t, _: np.ones((*t.values.shape, 1)),
+        needs="a reference",
+    )
+    result = diagnose(plain(rng), (constant, line("x")), (offset(),), rng, QUICK)
+    assert [(e.effect, e.needs) for e in result.not_excited] == [("offset", "a reference")]
+
+
+def test_an_effect_too_small_to_be_seen_is_not_excited(rng):
+    faint = line("x", plausible=0.01)
+    result = diagnose(plain(rng), (faint, line("z")), (offset(),), rng, QUICK)
+    assert [e.component for e in result.not_excited] == ["x"]
+
+
+def test_lost_beams_are_left_out(rng):
+    table = plain(rng)
+    values = table.values + np.outer(3 * table.covariate("x"), [1, 1])
+    values[[10, 70, 110]] = [[500, -300], [80, 0], [-4000, 90]]
+    result = diagnose(table.with_values(values), (line("x"), line("z")), (offset(),), rng, QUICK)
+    assert result.lost_units == 3
+    assert [finding.name for finding in result.findings] == ["line@x"]
+
+
+def test_an_effect_that_fails_in_another_session_is_thrown_out(rng):
+    n = 160
+    session = np.repeat([0, 1], n // 2)
+    table = Observations(rng.normal(size=(n, 2)), {"x": rng.uniform(-1, 1, n)}, session=session)
+    sign = np.where(session == 0, 1, -1)
+    values = table.values + np.outer(3 * sign * table.covariate("x"), [1, 1])
+    result = diagnose(table.with_values(values), (line("x"),), (offset(),), rng, QUICK)
+    assert result.verdict == "unknown"
+    assert result.findings == ()
+    assert "line@x fitted here makes the sealed part worse" in result.unexplained.evidence
+
+
+def test_blank_components_are_allowed(rng):
+    table = plain(rng, m=3)
+    values = table.values + np.outer(3 * table.covariate("x"), [1, 1, 1])
+    values[:, 2] = np.nan
+    values[::7, 0] = np.nan
+    result = diagnose(table.with_values(values), (line("x"), line("z")), (offset(),), rng, QUICK)
+    assert [finding.name for finding in result.findings] == ["line@x"]
+
+
+def test_the_same_seed_gives_the_same_answer(rng):
+    table = plain(rng)
+    answers = [
+        diagnose(table, (line("x"), line("z")), (offset(),), np.random.default_rng(3), QUICK)
+        for _ in range(2)
+    ]
+    assert answers[0] == answers[1]
+
+
+def test_the_result_is_plain_json(rng):
+    table = plain(rng)
+    table = table.with_values(table.values + np.outer(3 * table.covariate("x"), [1, 1]))
+    told = diagnose(table, (line("x"),), (offset(),), rng, QUICK).as_json()
+    assert json.loads(json.dumps(told)) == told
+    assert told["schema"] == 1
+    assert told["findings"][0]["class"] == [{"effect": "line", "component": "x"}]
+
+
+@pytest.mark.parametrize(
+    ("n", "candidates", "message"),
+    [
+        (8, (line("x"),), "8 units are too few"),
+        (40, (line("x"), line("x")), "line@x is listed twice"),
+    ],
+)
+def test_unusable_questions_are_refused(rng, n, candidates, message):
+    with pytest.raises(InputError, match=message):
+        diagnose(plain(rng, n), candidates, (offset(),), rng)
+
+
+def test_a_table_of_blanks_is_refused(rng):
+    table = plain(rng)
+    with pytest.raises(InputError, match="nothing was measured"):
+        diagnose(table.with_values(np.full((120, 2), np.nan)), (line("x"),), (offset(),), rng)
