@@ -196,3 +196,22 @@ def test_many_contacts_at_once_are_each_ones_contact():
             one, closed = solve_contact(approach[row], gap[row])
             assert np.array_equal(active[row], closed)
             assert np.allclose(force[row], one, rtol=1e-8, atol=1e-12 * one.max())
+
+
+def test_candidates_in_one_pass_are_their_own_batches(model, make):
+    """Also where a candidate changes the parts, and where memory crosses chunks."""
+    base = model.with_effects(make.effect("encoder_offset@motor_1", offset_mdeg=20.0))
+    names = (
+        "link_stiffness@link_1",
+        "creep@joint_3",
+        "joint_friction@joint_2",
+        "drift@pose_sensor",
+    )
+    candidates = [(), *((plausible(*name.split("@")),) for name in names)]
+    block = make.block(50)
+    together = base.batch_with(block, candidates)
+    for extra, found in zip(candidates, together, strict=True):
+        alone = base.with_effects(*base.effects, *extra).batch(block)
+        scale = np.abs(alone.measured).max(axis=0)
+        assert np.all(np.abs(found.measured - alone.measured) <= 1e-12 * scale)
+    assert not np.array_equal(together[0].measured, together[4].measured)

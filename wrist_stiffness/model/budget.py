@@ -116,7 +116,7 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
         else:
             twist = _felt(at, added, result.active)
         spread = [
-            evaluate(model.with_effects(*before, other, *after), block, None, at)[0].measured[0]
+            evaluate(model.with_effects(*before, other, *after), block, None, result)[0].measured[0]
             - result.measured[0]
             for other in effect.varied
         ]

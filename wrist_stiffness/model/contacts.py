@@ -9,7 +9,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.contact import RELATIVE_TOLERANCE, solve_contact
 
 FEW = 4
-"""Up to this many samples are solved one by one, each from its neighbour's contact state."""
+"""Up to this many samples are solved one by one."""
 
 STRIDE = 8
 
@@ -31,8 +31,8 @@ def solve_contacts(
         A [m/N].
     gap : (n, m) float
         Openings without contact forces [m].
-    active : (m,) bool or None
-        First guess for all.
+    active : (m,) or (n, m) bool or None
+        First guess for all or for each.
 
     Returns
     -------
@@ -49,11 +49,11 @@ def solve_contacts(
     n, m = gap.shape
     force = np.zeros((n, m))
     closed = np.zeros((n, m), dtype=bool)
-    if n > STRIDE * FEW:
+    if n > STRIDE * FEW and (active is None or active.ndim == 1):
         # Neighbours in time share most of their contact state: every eighth sample guesses for all.
-        coarse = solve_contacts(approach[::STRIDE], gap[::STRIDE], active)[1]
-        closed[:] = np.repeat(coarse, STRIDE, axis=0)[:n]
-    elif active is not None:
+        active = np.repeat(solve_contacts(approach[::STRIDE], gap[::STRIDE], active)[1], STRIDE, 0)
+        active = active[:n]
+    if active is not None:
         closed[:] = active
     open_rows = np.arange(n)
     if n > FEW and m:
@@ -71,10 +71,8 @@ def solve_contacts(
             open_rows = open_rows[wrong.any(axis=1)]
             if len(open_rows) == 0:
                 return np.maximum(force, 0.0), closed
-    guess = active
     for row in open_rows:
-        force[row], closed[row] = solve_contact(approach[row], gap[row], guess)
-        guess = closed[row]
+        force[row], closed[row] = solve_contact(approach[row], gap[row], closed[row].copy())
     return force, closed
 
 

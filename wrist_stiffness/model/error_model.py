@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -219,19 +220,46 @@ class ErrorModel:
         BlockPrediction
             The same as a session's predictions sample by sample.
         """
+        return self.batch_with(block, [()])[0]
+
+    def batch_with(
+        self, block: Block, additions: Sequence[Sequence[Effect]]
+    ) -> list[BlockPrediction]:
+        """Predict a whole recording once for each of several additions to the model's effects.
+
+        What the models have in common is computed once; so a row of candidates costs far less than
+        as many batches.
+
+        Parameters
+        ----------
+        block : Block
+            n samples.
+        additions : sequence of sequences of Effect
+            Further effects of each model; an empty one for the model as it is.
+
+        Returns
+        -------
+        list of BlockPrediction
+            One for each addition.
+        """
+        models = [self.with_effects(*self.effects, *extra) for extra in additions]
         accepted = self.accepts(block)
-        usable = block.take(accepted)
-        twist = np.full((len(block), 6), np.nan)
-        measured = twist.copy()
-        rows = np.flatnonzero(accepted)
-        memory: Memory | None = None
-        warnings: dict[str, None] = {}
+        usable, rows = block.take(accepted), np.flatnonzero(accepted)
+        twists, measured = np.full((2, len(models), len(block), 6), np.nan)
+        memories: list[Memory | None] = [None] * len(models)
+        warnings: list[dict[str, None]] = [{} for _ in models]
         for start in range(0, len(usable), CHUNK):
             part = slice(start, start + CHUNK)
-            result, memory = evaluate(self, usable.take(part), memory)
-            twist[rows[part]], measured[rows[part]] = result.twist, result.measured
-            warnings.update(dict.fromkeys(result.warnings))
-        return BlockPrediction(twist, measured, accepted, tuple(warnings))
+            first = None
+            for i, model in enumerate(models):
+                result, memories[i] = evaluate(model, usable.take(part), memories[i], first)
+                first = first or result
+                twists[i, rows[part]], measured[i, rows[part]] = result.twist, result.measured
+                warnings[i].update(dict.fromkeys(result.warnings))
+        return [
+            BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]))
+            for i in range(len(models))
+        ]
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
         """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""
@@ -344,7 +372,7 @@ class Session:
         others = []
         for number, other in enumerate(model.variations):
             before = None if self._others is None else self._others[number]
-            moved, after = evaluate(other, sample.block, before, result.situation)
+            moved, after = evaluate(other, sample.block, before, result)
             others.append(after)
             covariance += np.outer(moved.twist[0] - twist, moved.twist[0] - twist)
         prediction = Prediction(

@@ -84,7 +84,7 @@ class Evaluated:
 
 
 def evaluate(
-    model: ErrorModel, block: Block, memory: Memory | None, like: Situation | None = None
+    model: ErrorModel, block: Block, memory: Memory | None, like: Evaluated | None = None
 ) -> tuple[Evaluated, Memory]:
     """Evaluate a model over a block.
 
@@ -96,8 +96,8 @@ def evaluate(
         n > 0 samples inside the table's domain and load range.
     memory : Memory or None
         What the block before left, None at the start.
-    like : Situation, optional
-        Of another model at the same block; what it found out is used where the parts are the same.
+    like : Evaluated, optional
+        Of another model at the same block: what they have in common is not computed again.
 
     Returns
     -------
@@ -106,8 +106,8 @@ def evaluate(
     Memory
         For the next block.
     """
-    if like is not None and like.parts is model.parts:
-        at = advanced(like, NOTHING)
+    if like is not None and like.situation.parts is model.parts:
+        at = advanced(replace(like.situation, guess=like.active), NOTHING, like.situation)
     else:
         block = with_speeds(block, memory)
         at = situation_of(model, block, None if memory is None else memory.active)
@@ -150,12 +150,12 @@ def situation_of(model: ErrorModel, block: Block, guess: NDArray[np.bool_] | Non
     return Situation(block, load, configuration, operators, model.table, model.parts, guess=guess)
 
 
-def advanced(at: Situation, given: Contribution) -> Situation:
+def advanced(at: Situation, given: Contribution, known: Situation | None = None) -> Situation:
     """Return the situation with what another stage added; its projectors need no new work."""
     later = replace(at, given=given)
     for name in ("influence", "_turned_flexibility", "speed", "own_weight", "jacobian", "told"):
-        if name in at.__dict__:
-            later.__dict__[name] = at.__dict__[name]
+        if name in (known or at).__dict__:
+            later.__dict__[name] = (known or at).__dict__[name]
     return later
 
 

@@ -51,7 +51,7 @@ class Situation:
         Elastic parts as they are with the model's effects.
     given : Contribution
         Sum of what earlier stages added.
-    guess : (m,) bool or None
+    guess : (m,) or (n, m) bool or None
         First guess of the contact state.
     """
 
