@@ -1,21 +1,26 @@
-"""The temperature of a part: measured, or a first-order lag behind ambient."""
+"""The temperature of a part: measured, or a first-order lag behind ambient and motor heat."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.influence import LIMB_1
 from wrist_stiffness.model.memory import lag
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
 
 LAG = Parameter("lag_s", 0.0, 1e5, 600.0, mean=600.0, linear=False)
-"""Time constant of a part without a thermometer behind the ambient temperature; 0 for none."""
+SHARE = Parameter("motor_share_percent", 0.0, 100.0, 30.0, linear=False)
+WARMTH = (LAG, SHARE)
+"""Time constant of a part without a thermometer, 0 for none; and how far its limb's motor (for the
+frame and the platform motor 1) rather than ambient decides where its temperature goes."""
 
 
-def warmth(at: Situation, place: str, time_constant: float, state: Any) -> tuple[Array, Any]:
+def warmth(at: Situation, place: str, values: Mapping[str, float], state: Any) -> tuple[Array, Any]:
     """Return the temperature of a part above reference.
 
     Parameters
@@ -24,8 +29,8 @@ def warmth(at: Situation, place: str, time_constant: float, state: Any) -> tuple
         n samples.
     place : str
         The part; its own thermometer is believed as it is.
-    time_constant : float
-        Of the lag behind ambient [s].
+    values : dict of str to float
+        With `WARMTH`, in SI units.
     state : object
         What the call before returned.
 
@@ -39,12 +44,18 @@ def warmth(at: Situation, place: str, time_constant: float, state: Any) -> tuple
     Raises
     ------
     MissingSignalError
-        If neither the part nor ambient has a thermometer.
+        If neither the part nor what it follows has a thermometer.
     """
     if place in at.block.temperatures:
         return at.temperature(place), None
-    ambient = at.temperature("ambient")[:, None]
-    slow, state = lagged(at.block.time, ambient, time_constant, state)
+    share = values[SHARE.key]
+    source = np.zeros(len(at.block))
+    if share < 1.0:
+        source += (1.0 - share) * at.temperature("ambient")
+    if share > 0.0:
+        first = place in (*LIMB_1, "frame", "platform")
+        source += share * at.temperature("motor_1" if first else "motor_2")
+    slow, state = lagged(at.block.time, source[:, None], values[LAG.key], state)
     return slow[:, 0], state
 
 

@@ -13,7 +13,7 @@ from wrist_stiffness.model.at_point import bushing_centre
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.warmth import LAG, warmth
+from wrist_stiffness.model.warmth import WARMTH, warmth
 
 
 class ThermalExpansion(Law):
@@ -28,19 +28,19 @@ class ThermalExpansion(Law):
     places = ("link_1", "link_2", "frame", "platform")
     sentence = "{place} grows as it warms"
     check = "measure one unloaded pose cold and after warm-up; feel or measure the part's warmth"
-    signals = ("temperature of the part, or ambient",)
+    signals = ("temperature of the part, or ambient, or its motor",)
     excited_by = "unloaded returns to one pose from cold to warm"
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the coefficient of expansion and the lag behind ambient."""
+        """Return the coefficient of expansion and how the part warms."""
         mean = {"platform": 23.0}.get(place, 11.5)
-        return (Parameter("expansion_ppm_per_K", 0.0, 300.0, 5.0, mean=mean), LAG)
+        return (Parameter("expansion_ppm_per_K", 0.0, 300.0, 5.0, mean=mean), *WARMTH)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the shift of the far side."""
-        warm, state = warmth(at, place, values[LAG.key], state)
+        warm, state = warmth(at, place, values, state)
         growth = values["expansion_ppm_per_K"] * warm
         if place == "frame":
             limbs = {

@@ -10,7 +10,7 @@ from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.scaled_part import extra
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.warmth import LAG, warmth
+from wrist_stiffness.model.warmth import WARMTH, warmth
 
 
 class ThermalSoftening(Law):
@@ -21,16 +21,16 @@ class ThermalSoftening(Law):
     places = JOINTS
     sentence = "the bushing of {place} softens as it warms"
     check = "repeat one loaded pose cold and warm"
-    signals = ("temperature of the joint, or ambient",)
+    signals = ("temperature of the joint, or ambient, or its motor",)
     excited_by = "the same loads at temperatures at least 5 K apart"
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the growth of flexibility by the temperature, and the lag behind ambient."""
-        return (Parameter("softening_percent_per_K", -5.0, 20.0, 1.0), LAG)
+        """Return the growth of flexibility by the temperature, and how the part warms."""
+        return (Parameter("softening_percent_per_K", -5.0, 20.0, 1.0), *WARMTH)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the further screw."""
-        warm, state = warmth(at, place, values[LAG.key], state)
+        warm, state = warmth(at, place, values, state)
         return extra(at, place, values["softening_percent_per_K"] * warm), state
