@@ -129,7 +129,9 @@ def test_springs_store_energy_and_are_reciprocal(weightless, make, name):
 
 def test_frame_gives_under_all_that_hangs_on_it(free_model, make):
     """All weights but those of the motor bushings' halves in the frame, and the load."""
-    effect = make.effect("frame_compliance@frame", x_um_per_N=3.0, z_um_per_N=2.0)
+    effect = make.effect(
+        "frame_compliance@frame", x_um_per_N=3.0, z_um_per_N=2.0, turn_y_mdeg_per_Nm=90.0
+    )
     parts = free_model.table.components
     hanging = parts.weight_motor_side + parts.weight_platform_side
     for joint in ("joint_1", "joint_5"):
@@ -137,8 +139,26 @@ def test_frame_gives_under_all_that_hangs_on_it(free_model, make):
     weights = hanging.sum(axis=0) + parts.platform_weight
     total = weights @ free_model.table.geometry.gravity + np.array(LOAD)
     twist = make.added(free_model, effect, make.rest((0.0, 0.0), LOAD))[0]
-    expected = np.array([3e-6 * total[0], 0.0, 2e-6 * total[2]])
-    assert np.allclose(twist[:3], expected, rtol=1e-9, atol=1e-15)
+    expected = [3e-6 * total[0], 0.0, 2e-6 * total[2], 0.0, np.radians(0.09) * total[4], 0.0]
+    assert np.allclose(twist, expected, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize(("motor", "joint"), [(1, "joint_1"), (2, "joint_5")])
+def test_bracket_gives_at_the_bushing(weightless, make, motor, joint):
+    """Deflection and turn at the bushing's centre, seen from O by the velocity of a rigid body."""
+    geometry = weightless.table.geometry
+    centre = geometry.bushings[joint].radius * geometry.axes[joint]
+    effect = make.effect(
+        f"mount_compliance@motor_{motor}", y_um_per_N=2.0, turn_z_mdeg_per_Nm=300.0
+    )
+    g = influence(weightless.table.mechanism.forward(np.radians(POSE)))
+    carry = (g.limb_1, g.limb_2)[motor - 1]
+    force, moment = carry.T @ LOAD[:3], carry.T @ LOAD[3:]
+    turn = np.array([0.0, 0.0, np.radians(0.3) * (moment - np.cross(centre, force))[2]])
+    shift = np.array([0.0, 2e-6 * force[1], 0.0]) - np.cross(turn, centre)
+    twist = make.added(weightless, effect, make.rest(POSE, LOAD))[0]
+    expected = np.concatenate([carry @ shift, carry @ turn])
+    assert np.allclose(twist, expected, rtol=1e-8, atol=1e-16)
 
 
 def test_platform_spring_gives_at_its_centre(free_model, make):
