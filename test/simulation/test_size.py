@@ -101,8 +101,7 @@ def test_seed_draws_the_same_secret_and_seeds_differ(wrist):
 
 def test_wrong_base_is_wrong_by_what_it_says_and_shimmed_at_home(wrist):
     table = wrist()
-    rng = np.random.default_rng(2)
-    laws = base_laws("wrong", table, rng)
+    laws = base_laws("wrong", table, 2, 0)
     parts = table.components
     for law in laws:
         parts = law.parts(parts)
@@ -116,4 +115,4 @@ def test_wrong_base_is_wrong_by_what_it_says_and_shimmed_at_home(wrist):
     assert 1e-4 < np.linalg.norm(shift) < 4e-3
     assert np.linalg.norm(turn) < np.radians(1.0)
     with pytest.raises(InputError, match="shaky"):
-        base_laws("shaky", table, rng)
+        base_laws("shaky", table, 2, 0)

@@ -25,7 +25,7 @@ LOAD_SCALE = 0.03
 """How wrong a wrong base is, to each side and evenly spread [-], [m, rad], [m, rad], [-]."""
 
 
-def base_laws(name: str, table: Table, rng: np.random.Generator) -> list[Law]:
+def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
     """Return the laws by which the true wrist departs from its table before any effect.
 
     Parameters
@@ -35,8 +35,10 @@ def base_laws(name: str, table: Table, rng: np.random.Generator) -> list[Law]:
         the pose sensor and the scale of the load sensor.
     table : Table
         Of the wrist.
-    rng : numpy.random.Generator
+    seed : int
         Draws how wrong it is.
+    session : int
+        Sessions of one wrist differ in the registrations of the pose sensor.
 
     Returns
     -------
@@ -52,6 +54,7 @@ def base_laws(name: str, table: Table, rng: np.random.Generator) -> list[Law]:
         raise InputError(f"base {name!r} is not one of {', '.join(BASES)}")
     if name == "exact":
         return []
+    rng, day = np.random.default_rng(seed), np.random.default_rng([seed, session])
     softer = [UniformSoftness(part, rng.uniform(-STIFFNESS, STIFFNESS)) for part in ELASTIC]
     axes = [_misaligned(joint, table, rng) for joint in JOINTS]
     turn = np.repeat([REGISTRATION_SHIFT, REGISTRATION_TURN], 3)
@@ -61,8 +64,8 @@ def base_laws(name: str, table: Table, rng: np.random.Generator) -> list[Law]:
         *axes,
         *_shims(table, axes),
         LoadMatrix(scale * np.eye(6)),
-        TargetMounting(turn * rng.uniform(-1.0, 1.0, 6)),
-        MeasurementFrame(turn * rng.uniform(-1.0, 1.0, 6)),
+        TargetMounting(turn * day.uniform(-1.0, 1.0, 6)),
+        MeasurementFrame(turn * day.uniform(-1.0, 1.0, 6)),
     ]
 
 

@@ -85,7 +85,7 @@ CATALOGUE: dict[str, Entry] = {
         JOINTS, ("saturating", "power"), "-", 0.2, 0.5, makers.bushing_hardening
     ),
     "joint_friction": Entry(
-        PASSIVE_JOINTS, ("coulomb", "stribeck"), "-", 0.1, 1.0, makers.joint_friction
+        PASSIVE_JOINTS, ("coulomb", "stribeck"), "-", 0.1, 0.5, makers.joint_friction
     ),
     "backlash": Entry(MOTORS, ("single", "train"), "rad", 1e-4, 0.02, makers.backlash),
     "encoder_offset": Entry(MOTORS, ONE, "rad", 2e-4, 0.05, makers.encoder_offset),

@@ -48,6 +48,8 @@ class CellSettings:
         What the true wrist has besides its base.
     base, base_seed : str, int
         `exact`, or `wrong` as the seed draws it.
+    session : int
+        Number of the session: registrations of a wrong base differ between them.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class CellSettings:
     hidden: tuple[HiddenEffect, ...] = ()
     base: str = "exact"
     base_seed: int = 0
+    session: int = 0
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -133,7 +136,7 @@ class VirtualCell:
         )
         self._laws: Sequence[Law] = [
             *(build(hidden, table) for hidden in settings.hidden),
-            *base_laws(settings.base, table, np.random.default_rng(settings.base_seed)),
+            *base_laws(settings.base, table, settings.base_seed, settings.session),
         ]
         self._wrist = TrueWrist(table, self._laws)
         drive_rng, load_rng, pose_rng = rng.spawn(3)

@@ -116,15 +116,20 @@ class Scale:
         InputError
             If no magnitude up to the catalogue's limit has this size.
         """
-        limit = ALL[hidden.effect].limit
-        magnitude = magnitude_for(
-            lambda m: self.size(replace(hidden, magnitude=m)), hidden.magnitude, size, limit
-        )
+        entry = ALL[hidden.effect]
+
+        def measure(magnitude: float) -> float:
+            try:
+                return self.size(replace(hidden, magnitude=magnitude))
+            except InputError:
+                # So large that the wrist has no equilibrium any more.
+                return np.inf
+
+        magnitude = magnitude_for(measure, hidden.magnitude, size, entry.limit)
         if magnitude is None:
-            largest = self.size(replace(hidden, magnitude=limit))
             raise InputError(
                 f"{hidden.effect}@{hidden.component}: size {size:g} is out of reach, at the limit "
-                f"of {limit:g} {ALL[hidden.effect].unit} it is {largest:.3g}"
+                f"of {entry.limit:g} {entry.unit} it is {measure(entry.limit):.3g}"
             )
         return replace(hidden, magnitude=magnitude)
 
@@ -150,10 +155,11 @@ def magnitude_for(
                 return None
         else:
             high = min(high, magnitude)
-        if last is not None and found > 0.0 and last[1] > 0.0 and magnitude != last[0]:
+        if last is not None and 0.0 < found < np.inf and last[1] > 0.0 and magnitude != last[0]:
             slope = np.log(found / last[1]) / np.log(magnitude / last[0])
             power = float(np.clip(slope, 0.2, 4.0))
-        last = magnitude, found
+        if np.isfinite(found):
+            last = magnitude, found
         step = (size / found) ** (1.0 / power) if found > 0.0 else 10.0
         following = min(magnitude * float(np.clip(step, 1e-3, 1e3)), limit)
         if not low < following < high and not following == limit > low:

@@ -17,10 +17,13 @@ from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
 from wrist_stiffness.simulation.heat import HeatNetwork
 from wrist_stiffness.simulation.laws.law import Law, no_screws
 
-MAX_SWEEPS = 60
+MAX_SWEEPS = 80
 """Passes in which histories (creep, friction) and equilibrium find each other."""
 
-SWEEP_TOLERANCE = 1e-13
+FULL_SWEEPS = 15
+"""Passes after which the steps are halved."""
+
+SWEEP_TOLERANCE = 1e-11
 """Largest change of the platform's twist in the last pass, up to `TWIST_SCALE` [m, rad]."""
 
 TWIST_SCALE = 1e-3
@@ -128,21 +131,26 @@ class TrueWrist:
         rubbing = [law for law in self._laws if law.rubs is not None]
         if not rubbing and all(law.flows is None for law in self._laws):
             return state
-        acting = np.zeros((len(rubbing), len(block.time_s), 2))
-        for _ in range(MAX_SWEEPS):
+        moved, acting = screws, np.zeros((len(rubbing), len(block.time_s), 2))
+        for sweep in range(MAX_SWEEPS):
             before = state
-            moved, friction = self._histories(block, pose, state, screws, acting, False)
+            new_moved, new_acting = self._histories(block, pose, state, screws, acting, False)
+            # Flanges that hold what friction pushes can make full steps jump to and fro.
+            share = 1.0 if sweep < FULL_SWEEPS else 0.5
+            moved = moved + share * (new_moved - moved)
+            acting = acting + share * (new_acting - acting)
+            friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
+            for law, force in zip(rubbing, acting, strict=True):
+                friction[:, PASSIVE_JOINTS.index(law.rubs or "")] += force
             state = pose.solve(load, moved, bends, pose.friction_wrench(friction))
             change = np.max(np.abs(state.twist - before.twist))
             if change <= SWEEP_TOLERANCE * max(1.0, np.max(np.abs(state.twist)) / TWIST_SCALE):
-                break
-        else:
-            raise InputError(
-                f"true wrist: creep or friction found no equilibrium in {MAX_SWEEPS} passes; the "
-                f"last changed the platform's twist by {change:.1e}"
-            )
-        self._histories(block, pose, state, screws, acting, True)
-        return state
+                self._histories(block, pose, state, screws, acting, True)
+                return state
+        raise InputError(
+            f"true wrist: creep or friction found no equilibrium in {MAX_SWEEPS} passes; the "
+            f"last changed the platform's twist by {change:.1e}"
+        )
 
     def _histories(
         self,
@@ -153,19 +161,16 @@ class TrueWrist:
         acting: Array,
         remember: bool,
     ) -> tuple[Array, Array]:
-        """Return screws (n, 8, 6) and friction (n, 3, 2) after the history that led to `state`.
+        """Return screws (n, 8, 6) and friction (laws, n, 2) after the history that led to `state`.
 
-        `acting` (laws, n, 2) is the friction under which the state was found; it is replaced.
+        `acting` (laws, n, 2) is the friction under which the state was found.
         """
         moved = screws.copy()
-        friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
-        rubs = 0
+        rubbed: list[Array] = []
         for law in self._laws:
             if law.flows is not None:
                 k = ELASTIC.index(law.flows)
                 moved[:, k] += law.flow(block, state.through[:, k], remember)
             if law.rubs is not None:
-                acting[rubs] = law.rub(block, pose, state, acting[rubs], remember)
-                friction[:, PASSIVE_JOINTS.index(law.rubs)] += acting[rubs]
-                rubs += 1
-        return moved, friction
+                rubbed.append(law.rub(block, pose, state, acting[len(rubbed)], remember))
+        return moved, np.reshape(rubbed, acting.shape)

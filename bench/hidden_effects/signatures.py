@@ -1,0 +1,91 @@
+"""Draw what each hidden effect does to the residual, as a user would see it without noise.
+
+Writes docs/pictures/hidden_effects.png and hidden_effects_strangers.png.  About two minutes.
+
+    python bench/hidden_effects/signatures.py [--table TABLE] [--output FOLDER]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.cli.progress import Progress
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, Entry, HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings
+from wrist_stiffness.simulation.size import Scale
+from wrist_stiffness.workflows.plotting import DPI, new_figure
+
+SECONDS, RATE_HZ = 40.0, 50.0
+SIZE = 3.0
+SHAPE_SEED = 3
+COLUMNS = 5
+
+
+def sized_or_largest(scale: Scale, start: HiddenEffect) -> tuple[HiddenEffect, str]:
+    """Return the effect at `SIZE`, or at its plausible magnitude, and what the panel says."""
+    try:
+        return scale.sized(start, SIZE), f"size {SIZE:g}"
+    except InputError:
+        return start, f"size {scale.size(start):.2g}, {SIZE:g} is out of reach"
+
+
+def draw_page(scale: Scale, entries: dict[str, Entry], path: Path) -> None:
+    """Draw one panel for each effect at its first place."""
+    rows = -(-len(entries) // COLUMNS)
+    figure = new_figure(3.6 * COLUMNS, 2.1 * rows)
+    panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+    progress = Progress(path.stem)
+    for number, (effect, entry) in enumerate(entries.items()):
+        panel = panels[number]
+        start = HiddenEffect(
+            effect, entry.components[0], entry.forms[0], entry.plausible, SHAPE_SEED
+        )
+        hidden, note = sized_or_largest(scale, start)
+        change = scale.signature(hidden)
+        for axis, name in enumerate("xyz"):
+            panel.plot(scale.time_s, 1e6 * change[:, axis], linewidth=0.9, label=f"s_{name}")
+        panel.set_ylabel("shift [µm]", fontsize=7)
+        turned = panel.twinx()
+        turn = np.degrees(np.linalg.norm(change[:, 3:], axis=1)) * 1e3
+        turned.plot(scale.time_s, turn, color="0.6", linewidth=0.7, label="φ")
+        turned.set_ylabel("φ [mdeg]", fontsize=7, color="0.5")
+        for side in (panel, turned):
+            side.tick_params(labelsize=6)
+            side.ticklabel_format(useOffset=False)
+        panel.set_title(
+            f"{effect}@{hidden.component}\n{hidden.magnitude:.3g} {entry.unit.strip('-')}, {note}",
+            fontsize=7,
+        )
+        progress(number + 1, len(entries))
+    for panel in panels[len(entries) :]:
+        panel.set_visible(False)
+    for panel in panels[-COLUMNS:]:
+        panel.set_xlabel("time [s]", fontsize=7)
+    panels[0].legend(fontsize=6, loc="upper left")
+    figure.savefig(path, dpi=DPI)
+
+
+def main() -> None:
+    """Draw both pages."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--table", help="default: the shipped one")
+    parser.add_argument("--output", default="docs/pictures", help="folder of the pictures")
+    arguments = parser.parse_args()
+    table: Table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
+    folder = Path(arguments.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    settings = CellSettings(rate_hz=RATE_HZ, program_seconds=SECONDS, program_seed=1)
+    scale = Scale(table, settings, SECONDS)
+    draw_page(scale, CATALOGUE, folder / "hidden_effects.png")
+    draw_page(scale, STRANGERS, folder / "hidden_effects_strangers.png")
+
+
+if __name__ == "__main__":
+    main()
