@@ -3,6 +3,7 @@
 import copy
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -196,3 +197,30 @@ def test_build_refuses_before_it_computes(tmp_path, monkeypatch, refused, option
     (tmp_path / "flat.yaml").write_text(yaml.safe_dump(values))
     assert named in refused("table", "build", *options)
     assert not (tmp_path / "table.npz").exists()
+
+
+@pytest.mark.slow
+def test_build_writes_a_table_that_is_good(tmp_path, monkeypatch, capsys):
+    """The whole sweep on a mesh that is coarse, but of solids."""
+    sweep = pytest.importorskip("wrist_stiffness.fem.sweep", reason="a build needs the mesher")
+    solids = pytest.importorskip("wrist_stiffness.fem.solids")
+    sizes = solids.MeshSettings(
+        link=4e-3, bore=2.4e-3, bushing=1.0e-3, bushing_corner=0.4e-3, bushing_arc=2.8e-3
+    )
+    monkeypatch.setattr(sweep, "BuildSettings", partial(sweep.BuildSettings, sizes=sizes))
+    monkeypatch.chdir(tmp_path)
+    assert main(["table", "build", "-o", "built.npz", "--grid", "5", "--json", "built.json"]) == 0
+    shown = capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["built.json", "built.npz"]
+    header, table = json.loads((tmp_path / "built.json").read_text()), load_table("built.npz")
+    assert header["checksum"] == table.checksum
+    assert table.checksum[:12] in shown
+    assert len(table.nodes) == len(table.workspace.grid(5))
+    assert header["mesh"]["sizes_mm"]["link"] == pytest.approx(4.0)
+    geometry = shipped_file("config/palmieri2015.yaml")
+    assert check("built.npz", tmp_path, "--geometry", geometry)[0] == 0
+    # A coarse mesh is a little too stiff, not another wrist.
+    fine = load_table(shipped_file("precomputed/palmieri2015.npz"))
+    stiffer = np.linalg.norm(table.components.flexibility, axis=(1, 2))
+    ratio = stiffer / np.linalg.norm(fine.components.flexibility, axis=(1, 2))
+    assert np.all((ratio > 0.7) & (ratio < 1.02))
