@@ -3,6 +3,7 @@
 import argparse
 import re
 import shlex
+from pathlib import Path
 
 import pytest
 
@@ -46,3 +47,9 @@ def test_every_option_is_explained(name):
         action.option_strings or action.dest for action in LEAVES[name]._actions if not action.help
     ]
     assert silent == []
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_every_command_has_its_section(name):
+    page = Path(__file__).resolve().parents[2] / "docs/commands.md"
+    assert f"\n## {name}\n" in page.read_text()
