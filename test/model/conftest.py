@@ -14,7 +14,7 @@ from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 
-SIGNALS = ("ambient", "link_1", "joint_3")
+SIGNALS = ("ambient", "link_1", "joint_3", "motor_1", "motor_2")
 
 
 def make_effect(name, **values):

@@ -137,6 +137,8 @@ def test_time_does_not_run_backwards(model):
         session.advance(Sample(0.5, np.zeros(2), Load(np.zeros(6))))
     with pytest.raises(InputError, match="time nan is not finite"):
         session.advance(Sample(np.nan, np.zeros(2), Load(np.zeros(6))))
+    with pytest.raises(InputError, match="speeds .* are not finite"):
+        session.advance(Sample(2.0, np.zeros(2), Load(np.zeros(6)), np.array([np.nan, 0.0])))
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,33 @@ def test_bad_law_files_give_one_line(tmp_path, own, text):
         load_model(write(tmp_path, own=own))
 
 
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        ("return 1 / 0, None", "twist@platform: ZeroDivisionError: division by zero"),
+        ("return Contribution(wrench=np.zeros((2, 6))), None", r"wrench has shape \(2, 6\)"),
+        ("return Contribution(both=np.full((1, 6), np.nan)), None", "both is not finite"),
+        ("return None, None", "twist@platform: AttributeError"),
+        ("return 3", "twist@platform: TypeError"),
+        ("return at.screw(place, np.zeros(6) + at.covariate('wind')[:, None]), None", None),
+    ],
+)
+def test_a_broken_law_of_ones_own_is_one_clear_error(tmp_path, body, text):
+    """And one that lacks its signal is left out like any other."""
+    start = OWN.index("        return at.screw")
+    own = OWN[:start] + f"        {body}\n"
+    own = own.replace("import Law\n", "import Contribution, Law\n")
+    model = load_model(write(tmp_path, own=own))
+    model = model.with_effects(model.effects[-1])
+    if text is None:
+        said = model.predict(np.zeros(2), Load(np.zeros(6))).warnings
+        assert said == ("twist@platform: covariate wind is missing, left out",)
+        return
+    with pytest.raises(InputError, match=text) as caught:
+        model.predict(np.zeros(2), Load(np.zeros(6)))
+    assert "twist@platform" in str(caught.value)
+
+
 def test_twice_the_same_effect_is_refused(tmp_path):
     first = GOOD[GOOD.index("- effect: joint") : GOOD.index("- effect: formula")]
     with pytest.raises(InputError, match="joint_clearance@joint_3 is there twice"):

@@ -357,6 +357,8 @@ class Session:
         model, memory = self.model, self._memory
         if not np.isfinite(sample.time):
             raise InputError(f"sample: time {sample.time} is not finite")
+        if sample.theta_dot is not None and not np.isfinite(sample.theta_dot).all():
+            raise InputError(f"sample: motor speeds {sample.theta_dot} are not finite")
         if memory is not None and sample.time < memory.time:
             raise InputError(
                 f"sample: time {sample.time:.6f} s is before the last one, {memory.time:.6f} s"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
@@ -120,9 +121,7 @@ def evaluate(
             if effect.stage != stage:
                 continue
             try:
-                added[number], states[number] = effect.law.advance(
-                    at, effect.component, effect.si, states[number]
-                )
+                added[number], states[number] = _advanced_by(effect, at, states[number])
             except MissingSignalError as missing:
                 warnings.append(f"{effect.name}: {missing.signal} is missing, left out")
             total = total + added[number]
@@ -185,6 +184,22 @@ def with_speeds(block: Block, memory: Memory | None) -> Block:
     step = np.diff(block.theta, axis=0, prepend=first[1][None])
     speed = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
     return replace(block, theta_dot=speed)
+
+
+def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution, Any]:
+    """Call a law; whatever goes wrong in a user's own becomes an error that names it."""
+    if not effect.law.foreign:
+        return effect.law.advance(at, effect.component, effect.si, state)
+    try:
+        added, state = effect.law.advance(at, effect.component, effect.si, state)
+        added.check(len(at.block), len(at.parts.sectors.gap))
+    except MissingSignalError:
+        raise
+    except WristError as error:
+        raise InputError(f"{effect.name}: {error}") from error
+    except Exception as error:
+        raise InputError(f"{effect.name}: {type(error).__name__}: {error}") from error
+    return added, state
 
 
 def _first_order(effect: Effect, added: Contribution) -> list[str]:

@@ -8,6 +8,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.parameters import Parameter
@@ -57,11 +60,21 @@ class Contribution:
             *(_added(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
         )
 
-    def __sub__(self, other: Contribution) -> Contribution:
-        """Return what this one has more."""
-        return self + Contribution(
-            *(None if (v := getattr(other, f.name)) is None else -v for f in fields(other))
-        )
+    def check(self, samples: int, sectors: int) -> None:
+        """Refuse arrays of other shapes than n samples and m sectors ask for, or not finite.
+
+        Raises
+        ------
+        InputError
+            The message names the field.
+        """
+        shapes = {"through": (samples, 8, 6), "gap": (samples, sectors)}
+        for name in (f.name for f in fields(self)):
+            value, shape = getattr(self, name), shapes.get(name, (samples, 6))
+            if value is not None and np.shape(value) != shape:
+                raise InputError(f"{name} has shape {np.shape(value)}, not {shape}")
+            if value is not None and not np.isfinite(value).all():
+                raise InputError(f"{name} is not finite")
 
 
 def _added(a: Array | None, b: Array | None) -> Array | None:
@@ -122,6 +135,11 @@ class Law(ABC):
     signals: tuple[str, ...] = ()
     excited_by: str
     file: Path | None = None
+
+    @property
+    def foreign(self) -> bool:
+        """Whether the law is a user's own Python."""
+        return not type(self).__module__.startswith("wrist_stiffness.model.")
 
     @abstractmethod
     def parameters(self, place: str) -> tuple[Parameter, ...]:

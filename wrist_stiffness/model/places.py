@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, JOINTS, LINKS, MOTORS
+from wrist_stiffness.mechanism.components import CARRIER, ELASTIC
 from wrist_stiffness.mechanism.influence import LIMB_1
 
 Limb = Literal["limb_1", "limb_2", "both"]
-
-SENSORS = ("load_sensor", "pose_sensor")
-WHOLE = ("frame", "platform")
-PLACES = (*LINKS, *WHOLE, *JOINTS, *MOTORS, *SENSORS)
-"""All component names."""
 
 LIMB: dict[str, Limb] = {
     **{name: "limb_1" if name in LIMB_1 else "limb_2" for name in ELASTIC},
