@@ -18,12 +18,12 @@ from wrist_stiffness.mechanism.geometry_file import (
     mechanism_of,
 )
 
-SHIPPED = Path(__file__).parents[2] / "config" / "palmieri2015.yaml"
-VALUES = yaml.safe_load(SHIPPED.read_text())
+ORTHOGONAL = Path(__file__).with_name("orthogonal_wrist.yaml")
+VALUES = yaml.safe_load(ORTHOGONAL.read_text())
 
 
 def changed(path, value):
-    """The shipped values with another value at a place like ("site", "gravity_m_s2")."""
+    """The values with another value at a place like ("site", "gravity_m_s2")."""
     values = copy.deepcopy(VALUES)
     reduce(lambda block, key: block[key], path[:-1], values)[path[-1]] = value
     return values
@@ -65,9 +65,9 @@ def dotted(place):
     return ".".join(place)
 
 
-def test_shipped_geometry_reads_in_si_units():
-    geometry = load_geometry(SHIPPED)
-    assert geometry.name == "palmieri2015"
+def test_geometry_reads_in_si_units():
+    geometry = load_geometry(ORTHOGONAL)
+    assert geometry.name == "orthogonal"
     link, raw = geometry.links["link_1"], VALUES["links"]["link_1"]
     assert link.arc_radius == pytest.approx(raw["arc_radius_mm"] * 1e-3)
     assert link.material.young == pytest.approx(
@@ -87,8 +87,18 @@ def test_shipped_geometry_reads_in_si_units():
     np.testing.assert_allclose(mechanism_of(geometry).alphas, np.radians([90.0] * 5))
 
 
+@pytest.mark.parametrize(
+    "path",
+    sorted((Path(__file__).parents[2] / "config").glob("palmieri2015*.yaml")),
+    ids=lambda path: path.stem,
+)
+def test_shipped_geometries_are_calibrated(path):
+    if not path.stem.endswith("_model"):
+        assert load_geometry(path).status == "calibrated"
+
+
 def test_plate_mass_and_centre_of_gravity_follow_from_its_size():
-    platform = load_geometry(SHIPPED).platform
+    platform = load_geometry(ORTHOGONAL).platform
     raw = VALUES["platform"]
     volume = np.pi * (raw["diameter_mm"] / 2e3) ** 2 * raw["thickness_mm"] / 1e3
     density = VALUES["materials"][raw["material"]]["density_kg_m3"]
@@ -107,7 +117,7 @@ def test_load_point_follows_the_word_in_the_file():
 def test_written_values_read_back_the_same(tmp_path):
     path = tmp_path / "again.yaml"
     path.write_text(yaml.safe_dump(VALUES, sort_keys=True, default_flow_style=False))
-    again, first = load_geometry(path), load_geometry(SHIPPED)
+    again, first = load_geometry(path), load_geometry(ORTHOGONAL)
     assert again.sha256 == first.sha256
     assert again.links == first.links
     assert again.bushings == first.bushings
@@ -387,7 +397,7 @@ def reordered(values):
 def test_checksum_ignores_layout_comments_and_order(tmp_path):
     path = tmp_path / "same.yaml"
     path.write_text("# another comment\n" + yaml.safe_dump(reordered(VALUES), sort_keys=False))
-    assert load_geometry(path).sha256 == load_geometry(SHIPPED).sha256
+    assert load_geometry(path).sha256 == load_geometry(ORTHOGONAL).sha256
 
 
 def test_checksum_takes_whole_numbers_for_what_they_are():
