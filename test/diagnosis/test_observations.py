@@ -52,3 +52,9 @@ def test_time_may_start_again_in_the_next_session():
 def test_unknown_covariate_is_named_with_the_known_ones(table):
     with pytest.raises(InputError, match=r"no covariate 'force' in the table, only x, z"):
         table.covariate("force")
+
+
+def test_units_know_their_row_through_several_choices(table):
+    some = table.take(np.arange(10, 40)).take(np.array([5, 2]))
+    assert some.rows.tolist() == [15, 12]
+    assert some.with_values(some.values).rows.tolist() == [15, 12]

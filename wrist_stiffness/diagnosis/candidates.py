@@ -6,7 +6,7 @@ linear algebra; the shape itself is searched on its grid (variable projection).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -118,3 +118,25 @@ class Candidate:
         if not np.isfinite(columns).all():
             raise InputError(f"{self.name} returned a column that is not a number")
         return columns
+
+
+def remembered(candidate: Candidate, table: Observations) -> Candidate:
+    """Evaluate a candidate once per shape on a whole table, and give out rows of it.
+
+    Saves time, and keeps the memory of an effect over units that are later put aside.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Any candidate.
+    table : Observations
+        The whole table; only units taken from it may be asked for afterwards.
+    """
+    known: dict[tuple[float, ...], Array] = {}
+
+    def columns(units: Observations, shape: tuple[float, ...]) -> Array:
+        if shape not in known:
+            known[shape] = candidate.evaluate(table, shape)
+        return known[shape][units.rows]
+
+    return replace(candidate, columns=columns)

@@ -1,8 +1,10 @@
 """Which physical effect is missing?  All steps of a diagnosis in their order."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from wrist_stiffness.diagnosis.candidates import Candidate
+from wrist_stiffness.diagnosis.candidates import Candidate, remembered
 from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
 from wrist_stiffness.diagnosis.estimates import joint_fit
 from wrist_stiffness.diagnosis.findings import Model, describe
@@ -74,6 +76,8 @@ def diagnose(
     """
     settings = settings or Settings()
     _refuse_unusable(observations, candidates)
+    observations = replace(observations, row=None)
+    candidates = tuple(remembered(candidate, observations) for candidate in candidates)
     aside = sealed_units(observations, settings.sealed_share)
     training, n_lost = _cleaned(observations.take(~aside), candidates, nuisances, settings)
     evidence = _gather(training, candidates, nuisances)

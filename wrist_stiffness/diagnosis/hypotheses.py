@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from wrist_stiffness.diagnosis.candidates import Candidate
 from wrist_stiffness.diagnosis.nuisance import NuisanceColumns
@@ -94,7 +95,7 @@ def all_hypotheses(evidence: Evidence, candidates: tuple[Candidate, ...]) -> lis
 
 
 def refined(evidence: Evidence, hypothesis: Hypothesis, base: Base) -> Hypothesis:
-    """Shape that explains most beyond the base, by golden section along each shape parameter.
+    """Shape that explains most beyond the base, searched along each shape parameter.
 
     Parameters
     ----------
@@ -105,28 +106,31 @@ def refined(evidence: Evidence, hypothesis: Hypothesis, base: Base) -> Hypothesi
     base : Base
         What is refitted besides, other effects included.
     """
-    candidate, shape = hypothesis.candidate, list(hypothesis.shape)
     best, best_gain = hypothesis, gain(base, hypothesis)
-    for axis, parameter in enumerate(candidate.shape):
-        grid = parameter.grid
-        at = int(np.argmin(np.abs(np.array(grid) - shape[axis])))
-        low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
-        for _ in range(SECTIONS):
-            left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-            trials = []
-            for value in (left, right):
-                point = (*shape[:axis], value, *shape[axis + 1 :])
-                trial = evidence.hypothesis(candidate, point)
-                trials.append(gain(base, trial))
-                if trials[-1] > best_gain:
-                    best, best_gain = trial, trials[-1]
-            low, high = (low, right) if trials[0] >= trials[1] else (left, high)
-        shape[axis] = best.shape[axis]
+
+    def missed(value: float, axis: int) -> float:
+        nonlocal best, best_gain
+        point = (*best.shape[:axis], float(value), *best.shape[axis + 1 :])
+        trial = evidence.hypothesis(hypothesis.candidate, point)
+        explained = gain(base, trial)
+        if explained > best_gain:
+            best, best_gain = trial, explained
+        return -explained
+
+    for axis, parameter in enumerate(hypothesis.candidate.shape):
+        grid = np.array(parameter.grid)
+        at = int(np.argmin(np.abs(grid - hypothesis.shape[axis])))
+        minimize_scalar(
+            missed,
+            bounds=(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]),
+            args=(axis,),
+            method="bounded",
+            options={"maxiter": SEARCH_STEPS},
+        )
     return best
 
 
-GOLDEN = (5**0.5 - 1) / 2
-SECTIONS = 8
+SEARCH_STEPS = 8
 
 
 def gain(base: Base, hypothesis: Hypothesis) -> float:

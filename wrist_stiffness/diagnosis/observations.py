@@ -5,7 +5,7 @@ counts as a measurement of its own: the mean over one dwell, or one sample.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,8 @@ class Observations:
         How many samples a unit averages.
     quantities : tuple of Quantity, optional
         What is reported as one length; by default all components as ``value``.
+    row : (n,) array of int, optional
+        Number of each unit in the table that it was taken from; by default this one.
     """
 
     values: Array
@@ -76,6 +78,7 @@ class Observations:
     replicate: Labels | None = None
     samples: Array | None = None
     quantities: tuple[Quantity, ...] = field(default=())
+    row: Labels | None = None
 
     def __post_init__(self) -> None:
         """Refuse tables whose columns do not belong together."""
@@ -89,6 +92,7 @@ class Observations:
             "session": self.session,
             "replicate": self.replicate,
             "samples": self.samples,
+            "row": self.row,
             **{f"covariate {name!r}": column for name, column in self.covariates.items()},
         }
         for name, column in per_unit.items():
@@ -107,6 +111,11 @@ class Observations:
                 raise InputError("time_s runs backwards inside a session; sort the rows by time")
         if not self.quantities:
             object.__setattr__(self, "quantities", (Quantity("value", "si", tuple(range(m))),))
+
+    @property
+    def rows(self) -> Labels:
+        """Number of each unit in the table that it was taken from, (n,)."""
+        return np.arange(self.n_units) if self.row is None else self.row
 
     @property
     def n_units(self) -> int:
@@ -173,17 +182,9 @@ class Observations:
             some(self.replicate),
             some(self.samples),
             self.quantities,
+            self.rows[rows],
         )
 
     def with_values(self, values: Array) -> "Observations":
         """Return the same conditions with other measured values, (n, m)."""
-        return Observations(
-            values,
-            self.covariates,
-            self.covariance,
-            self.time_s,
-            self.session,
-            self.replicate,
-            self.samples,
-            self.quantities,
-        )
+        return replace(self, values=values)

@@ -20,6 +20,9 @@ from wrist_stiffness.diagnosis.structure import lack_of_fit
 
 SWAP_ROUNDS = 3
 
+CONTENDING_SHARE = 0.5
+"""A better shape rarely doubles what a candidate explains at a point of its grid."""
+
 CONTENDERS = 3
 """So many candidates get their shape refined before one is chosen."""
 
@@ -130,7 +133,8 @@ def _sharpened(
     ranked = rank(base, hypotheses, dimension, evidence.noise.dof)
     contenders: dict[str, Hypothesis] = {}
     for each in ranked:
-        if each.hypothesis.candidate.shape and len(contenders) < CONTENDERS:
+        near = each.gain > CONTENDING_SHARE * ranked[0].gain
+        if each.hypothesis.candidate.shape and near and len(contenders) < CONTENDERS:
             contenders.setdefault(each.name, each.hypothesis)
     if not contenders:
         return ranked
