@@ -76,6 +76,18 @@ def test_prediction_is_the_models_with_the_load_of_the_stamp(model):
     assert np.array_equal(sample.prediction.twist, model.predict(THETA, Load(DOWN)).twist)
 
 
+def test_samples_without_effects_leave_no_trace_not_even_in_the_last_bit(model):
+    """Whatever was predicted before, the flanges in contact are found anew."""
+    rng = np.random.default_rng(9)
+    stream = PredictionStream(model, StreamSettings())
+    for i in range(200):
+        load = rng.normal(size=6) * np.repeat([0.8, 0.02], 3)
+        theta, stamp = rng.uniform(-0.6, 0.6, 2), SECOND + i
+        stream.loads.add(stamp, "wrist_base", load[:3], load[3:])
+        found = stream.on_joint_state(stamp, NAMES, theta).prediction
+        assert np.array_equal(found.twist, model.predict(theta, Load(load)).twist)
+
+
 def test_without_a_model_nothing_is_predicted_and_commands_pass():
     stream = PredictionStream(None, StreamSettings())
     stream.loads.add(SECOND, "wrist_base", (0, 0, 0), (0, 0, 0))

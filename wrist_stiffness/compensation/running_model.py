@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.mechanism.components import Array
@@ -35,6 +38,7 @@ class RunningModel:
         self._covariates = covariates
         self._session: Session | None = model.session() if model.effects else None
         self._last_ns = 0
+        self._active: NDArray[np.bool_] | None = None
 
     def advance(self, stamp_ns: int, theta: Array, load: Load) -> Prediction:
         """Predict a sample and remember it.
@@ -60,7 +64,7 @@ class RunningModel:
         """
         session = self._session_at(stamp_ns)
         if session is None:
-            return self.model.predict(theta, load)
+            return self._predict(theta, load)
         prediction = session.advance(self._sample(stamp_ns, theta, load))
         self._last_ns = stamp_ns
         return prediction
@@ -74,8 +78,15 @@ class RunningModel:
         """Return the prediction as a function of the motor angles, to be tried and forgotten."""
         session = self._session_at(stamp_ns)
         if session is None:
-            return lambda theta: self.model.predict(theta, load)
+            return lambda theta: self._predict(theta, load)
         return lambda theta: session.preview(self._sample(stamp_ns, theta, load))
+
+    def _predict(self, theta: Array, load: Load) -> Prediction:
+        # The flanges that touched last are a good guess.  It saves time and leaves no trace: the
+        # forces are solved for once more from the flanges that are found, whatever the guess was.
+        prediction = self.model.predict(theta, load, self._active)
+        self._active = prediction.active
+        return prediction
 
     def _session_at(self, stamp_ns: int) -> Session | None:
         if self._session is not None and stamp_ns < self._last_ns - JUMP_S * NANOSECONDS:
