@@ -156,11 +156,11 @@ def _build(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows import table
     from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.table_check import check
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
-    findings = table.check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
+    findings = check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
     for finding in findings:
         print(f"{'good' if finding.passed else 'BAD ':4} {finding.name}: {finding.text}")
     passed = all(finding.passed for finding in findings)
@@ -190,7 +190,7 @@ def _show(arguments: argparse.Namespace) -> int:
     pictures = table.draw_maps(shown, arguments.output, push)
     _print_facts(shown)
     summary = table.summarise(shown)
-    print("1 N downward, own weight left out, operative workspace:")
+    print("rated load (1 N downward, own weight left out), operative workspace:")
     for name, row in summary.operative.items():
         print(
             f"  {name:12} mean {row['mean']:7.2f}   min {row['min']:7.2f}   max {row['max']:7.2f}"
