@@ -20,7 +20,7 @@ from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, Entry, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.size import Scale
-from wrist_stiffness.workflows.plotting import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
 
 SECONDS, RATE_HZ = 40.0, 50.0
 SIZE = 3.0

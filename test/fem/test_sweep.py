@@ -13,7 +13,7 @@ from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.sweep import BuildSettings, build_table
 from wrist_stiffness.lookup.table_file import load_table, save_table
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.table import check
+from wrist_stiffness.workflows.table_check import check
 
 COARSE = BuildSettings(
     sizes=MeshSettings(

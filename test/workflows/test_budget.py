@@ -8,8 +8,8 @@ from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows.budget import Push, budget
+from wrist_stiffness.workflows.pictures.bent_wrist import bent_shapes
 from wrist_stiffness.workflows.table import draw_maps
-from wrist_stiffness.workflows.wrist_picture import bent_shapes
 
 
 @pytest.fixture(scope="module")

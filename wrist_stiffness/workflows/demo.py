@@ -15,7 +15,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.workflows.before_after import Pass, before_and_after
 from wrist_stiffness.workflows.cell import run_cell
 from wrist_stiffness.workflows.compare_runs import RunComparison, compare_runs
-from wrist_stiffness.workflows.plotting import draw_before_after
+from wrist_stiffness.workflows.pictures.before_after import draw_before_after
 from wrist_stiffness.workflows.replay import ReplaySummary, replay
 from wrist_stiffness.workflows.table import draw_maps
 

@@ -22,7 +22,6 @@ from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.geometry_file import load_geometry
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows import paper_pictures as pictures
 from wrist_stiffness.workflows.paper_figures import (
     COLUMNS,
     PUBLISHED,
@@ -31,6 +30,7 @@ from wrist_stiffness.workflows.paper_figures import (
     PaperExperiment,
 )
 from wrist_stiffness.workflows.paper_predictions import energy_budget, predictions
+from wrist_stiffness.workflows.pictures import paper as pictures
 
 if TYPE_CHECKING:
     from wrist_stiffness.fem.solids import MeshSettings

@@ -9,7 +9,7 @@ import numpy as np
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC
 from wrist_stiffness.workflows.budget import Budget
-from wrist_stiffness.workflows.plotting import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
 
 
 def draw_budget(table: Table, budget: Budget, load: str, path: Path) -> None:

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.paper_figures import PUBLISHED, UNITS, PaperExperiment
-from wrist_stiffness.workflows.plotting import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
 
 S, PHI = 3, 4
 NAMES = {S: "shift s", PHI: "turn φ"}

@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.vectors import cross, unit
 from wrist_stiffness.workflows.budget import Push
-from wrist_stiffness.workflows.plotting import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
 
 SHOWN_M = 0.010
 """The largest displacement is drawn about this long."""

@@ -1,0 +1,1 @@
+"""Pictures: every function writes one PNG; matplotlib is imported where it draws."""

@@ -1,0 +1,145 @@
+"""Verify a lookup table: undamaged, definite, as good as stated, and reproducible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry_file import load_geometry
+
+Progress = Callable[[int, int], None]
+
+REBUILT_TOLERANCE = 1e-6
+"""Relative difference of a rebuilt table that counts as the same: other BLAS, same mesh."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a check looked at.
+
+    Parameters
+    ----------
+    name, text : str
+        What was checked and what was found, with the limit.
+    passed : bool
+        Whether it holds.
+    """
+
+    name: str
+    text: str
+    passed: bool
+
+
+def check(
+    path: str | Path,
+    geometry: str | Path | None = None,
+    rebuild: bool = False,
+    progress: Progress = lambda done, of: None,
+) -> list[Finding]:
+    """Verify a table.
+
+    Parameters
+    ----------
+    path : path
+        Table file.
+    geometry : path, optional
+        Geometry file that the table must be of.
+    rebuild : bool
+        Also condense the parts and sweep again, and compare all numbers.
+    progress : callable
+        Called with steps done and in all.
+
+    Returns
+    -------
+    list of Finding
+        All checks; the table is good if all passed.
+
+    Raises
+    ------
+    TableError, GeometryError
+        If a file cannot be read at all.
+    """
+    from wrist_stiffness.fem.solids import MeshSettings
+    from wrist_stiffness.fem.sweep import BuildSettings, build_table, interpolation_errors
+
+    table = load_table(path)
+    findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]
+    if geometry is not None:
+        wanted = load_geometry(geometry).sha256
+        same = wanted == table.geometry.sha256
+        findings.append(
+            Finding(
+                "geometry",
+                f"made for {table.geometry.sha256[:12]}, {geometry} is {wanted[:12]}",
+                same,
+            )
+        )
+    findings.append(_definiteness(table))
+    errors = interpolation_errors(table)
+    for region in ("operative", "domain"):
+        for name in ("s", "phi"):
+            stated = table.header.errors["predicted"][region][name]
+            found = errors["predicted"][region][name]
+            findings.append(
+                Finding(
+                    f"spline {name} {region}",
+                    f"errs by {100 * found:.3f} % at {errors['unseen_poses']} unseen poses, "
+                    f"stated {100 * stated:.3f} %",
+                    found <= stated * (1.0 + REBUILT_TOLERANCE) + 1e-9,
+                )
+            )
+    if rebuild:
+        header = table.header
+        sizes = MeshSettings(**{key: 1e-3 * v for key, v in header.mesh["sizes_mm"].items()})
+        settings = BuildSettings(
+            sizes=sizes,
+            interface=header.interface,  # type: ignore[arg-type]
+            evaluation=header.evaluation,
+            kernel=header.kernel,
+            per_axis=header.per_axis,
+        )
+        again = build_table(header.geometry, settings, progress)
+        for name in ("operators", "map_values"):
+            old, new = getattr(table, name), getattr(again, name)
+            same_shape = old.shape == new.shape
+            difference = _difference(old, new) if same_shape else float("inf")
+            findings.append(
+                Finding(
+                    f"rebuilt {name}",
+                    f"differs by {difference:.1e} of its size (limit {REBUILT_TOLERANCE:.0e})",
+                    difference <= REBUILT_TOLERANCE,
+                )
+            )
+    return findings
+
+
+def _difference(old: Array, new: Array) -> float:
+    return float(np.max(np.abs(old - new) / np.max(np.abs(old), axis=0, initial=1e-300)))
+
+
+def _definiteness(table: Table) -> Finding:
+    from wrist_stiffness.fem.sweep import unseen_poses
+
+    configuration = table.mechanism.forward(unseen_poses(table.workspace))
+    lowest = min(
+        float(
+            np.min(np.linalg.eigvalsh(_scaled(table.operators_at(configuration, way).compliance)))
+        )
+        for way in ("closed_form", "spline")
+    )
+    return Finding(
+        "compliance", f"smallest scaled eigenvalue {lowest:.1e}, must be > 0", lowest > 0
+    )
+
+
+def _scaled(matrix: Array) -> Array:
+    """Scale a compliance to a unit diagonal, so that metres and radians weigh the same."""
+    size = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    scaled: Array = matrix / size[..., :, None] / size[..., None, :]
+    return scaled
