@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,13 +15,40 @@ FEW = 4
 """Up to this many samples are solved one by one."""
 
 STRIDE = 8
+"""Neighbours in time share most of their contact state: one in so many guesses for all."""
 
 MAX_EXCHANGES = 12
 """Block exchanges of the whole stack; samples that are not done then are solved one by one."""
 
 
+@dataclass(frozen=True)
+class Held:
+    """A contact state of n samples with the forces that hold it: the guess for a like problem.
+
+    Parameters
+    ----------
+    active : (n, m) bool
+        Sectors in contact.
+    stiffness : (n, m, m) float
+        Forces for a unit opening of each sector that does not happen, zero where not in contact
+        [N/m].
+    """
+
+    active: NDArray[np.bool_]
+    stiffness: Array
+
+    @classmethod
+    def of(cls, approach: Array, active: NDArray[np.bool_]) -> Held:
+        """Return the held state for flexibilities A (n, m, m) [m/N]."""
+        stiffness = np.zeros_like(approach)
+        for rows, held in _patterns(active):
+            own = np.ix_(rows, held, held)
+            stiffness[own] = np.linalg.inv(approach[own])
+        return cls(active, stiffness)
+
+
 def solve_contacts(
-    approach: Array, gap: Array, active: NDArray[np.bool_] | None
+    approach: Array, gap: Array, guess: NDArray[np.bool_] | Held | None
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Solve the contact problem of n samples.
 
@@ -31,8 +61,8 @@ def solve_contacts(
         A [m/N].
     gap : (n, m) float
         Openings without contact forces [m].
-    active : (m,) or (n, m) bool or None
-        First guess for all or for each.
+    guess : (m,) bool or Held or None
+        Sectors in contact of a sample before, or all that is known of a problem with the same A.
 
     Returns
     -------
@@ -47,33 +77,42 @@ def solve_contacts(
         If an input is not finite or a matrix is not positive definite.
     """
     n, m = gap.shape
-    force = np.zeros((n, m))
     closed = np.zeros((n, m), dtype=bool)
-    if n > STRIDE * FEW and (active is None or active.ndim == 1):
-        # Neighbours in time share most of their contact state: every eighth sample guesses for all.
-        active = np.repeat(solve_contacts(approach[::STRIDE], gap[::STRIDE], active)[1], STRIDE, 0)
-        active = active[:n]
-    if active is not None:
-        closed[:] = active
+    if isinstance(guess, Held):
+        force, closed[:] = -(guess.stiffness @ gap[..., None])[..., 0], guess.active
+    else:
+        if n > STRIDE * FEW:
+            coarse = solve_contacts(approach[::STRIDE], gap[::STRIDE], guess)[1]
+            closed[:] = np.repeat(coarse, STRIDE, axis=0)[:n]
+        elif guess is not None:
+            closed[:] = guess
+        force = forces_of(approach, gap, closed) if n > FEW else np.zeros((n, m))
     open_rows = np.arange(n)
-    if n > FEW and m:
-        size = np.max(np.abs(gap), axis=1)
-        force_size = size / np.max(np.diagonal(approach, axis1=1, axis2=2), axis=1)
+    if (n > FEW or isinstance(guess, Held)) and m:
+        wrong = _wrong(approach, gap, force, closed)
         for _ in range(MAX_EXCHANGES):
-            force[open_rows] = forces_of(approach[open_rows], gap[open_rows], closed[open_rows])
-            opening = gap[open_rows] + (approach[open_rows] @ force[open_rows][..., None])[..., 0]
-            wrong = np.where(
-                closed[open_rows],
-                force[open_rows] < -RELATIVE_TOLERANCE * force_size[open_rows, None],
-                opening < -RELATIVE_TOLERANCE * size[open_rows, None],
-            )
             closed[open_rows] ^= wrong
             open_rows = open_rows[wrong.any(axis=1)]
             if len(open_rows) == 0:
                 return np.maximum(force, 0.0), closed
+            left = approach[open_rows], gap[open_rows]
+            force[open_rows] = forces_of(*left, closed[open_rows])
+            wrong = _wrong(*left, force[open_rows], closed[open_rows])
     for row in open_rows:
         force[row], closed[row] = solve_contact(approach[row], gap[row], closed[row].copy())
     return force, closed
+
+
+def _wrong(
+    approach: Array, gap: Array, force: Array, closed: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Tell where a held sector pulls or an open one overlaps, (n, m)."""
+    opening = gap + (approach @ force[..., None])[..., 0]
+    size = np.max(np.abs(gap), axis=1, keepdims=True)
+    stiffest = np.max(np.diagonal(approach, axis1=1, axis2=2), axis=1, keepdims=True)
+    pulls = force < -RELATIVE_TOLERANCE * size / stiffest
+    overlaps = opening < -RELATIVE_TOLERANCE * size
+    return np.where(closed, pulls, overlaps)
 
 
 def forces_of(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
@@ -94,12 +133,20 @@ def forces_of(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
         Forces, linear in `gap`; zero where not held [N].
     """
     force = np.zeros_like(gap)
+    for rows, held in _patterns(closed):
+        own = np.ix_(rows, held)
+        matrix = approach[np.ix_(rows, held, held)]
+        force[own] = np.linalg.solve(matrix, -gap[own][..., None])[..., 0]
+    return force
+
+
+def _patterns(
+    closed: NDArray[np.bool_],
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield the rows of each contact state that occurs, and its sectors, unless it has none."""
     patterns, which = np.unique(np.packbits(closed, axis=1), axis=0, return_inverse=True)
     for number in range(len(patterns)):
         rows = np.flatnonzero(which.ravel() == number)
         held = np.flatnonzero(closed[rows[0]])
         if len(held):
-            own = np.ix_(rows, held)
-            matrix = approach[np.ix_(rows, held, held)]
-            force[own] = np.linalg.solve(matrix, -gap[own][..., None])[..., 0]
-    return force
+            yield rows, held

@@ -7,6 +7,7 @@ xi = C W + sum_k G_k delta_k + B lambda
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.contacts import solve_contacts
+from wrist_stiffness.model.contacts import Held, solve_contacts
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import NOTHING, STAGES, Contribution, MissingSignalError
 from wrist_stiffness.model.situation import Situation, lengths
@@ -83,6 +84,11 @@ class Evaluated:
     contributions: tuple[Contribution, ...]
     warnings: tuple[str, ...]
 
+    @cached_property
+    def held(self) -> Held:
+        """The contact state, for other models at the same block."""
+        return Held.of(self.situation.operators.approach, self.active)
+
 
 def evaluate(
     model: ErrorModel, block: Block, memory: Memory | None, like: Evaluated | None = None
@@ -108,7 +114,7 @@ def evaluate(
         For the next block.
     """
     if like is not None and like.situation.parts is model.parts:
-        at = advanced(replace(like.situation, guess=like.active), NOTHING, like.situation)
+        at = advanced(replace(like.situation, guess=like.held), NOTHING, like.situation)
     else:
         block = with_speeds(block, memory)
         at = situation_of(model, block, None if memory is None else memory.active)

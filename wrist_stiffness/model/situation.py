@@ -22,7 +22,7 @@ from wrist_stiffness.mechanism.statics import (
 )
 from wrist_stiffness.mechanism.vectors import block_diagonal, dot
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.contacts import forces_of, solve_contacts
+from wrist_stiffness.model.contacts import Held, forces_of, solve_contacts
 from wrist_stiffness.model.law import NOTHING, Contribution, MissingSignalError
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
@@ -51,7 +51,7 @@ class Situation:
         Elastic parts as they are with the model's effects.
     given : Contribution
         Sum of what earlier stages added.
-    guess : (m,) or (n, m) bool or None
+    guess : (m,) bool or Held or None
         First guess of the contact state.
     """
 
@@ -62,7 +62,7 @@ class Situation:
     table: Table
     parts: ElasticComponents
     given: Contribution = NOTHING
-    guess: NDArray[np.bool_] | None = None
+    guess: NDArray[np.bool_] | Held | None = None
 
     @cached_property
     def influence(self) -> Influence:
