@@ -2,7 +2,7 @@
 
 Both are processes of their own and get the same JointState, one at a time, in alternating blocks;
 the echo node answers with an empty PoseWithCovarianceStamped of the same stamp.  A second echo node
-shows what the comparison can resolve.  Then the predictor gets 1 kHz and losses are counted.
+shows what the comparison can resolve.  Then the predictor gets a steady stream, 1 kHz if not told otherwise, and losses are counted.
 """
 
 from __future__ import annotations
@@ -143,7 +143,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--blocks", type=int, default=20)
     parser.add_argument("--pings", type=int, default=100, help="per block and node")
-    parser.add_argument("--seconds", type=float, default=10.0, help="at 1 kHz")
+    parser.add_argument("--seconds", type=float, default=10.0, help="of the stream")
+    parser.add_argument("--rate", type=float, default=1000.0, help="of the stream [Hz]")
     parser.add_argument("--echo", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.echo:
@@ -159,7 +160,7 @@ def main() -> None:
             probe.connect(name, f"/{name}/in", f"/{name}/out")
         probe.connect("predictor", "/joint_states", "/pose_error_predicted")
         round_trips(probe, options.blocks, options.pings)
-        endurance(probe, predictor.pid, options.seconds)
+        endurance(probe, predictor.pid, options.seconds, options.rate)
 
 
 def round_trips(probe: Probe, blocks: int, pings: int) -> None:
@@ -181,13 +182,13 @@ def round_trips(probe: Probe, blocks: int, pings: int) -> None:
         print(f"{name:12} {np.nanmedian(values):8.0f}   {p99:>26} {lost:6d}   {ratio:8.3f}")
 
 
-def endurance(probe: Probe, pid: int, seconds: float) -> None:
-    """Send 1 kHz and count what does not come back."""
+def endurance(probe: Probe, pid: int, seconds: float, rate_hz: float) -> None:
+    """Send a steady stream and count what does not come back."""
     probe.answered.clear()
-    count = round(1000 * seconds)
+    count = round(rate_hz * seconds)
     cpu, memory, start = cpu_seconds(pid), memory_mb(pid), time.perf_counter()
     for i in range(count):
-        while time.perf_counter() < start + i / 1000.0:
+        while time.perf_counter() < start + i / rate_hz:
             probe.executor.spin_once(timeout_sec=0.0)
         probe.send("predictor")
     wall = time.perf_counter() - start
@@ -196,7 +197,7 @@ def endurance(probe: Probe, pid: int, seconds: float) -> None:
         probe.executor.spin_once(timeout_sec=0.05)
     cpu = cpu_seconds(pid) - cpu
     print(
-        f"1 kHz for {wall:.1f} s: {count - len(probe.answered)} of {count} lost, "
+        f"{rate_hz:g} Hz for {wall:.1f} s: {count - len(probe.answered)} of {count} lost, "
         f"{100 * cpu / wall:.0f} % of a core, memory {memory:.1f} -> {memory_mb(pid):.1f} MB"
     )
 
