@@ -72,14 +72,21 @@ def test_session_is_the_batch_sample_by_sample(model, make, name, place):
     assert np.linalg.eigvalsh(prediction.covariance).min() > -1e-20
 
 
-def test_preview_leaves_no_trace(whole):
-    loaded, block, at_once = whole
-    session = loaded.session()
-    for row in range(5):
+def test_preview_leaves_no_trace(model, make):
+    loaded = model.with_effects(
+        make.effect("backlash@motor_1", width_mdeg=(50.0, 1.0)),
+        make.effect("creep@joint_2", delayed_percent=30.0, time_constant_s=0.2),
+        make.effect("joint_friction@joint_3", coefficient=0.3),
+    )
+    block = make.block(12)
+    at_once, session = loaded.batch(block), loaded.session()
+    for row in range(len(block)):
         sample = sample_of(block, row)
         session.preview(replace(sample, theta=sample.theta + 0.2))
         preview = session.preview(sample)
-        assert np.array_equal(preview.twist, session.advance(sample).twist)
+        prediction = session.advance(sample)
+        assert np.array_equal(preview.twist, prediction.twist)
+        assert np.array_equal(preview.covariance, prediction.covariance)
         assert np.allclose(preview.twist, at_once.twist[row], rtol=1e-9, atol=1e-15)
 
 

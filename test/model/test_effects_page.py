@@ -55,5 +55,5 @@ def test_python_on_the_page_runs(monkeypatch):
         "load": np.array([[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]] * 2),
     }
     exec(blocks("python")[1], names)
-    assert np.array_equal(names["several"][1].twist, names["recording"].twist)
+    assert np.allclose(names["several"][1].twist, names["recording"].twist, rtol=1e-12)
     assert np.array_equal(names["tried"].twist, names["prediction"].twist)
