@@ -88,6 +88,11 @@ def full_cases() -> list[Case]:
             for experiment in ("paper", "dead_weights", "production")
             for place in searched(CATALOGUE)
         ]
+    cases += [
+        Case((place,), 3.0, "exact", "rich", instrument, 1)
+        for instrument in ("tracker", "cmm")
+        for place in searched(CATALOGUE)
+    ]
     singles = searched(CATALOGUE)
     pairs = zip(singles[::2], singles[len(singles) // 2 :: 2], strict=False)
     cases += [Case(pair, 3.0, "exact", "rich", "interferometer", 2) for pair in pairs]

@@ -24,12 +24,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from bench_wrist import wrist
 from cases import Case, full_cases, quick_cases
+from diagnosis_core import diagnosis_core
 from dictionary import Word, dictionary
 from observe import pose_riddle
 from score import score, table
-from solvers import SOLVERS
+from solvers import BASELINES
 
 from wrist_stiffness.cli.progress import Progress
+
+SOLVERS = BASELINES | {"diagnosis_core": diagnosis_core}
 
 DRAWS = 6
 QUICK_DRAWS = 3

@@ -72,9 +72,9 @@ def told_the_answer(riddle: Riddle, words: Sequence[Word]) -> Answer:
 def geometry_only(riddle: Riddle, words: Sequence[Word]) -> Answer:
     """Calibrate joint axes and zeros, and believe that this is all."""
     chosen = [word for word in words if word.name.split("@")[0] in GEOMETRY]
-    fit = _Whitened(riddle.train, _nuisance(words))
+    fit = Whitened(riddle.train, _nuisance(words))
     values, gain, free = fit.fit(chosen)
-    predicted = _predict(chosen, values)
+    predicted = predict(chosen, values)
     if chi2.sf(gain, free) > ALPHA:
         return Answer("none", (), np.zeros_like(predicted))
     return Answer("effect", (tuple(w.name for w in chosen if "axis" in w.name),), predicted)
@@ -88,7 +88,7 @@ def stepwise_bic(riddle: Riddle, words: Sequence[Word]) -> Answer:
         covariance=np.broadcast_to(np.diag(white), riddle.train.covariance.shape),
         wander=np.zeros_like(riddle.train.wander),
     )
-    fit = _Whitened(session, _nuisance(words))
+    fit = Whitened(session, _nuisance(words))
     return _forward(riddle, words, fit, lambda gain, free, n: gain - free * np.log(n), single=True)
 
 
@@ -97,7 +97,7 @@ def knows_the_laws(riddle: Riddle, words: Sequence[Word]) -> Answer:
 
     A ceiling for whoever takes the laws as linear; strong play and friction are not.
     """
-    fit = _Whitened(riddle.train, _nuisance(words))
+    fit = Whitened(riddle.train, _nuisance(words))
     allowed = ALPHA / max(len(words), 1)
 
     def evidence(gain: float, free: int, n: int) -> float:
@@ -110,7 +110,7 @@ def gaussian_process(riddle: Riddle, words: Sequence[Word]) -> Answer:
     """Interpolate the residual over the conditions; it compensates and names nothing."""
     train, test = riddle.train, riddle.test
     factor, factor_test = (np.linalg.cholesky(each.covariance) for each in (train, test))
-    centred = _Whitened(train, _nuisance(words)).without_nuisance(train)
+    centred = Whitened(train, _nuisance(words)).without_nuisance(train)
     values = np.linalg.solve(factor, centred[..., None])[..., 0]
     # What a sensor wandered with the time of one session says nothing about another.
     here, there = (np.delete(each.conditions, TIME, axis=1) for each in (train, test))
@@ -128,7 +128,7 @@ def gaussian_process(riddle: Riddle, words: Sequence[Word]) -> Answer:
     return Answer("unknown", (), np.einsum("uij,uj->ui", factor_test, across @ weights))
 
 
-SOLVERS: dict[str, Solver] = {
+BASELINES: dict[str, Solver] = {
     "always_none": always_none,
     "told_the_answer": told_the_answer,
     "geometry_only": geometry_only,
@@ -138,7 +138,7 @@ SOLVERS: dict[str, Solver] = {
 }
 
 
-class _Whitened:
+class Whitened:
     """Least squares on one session with the nuisances marginalised by their wide priors."""
 
     def __init__(self, session: Session, nuisance: Sequence[Word]) -> None:
@@ -179,14 +179,15 @@ def _nuisance(words: Sequence[Word]) -> list[Word]:
     return [word for word in words if word.name in nuisance_names()]
 
 
-def _predict(words: Sequence[Word], values: Array) -> Array:
+def predict(words: Sequence[Word], values: Array) -> Array:
+    """Return the change of the second session's residual by words with coefficients, (u, 6)."""
     return np.concatenate([word.test for word in words], axis=2) @ values
 
 
 def _forward(
     riddle: Riddle,
     words: Sequence[Word],
-    fit: _Whitened,
+    fit: Whitened,
     evidence: Callable[[float, int, int], float],
     single: bool,
 ) -> Answer:
@@ -225,7 +226,7 @@ def _forward(
         return Answer(verdict, (), np.zeros_like(riddle.test.residual))
     left = excess - gained + used
     unknown = not single and left > STRUCTURE * excess and chi2.sf(left + n, n) < ALPHA
-    return Answer("unknown" if unknown else "effect", tuple(classes), _predict(chosen, values))
+    return Answer("unknown" if unknown else "effect", tuple(classes), predict(chosen, values))
 
 
 def _kernel(x: Array, y: Array, length: float) -> Array:

@@ -20,7 +20,7 @@ from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.vectors import skew
 from wrist_stiffness.mechanism.workspace import Workspace
 
-GEOMETRY = Path(__file__).parents[2] / "config" / "palmieri2015.yaml"
+GEOMETRY = Path(__file__).parent / "orthogonal_wrist.yaml"
 SECTORS = 8
 BUSHING_RADIAL, BUSHING_TILT = 3e-7, 5e-3  # m/N and rad/(N m)
 LINK_BEND, LINK_TURN = 2e-7, 2e-4
@@ -59,7 +59,7 @@ def flanges(axis, radius, bushing, sign, gap):
 
 @cache
 def make_wrist(gap=0.0, flanged=True):
-    """Table of the synthetic wrist on the shipped geometry."""
+    """Table of the synthetic wrist on an orthogonal geometry of assumed dimensions."""
     values = yaml.safe_load(GEOMETRY.read_text())
     geometry = geometry_from_values(values, str(GEOMETRY))
     mechanism = mechanism_of(geometry)

@@ -1,5 +1,7 @@
 """Each hidden law does what nature does: oracles are closed forms, energies and limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,7 @@ from wrist_stiffness.simulation.laws.creep import Creep
 from wrist_stiffness.simulation.laws.inertia import Inertia
 from wrist_stiffness.simulation.laws.joint_clearance import JointClearance
 from wrist_stiffness.simulation.laws.motor_turn import Backlash
+from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
 from wrist_stiffness.simulation.laws.time_delay import DelayLine
 from wrist_stiffness.simulation.seat import Seat
 from wrist_stiffness.simulation.wrist import TrueWrist
@@ -298,6 +301,30 @@ def test_motors_warm_the_wrist_and_heat_is_kept():
     stored = np.diff(kelvin, axis=0) @ CAPACITY / 10.0
     flow = 0.8 - (kelvin[1:] - 3.0) @ TO_ROOM
     np.testing.assert_allclose(stored, flow, atol=1e-9)
+
+
+def test_a_wrist_that_grows_as_a_whole_only_carries_its_plate_outward(wrist):
+    """With bearings at the bars' radii nothing is left between the bodies: similar wrists."""
+    table = wrist(flanged=False)
+    geometry = table.geometry
+    bushings = dict(geometry.bushings)
+    for joint, link in (("joint_1", "link_1"), ("joint_5", "link_2")):
+        radius = geometry.links[link].arc_radius
+        bushings[joint] = replace(bushings[joint], radius=radius)
+    geometry = replace(geometry, bushings=bushings)
+    strain = 1e-5
+    laws = [
+        ThermalExpansion(body, strain, growing_spots(geometry, body), 0.0)
+        for body in ("frame", "link_1", "link_2", "platform")
+    ]
+    theta = np.array([[0.3, -0.4], [-0.5, 0.2]])
+    warm, cold = (
+        state_at(table, laws, theta, np.zeros((2, 6)), kelvin=COLD + kelvin) for kelvin in (1, 0)
+    )
+    grown = warm.equilibrium.twist - cold.equilibrium.twist
+    outward = warm.block.configuration.platform @ (strain * geometry.platform.centre)
+    np.testing.assert_allclose(grown[:, :3], outward, atol=1e-12)
+    np.testing.assert_allclose(grown[:, 3:], 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("form", ["frame", "platform"])

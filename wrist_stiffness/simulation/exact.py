@@ -60,11 +60,11 @@ PAIRS = {
 MICRO = 1e-6
 """Lengths and angles are counted in millionths, so that they are of the size of the forces."""
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-9
 """Largest change of an unknown at the end [N, um]."""
 
 MAX_STEPS = 300
-FULL_STEPS = 40
+FULL_STEPS, SHORT_STEPS = 40, 100
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ class _System:
             else:
                 new, change = force, np.asarray(-np.linalg.solve(tangent, rest))
             # Kinked laws can make full steps jump to and fro.
-            share = 1.0 if step < FULL_STEPS else 0.3
+            share = 1.0 if step < FULL_STEPS else 0.3 if step < SHORT_STEPS else 0.1
             jump = new - force
             z, force = z + share * change, force + share * jump
             if max(np.max(np.abs(change)), np.max(np.abs(jump), initial=0.0)) < TOLERANCE:
