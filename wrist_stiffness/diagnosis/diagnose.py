@@ -6,8 +6,9 @@ import numpy as np
 
 from wrist_stiffness.diagnosis.candidates import Candidate, remembered
 from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
+from wrist_stiffness.diagnosis.errors_in_variables import without_attenuation
 from wrist_stiffness.diagnosis.estimates import joint_fit
-from wrist_stiffness.diagnosis.findings import Model, describe
+from wrist_stiffness.diagnosis.findings import Model, describe, with_values
 from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
@@ -77,6 +78,7 @@ def diagnose(
     settings = settings or Settings()
     _refuse_unusable(observations, candidates)
     observations = replace(observations, row=None)
+    original = {candidate.name: candidate for candidate in candidates}
     candidates = tuple(remembered(candidate, observations) for candidate in candidates)
     aside = sealed_units(observations, settings.sealed_share)
     training, n_lost = _cleaned(observations.take(~aside), candidates, nuisances, settings)
@@ -96,6 +98,12 @@ def diagnose(
     unexplained = _unexplained(evidence, base.energy, excess, flexible, broken)
     model = Model(evidence, testable, kept, tuple(stages), blocks, dimension, settings)
     findings = tuple(describe(model, which, rng) for which in range(len(kept)))
+    if observations.covariate_std and kept:
+        effects = [(original[each.name], each.hypothesis.shape) for each in kept]
+        exact = without_attenuation(evidence, effects, nuisances, rng)
+        findings = tuple(
+            with_values(finding, values) for finding, values in zip(findings, exact, strict=True)
+        )
     verdict = "effect" if findings else "none"
     if unexplained.energy_share >= settings.unexplained_share or broken:
         verdict = "unknown"

@@ -1,12 +1,12 @@
 """From an effect in the model to a finding that a technician can use."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wrist_stiffness.diagnosis.estimates import estimate
 from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
-from wrist_stiffness.diagnosis.observations import Labels
+from wrist_stiffness.diagnosis.observations import Array, Labels
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.ranking import Ranked, scored
 from wrist_stiffness.diagnosis.resampling import BlockGrams, stability
@@ -89,6 +89,23 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
         _told(own),
         candidate.check,
     )
+
+
+def with_values(finding: Finding, values: Array) -> Finding:
+    """Return the finding with corrected linear parameters, their uncertainty in proportion.
+
+    Parameters
+    ----------
+    finding : Finding
+        As fitted.
+    values : (k,) array
+        Corrected linear parameters; shape parameters stay.
+    """
+    corrected = dict(finding.parameters)
+    for (name, (old, error)), value in zip(finding.parameters.items(), values, strict=False):
+        growth = max(1.0, abs(value / old)) if old else 1.0
+        corrected[name] = (float(value), error * growth)
+    return replace(finding, parameters=corrected)
 
 
 def _stability(

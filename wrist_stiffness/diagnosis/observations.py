@@ -66,6 +66,8 @@ class Observations:
         How many samples a unit averages.
     quantities : tuple of Quantity, optional
         What is reported as one length; by default all components as ``value``.
+    covariate_std : mapping of str to float, optional
+        Standard deviation of the error of an uncertain condition (a load), per unit.
     row : (n,) array of int, optional
         Number of each unit in the table that it was taken from; by default this one.
     """
@@ -78,6 +80,7 @@ class Observations:
     replicate: Labels | None = None
     samples: Array | None = None
     quantities: tuple[Quantity, ...] = field(default=())
+    covariate_std: Mapping[str, float] = field(default_factory=dict)
     row: Labels | None = None
 
     def __post_init__(self) -> None:
@@ -101,6 +104,9 @@ class Observations:
             if column is not None and not np.isfinite(column).all():
                 row = int(np.flatnonzero(~np.isfinite(column))[0])
                 raise InputError(f"{name} is not a number in row {row}")
+        for name, deviation in self.covariate_std.items():
+            if name not in self.covariates or not 0 <= deviation < np.inf:
+                raise InputError(f"covariate_std of {name!r} is {deviation}, or no such covariate")
         if self.covariance is not None and self.covariance.shape not in ((m, m), (n, m, m)):
             raise InputError(
                 f"covariance has shape {self.covariance.shape}, needs {(m, m)} or {(n, m, m)}"
@@ -182,6 +188,7 @@ class Observations:
             some(self.replicate),
             some(self.samples),
             self.quantities,
+            self.covariate_std,
             self.rows[rows],
         )
 

@@ -100,7 +100,7 @@ def select(
     chance = 1.0
     while len(entered) < settings.most_findings:
         base = base_with(evidence.base, entered)
-        ranked = _sharpened(evidence, base, _others(hypotheses, entered), dimension)
+        ranked = _contest(evidence, base, _others(hypotheses, entered), dimension)
         if not ranked:
             break
         order, sign = rearrangements(evidence.observations.sessions, settings.permutations, rng)
@@ -124,6 +124,16 @@ def rivals_of(
     base = base_with(evidence.base, others)
     free = [*_others(hypotheses, others), entered[which].hypothesis]
     return _sharpened(evidence, base, free, dimension)
+
+
+def _contest(
+    evidence: Evidence, base: Base, hypotheses: list[Hypothesis], dimension: float
+) -> list[Ranked]:
+    """Rank, with shapes refined unless the best one without a shape reaches the noise floor."""
+    ranked = rank(base, hypotheses, dimension, evidence.noise.dof)
+    if ranked and ranked[0].remaining == 0 and not ranked[0].hypothesis.candidate.shape:
+        return ranked
+    return _sharpened(evidence, base, hypotheses, dimension)
 
 
 def _sharpened(
@@ -157,7 +167,9 @@ def _swapped(
     for _ in range(SWAP_ROUNDS):
         before = [each.name for each in entered]
         for which in range(len(entered)):
-            ranked = rivals_of(evidence, hypotheses, entered, which, dimension)
+            others = entered[:which] + entered[which + 1 :]
+            free = [*_others(hypotheses, others), entered[which].hypothesis]
+            ranked = _contest(evidence, base_with(evidence.base, others), free, dimension)
             if ranked:
                 better = replace(entered[which], hypothesis=ranked[0].hypothesis)
                 entered = (*entered[:which], better, *entered[which + 1 :])
