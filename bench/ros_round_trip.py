@@ -2,7 +2,8 @@
 
 Both are processes of their own and get the same JointState, one at a time, in alternating blocks;
 the echo node answers with an empty PoseWithCovarianceStamped of the same stamp.  A second echo node
-shows what the comparison can resolve.  Then the predictor gets a steady stream, 1 kHz if not told otherwise, and losses are counted.
+shows what the comparison can resolve.  Then the predictor gets a steady stream, 1 kHz if not told
+otherwise, and losses are counted.
 """
 
 from __future__ import annotations

@@ -86,10 +86,11 @@ class Recorder(Node):
         output = self.get_parameter("output").value
         if not output:
             raise InputError("recorder: the parameter output names no recording")
-        self._recording = ExitStack()
-        self._writer = self._recording.enter_context(RecordingWriter(output))
         self._begin_with = self.get_parameter("begin_with").value.split()
         self._looking = self.create_timer(1.0 / LOOKS_PER_S, self._look)
+        # Last, so that nothing can fail between the opening and `destroy_node`.
+        self._recording = ExitStack()
+        self._writer = self._recording.enter_context(RecordingWriter(output))
 
     def _look(self) -> None:
         if not all(self.count_publishers(topic) for topic in self._begin_with):

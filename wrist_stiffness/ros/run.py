@@ -40,6 +40,10 @@ def run(make_node: Callable[[], Node]) -> int:
     except (WristError, ParameterException) as error:
         print(f"wrist-stiffness node: error: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_BAD_INPUT
+    except Exception:
+        # Told to stop while it was still starting: ROS then fails wherever the node happens to be.
+        if rclpy.ok():
+            raise
     finally:
         for node in executor.get_nodes():
             node.destroy_node()
