@@ -1,6 +1,7 @@
 """Condensed parts: rigid motions, symmetry, reciprocity, weights, interface models."""
 
 import math
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -131,6 +132,23 @@ def test_sectors_are_equal_under_turns_by_an_eighth(flanged_bushing, interface):
         np.testing.assert_allclose(turned, inner, atol=1e-9 * inner.max())
     axial = element.sector_screw[2, :SECTORS]
     np.testing.assert_allclose(axial, axial[0], rtol=1e-8)
+
+
+def test_harmonics_solve_the_same_equations(flanged_bushing):
+    """Slice by slice in harmonics, or all unknowns of the ring at once."""
+    ring = replace(flanged_bushing, mesh=replace(flanged_bushing.mesh, slices=1))
+    by_harmonics, at_once = condense(flanged_bushing, "rigid"), condense(ring, "rigid")
+    assert flanged_bushing.mesh.slices == SECTORS
+    for field in fields(at_once):
+        expected = getattr(at_once, field.name)
+        difference = np.abs(getattr(by_harmonics, field.name) - expected).max()
+        assert difference < ROUND_OFF * np.abs(expected).max(), field.name
+
+
+def test_a_symmetry_that_is_not_there_is_refused(flanged_bushing):
+    body = replace(flanged_bushing, mesh=replace(flanged_bushing.mesh, slices=5))
+    with pytest.raises(ValueError, match="not symmetric under turns by 1/5"):
+        condense(body, "rigid")
 
 
 def test_flange_modes_are_positive_definite(flanged_bushing):

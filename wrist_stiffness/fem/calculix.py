@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.elasticity import rigid_motion
+from wrist_stiffness.fem.solids import MILLIMETRES
 from wrist_stiffness.fem.wrist_model import FRAMES, SCREWS, WristAtPose, platform_weight
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
 
-MILLIMETRES = 1e3
 TONNES = 1e-3
 """Of a kilogram."""
 

@@ -29,10 +29,13 @@ class SolidMesh:
         The mesh, in metres; curved elements at curved faces.
     surfaces : dict of str to (n,) int
         Facet numbers of each named surface.
+    slices : int
+        Equal turns about z that map the mesh, its bore and its hub wall onto themselves; 1 if none.
     """
 
     tets: MeshTet2
     surfaces: dict[str, NDArray[np.int64]]
+    slices: int = 1
 
     @property
     def nodes(self) -> Array:

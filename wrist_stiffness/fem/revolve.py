@@ -90,7 +90,7 @@ def revolve(section: OCCGeometry, arcs_per_sector: int) -> SolidMesh:
                 )
         else:
             surfaces[str(name)] = match_facets(mesh, faces.reshape(-1, 3))
-    return SolidMesh(mesh, surfaces)
+    return SolidMesh(mesh, surfaces, slices=arcs)
 
 
 def _sweep(cells: NDArray[np.int64], count: int, arcs: int) -> NDArray[np.int64]:

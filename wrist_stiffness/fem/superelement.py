@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from wrist_stiffness.fem.cyclic import CyclicFactor, factorise_cyclic
 from wrist_stiffness.fem.elasticity import rigid_motion, surface_integrals
-from wrist_stiffness.fem.factor import factorise
+from wrist_stiffness.fem.factor import Factor, factorise
 from wrist_stiffness.fem.parts import ElasticBody
 from wrist_stiffness.mechanism.components import Array
 
@@ -116,12 +118,17 @@ def frame_stiffness(body: ElasticBody, loads: Array) -> tuple[Array, Array, Arra
         held[unknowns] = True
     free = np.flatnonzero(~held)
     pull = body.stiffness @ motion
-    inner_stiffness = factorise(body.stiffness[free][:, free], free)
-    solution = inner_stiffness.solve(np.hstack([pull, loads])[free])
+    solution = _factorise_inside(body, free).solve(np.hstack([pull, loads])[free])
     by_frames, by_loads = solution[:, :12], solution[:, 12:]
     stiffness = _symmetric(motion.T @ pull - pull[free].T @ by_frames)
     on_frames = motion.T @ loads - pull[free].T @ by_loads
     return stiffness, on_frames, _symmetric(loads[free].T @ by_loads)
+
+
+def _factorise_inside(body: ElasticBody, free: NDArray[np.int64]) -> CyclicFactor | Factor:
+    if body.mesh.slices > 1:
+        return factorise_cyclic(body.stiffness, body.mesh.nodes, free, body.mesh.slices)
+    return factorise(body.stiffness[free][:, free], free)
 
 
 def _condense_rigid(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:
