@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 
@@ -6,8 +8,9 @@ from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.simulation.catalogue import CATALOGUE
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.workflows.simulate import simulate_recording
+from wrist_stiffness.workflows.simulate import hide, simulate_recording
 
 SETTINGS = CellSettings(rate_hz=50.0)
 
@@ -55,3 +58,31 @@ def test_command_writes_a_recording_and_its_result(wrist, tmp_path, capsys):
     assert '"samples": 20' in (tmp_path / "run.json").read_text()
     assert main([*arguments, "--rate", "-3"], [command]) == 2
     assert "rate_hz = -3" in capsys.readouterr().err
+
+
+def test_blind_recording_is_opened_by_its_seed_alone(wrist, tmp_path, capsys):
+    save_table(wrist(), tmp_path / "table.npz")
+    common = ["simulate", "--table", str(tmp_path / "table.npz"), "--seconds", "6", "--rate", "10"]
+    riddle, again, clean = (tmp_path / f"{name}.mcap" for name in ("riddle", "again", "clean"))
+    for path in (riddle, again):
+        assert main([*common, "-o", str(path), "--blind", "3"], [command]) == 0
+    assert main([*common, "-o", str(clean)], [command]) == 0
+    assert riddle.read_bytes() == again.read_bytes() != clean.read_bytes()
+    capsys.readouterr()
+    assert main([*common, "--reveal", "3", "--json", str(tmp_path / "key.json")], [command]) == 0
+    told = capsys.readouterr().out
+    key = json.loads((tmp_path / "key.json").read_text())
+    assert key["effect"] in CATALOGUE
+    assert told.startswith(f"{key['effect']}@{key['component']} ({key['form']})")
+
+
+def test_chosen_effect_is_hidden_and_a_wrong_name_refused(wrist):
+    table = wrist()
+    settings = hide("backlash@motor_2:train", 2.0, table, SETTINGS, 6.0)
+    (hidden,) = settings.hidden
+    assert (hidden.effect, hidden.component, hidden.form) == ("backlash", "motor_2", "train")
+    for wrong in ("backlash", "slack@motor_2", "backlash@joint_2"):
+        with pytest.raises(InputError, match=wrong.partition("@")[0]):
+            hide(wrong, 2.0, table, SETTINGS, 6.0)
+    with pytest.raises(InputError, match="size -1"):
+        hide("backlash@motor_2", -1.0, table, SETTINGS, 6.0)
