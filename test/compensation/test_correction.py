@@ -46,6 +46,16 @@ def test_the_normal_points_where_it_was_commanded(model, objective, seed):
         assert np.linalg.norm(np.cross(before, wanted)) > 1e3 * FIXED_POINT
 
 
+def test_the_bound_of_the_search_holds_where_it_converges_slowly(make_table, objective):
+    soft = ErrorModel("soft", make_table(softness=300.0), "closed_form")
+    normal = soft.table.geometry.platform.normal
+    for theta, load in random_cases(soft, 20):
+        correction = corrected(soft, theta, load, objective("pointing"))
+        wanted = soft.table.mechanism.forward(theta).platform @ normal
+        after = actual_pose(soft, theta + correction.delta, load)[0] @ normal
+        assert np.linalg.norm(np.cross(after, wanted)) < FIXED_POINT
+
+
 @pytest.mark.parametrize("name", ["orientation", "tool_point"])
 def test_no_small_change_of_the_angles_is_better(model, objective, name):
     def size(theta, load, wanted):

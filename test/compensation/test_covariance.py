@@ -14,7 +14,7 @@ from wrist_stiffness.model.error_model import ErrorModel, Load
 
 THETA = np.array([0.3, -0.2])
 DOWN = np.array([0.3, 0.0, -1.0, 0.0, 0.01, 0.0])
-NOISE = np.repeat([2e-3, 2e-5], 3)
+NOISE = np.array([4e-3, 1e-3, 2e-4, 1e-5, 4e-5, 2e-6])
 DRAWS = 1500
 # Of an estimated standard deviation, from as many draws: three of its own deviations.
 SAMPLING = 3.0 / np.sqrt(2.0 * DRAWS)

@@ -199,6 +199,9 @@ def test_a_marked_command_passes_unchanged_with_an_error(model):
     command = driver.send(frame_id="wrist_corrected")
     assert command.theta.tolist() == THETA.tolist()
     assert "not corrected twice" in str(command.fault)
+    # The own correction begins at zero again.
+    ramp = EVERY_LOAD.safety.slew * 0.02
+    assert np.all(np.abs(driver.send().theta - THETA) <= ramp + ROUNDING)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
@@ -261,6 +264,15 @@ def test_a_clock_that_jumps_back_does_not_move_the_correction(model):
     driver.stamp_ns = 2 * SECOND
     assert np.allclose(driver.send().theta - THETA, delta, rtol=0, atol=ROUNDING)
     assert np.allclose(driver.settle().theta - THETA, delta, rtol=0, atol=1e-9)
+
+
+def test_a_clock_that_jumps_back_does_not_move_a_correction_on_its_way(model):
+    driver = corrector(model)
+    driver.send()
+    delta = driver.send().theta - THETA
+    driver.stamp_ns = 2 * SECOND
+    assert np.allclose(driver.send().theta - THETA, delta, rtol=0, atol=ROUNDING)
+    assert np.max(np.abs(driver.send().theta - THETA - delta)) > 1e-6
 
 
 def test_a_trajectory_is_corrected_whole_or_not_at_all(model, objective):
