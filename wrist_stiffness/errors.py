@@ -18,7 +18,7 @@ class GeometryError(WristError):
 
 
 class UnreachablePoseError(WristError):
-    """The closure of the five-bar has no solution at these angles, or the normal is out of reach."""
+    """The five-bar does not close at these angles, or the platform normal is out of reach."""
 
 
 class SingularPoseError(WristError):
