@@ -95,6 +95,12 @@ class Probe:
             if time.monotonic() > end:
                 raise SystemExit(f"{name} did not come up")
 
+    def load_the_wrist(self) -> None:
+        """Send the first load, once somebody hears it."""
+        while not self.load.get_subscription_count():
+            self.executor.spin_once(timeout_sec=0.1)
+        self.load.publish(wrench_message(self.stamp_ns, "wrist_base", DOWN))
+
     def _on_answer(self, message: PoseWithCovarianceStamped) -> None:
         self.answered[nanoseconds(message.header.stamp)] = time.perf_counter()
 
@@ -160,6 +166,7 @@ def main() -> None:
         for name in ("echo_1", "echo_2"):
             probe.connect(name, f"/{name}/in", f"/{name}/out")
         probe.connect("predictor", "/joint_states", "/pose_error_predicted")
+        probe.load_the_wrist()
         round_trips(probe, options.blocks, options.pings)
         endurance(probe, predictor.pid, options.seconds, options.rate)
 
