@@ -7,35 +7,68 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
+from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.block import Block, Load, Sample
-from wrist_stiffness.model.effects.joint_clearance import play_screw
+from wrist_stiffness.model.effects.joint_clearance import end_screws
 from wrist_stiffness.model.effects.joint_friction import slip
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.memory import lag, play
+from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
 
-AXIS, LENGTH, RADIAL = np.array([0.0, 0.0, 1.0]), 0.0065, 1e-5
+RADIAL = 1e-5
 
 paths = arrays(float, st.tuples(st.integers(1, 40), st.just(2)), elements=st.floats(-1.0, 1.0))
 
 
+def open_play(force):
+    """A pin without flanges under end forces (4,) [N]."""
+    nothing = np.zeros((1, 0)), np.zeros((1, 0, 4)), np.zeros((1, 0, 0))
+    return Play(RADIAL, np.array([force], dtype=float), *nothing).resting()[0]
+
+
 def test_pin_lies_on_the_side_of_its_force():
-    screw = play_screw(np.array([[3.0, 4.0, 7.0, 0.0, 0.0, 0.0]]), AXIS, LENGTH, RADIAL)[0]
-    assert np.allclose(screw, RADIAL * np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0]), rtol=1e-4)
+    assert np.allclose(open_play([3.0, 4.0, -2.0, 0.0]) / RADIAL, [0.6, 0.8, -1, 0], atol=0.01)
 
 
-def test_couple_tilts_the_pin_corner_to_corner():
-    screw = play_screw(np.array([[0.0, 0.0, 0.0, 0.5, 0.0, 0.2]]), AXIS, LENGTH, RADIAL)[0]
-    assert np.allclose(screw, [0.0, 0.0, 0.0, 2.0 * RADIAL / LENGTH, 0.0, 0.0], rtol=1e-4)
+@given(arrays(float, 4, elements=st.floats(-5.0, 5.0)))
+def test_play_yields_to_its_forces_up_to_the_walls(force):
+    x = open_play(force)
+    assert force @ x >= 0.0
+    assert np.linalg.norm(x.reshape(2, 2), axis=1).max() <= RADIAL * 1.01
 
 
-@given(arrays(float, (1, 6), elements=st.floats(-5.0, 5.0)))
-def test_play_yields_to_its_wrench(wrench):
-    """The work of the wrench is never negative, and no end moves further than the play."""
-    screw = play_screw(wrench, AXIS, LENGTH, RADIAL)[0]
-    assert wrench[0] @ screw >= 0.0
-    for end in (0.5 * LENGTH * AXIS, -0.5 * LENGTH * AXIS):
-        moved = screw[:3] + np.cross(screw[3:], end)
-        assert np.linalg.norm(moved) <= RADIAL * (1.0 + 1e-9)
+@pytest.mark.parametrize("joint", JOINTS)
+def test_end_screws_are_a_rigid_pin(model, joint):
+    """Each screw moves its own end by one across the axis and leaves the other where it is."""
+    geometry = model.table.geometry
+    bushing, axis = geometry.bushings[joint], geometry.axes[joint]
+    ends = [(bushing.radius + half * bushing.length) * axis for half in (0.5, -0.5)]
+    across = cross_axes(geometry, joint)[:2]
+    for number, screw in enumerate(end_screws(geometry, joint)):
+        own, other = ends if number < 2 else ends[::-1]
+        assert np.allclose(screw[:3] + np.cross(screw[3:], own), across[number % 2], atol=1e-12)
+        assert np.allclose(screw[:3] + np.cross(screw[3:], other), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_flanges_push_the_pin_back_within_its_play(model, make, joint):
+    """The pin is in balance with walls and flanges, and no flange bears more than a few loads."""
+    loaded = model.with_effects(make.effect(f"joint_clearance@{joint}", clearance_um=2e6 * RADIAL))
+    block = make.block(25)
+    result, _ = evaluate(loaded, block, None)
+    at = result.situation
+    assert result.active.any()
+    assert result.force.max() < 3.0
+    ends = end_screws(at.table.geometry, joint)
+    force = (at.at_home(joint, at.through_place(joint)) @ ends.T).reshape(-1, 2, 2)
+    added = result.contributions[0]
+    screw = at.at_home(joint, added.limb_1 if added.limb_2 is None else added.limb_2)
+    moved = np.linalg.lstsq(ends.T, screw.T, rcond=None)[0].T.reshape(-1, 2, 2)
+    size = np.linalg.norm(moved, axis=-1, keepdims=True)
+    assert size.max() < 1.05 * RADIAL
+    centring = SMALL_FORCE / RADIAL
+    wall = (centring + WALLS[-1] * np.maximum(1.0 - RADIAL / size, 0.0)) * moved
+    assert np.allclose(force, wall, atol=1e-5)
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -50,7 +83,8 @@ def test_play_vanishes_with_its_gap_and_follows_its_load(weightless, make, joint
             for c in (2.0, 1.0)
         )
         assert whole @ block.load[0] > 0.0
-        assert np.allclose(half, 0.5 * whole, rtol=1e-9)
+        # An end that carries newtons lies tens of nanometres in its wall.
+        assert np.allclose(half, 0.5 * whole, atol=0.1 * np.abs(whole).max())
         none = make.effect(f"joint_clearance@{joint}", clearance_um=0.0)
         assert not make.added(weightless, none, block).any()
 

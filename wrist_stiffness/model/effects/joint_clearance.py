@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS, Array
+from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.vectors import cross
-from wrist_stiffness.model.at_point import bushing_centre, screw_from, wrench_at
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.at_point import bushing_centre, cross_axes, screw_from
+from wrist_stiffness.model.law import NOTHING, Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.situation import Situation, lengths
-
-SMALL_FORCE = 1e-2
-"""An end that carries less radial force than this is not pressed to its wall altogether [N]."""
+from wrist_stiffness.model.pin_play import Play
+from wrist_stiffness.model.situation import Situation
 
 
 class JointClearance(Law):
@@ -23,7 +22,7 @@ class JointClearance(Law):
 
     Force and moment of the bearing are two end forces, half a sleeve's length off its centre; each
     end moves by half the diametral clearance along its own.  Equal end forces shift the pin,
-    opposite ones tilt it.
+    opposite ones tilt it.  A flange that touches pushes the pin back within its play.
     """
 
     id = "joint_clearance"
@@ -41,37 +40,34 @@ class JointClearance(Law):
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the screw of the play."""
-        geometry = at.table.geometry
-        axis, length = geometry.axes[place], geometry.bushings[place].length
-        centre = bushing_centre(geometry, place)
-        local = wrench_at(centre, at.at_home(place, at.through_place(place)))
-        home = play_screw(local, axis, length, 0.5 * values["clearance_um"])
-        return at.screw(place, screw_from(centre, home)), None
+        radial = 0.5 * values["clearance_um"]
+        if radial == 0.0:
+            return NOTHING, None
+        ends = end_screws(at.table.geometry, place)
+        opening = np.stack([at.carried(at.screw(place, end))[1] for end in ends], axis=-1)
+        carried = at.at_home(place, at.through_place(place)) @ ends.T
+        flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
+        play = Play(radial, carried - flanges, at.free[1], opening, at.operators.approach)
+        return at.screw(place, play.resting() @ ends), None
 
 
-def play_screw(wrench: Array, axis: Array, length: float, radial: float) -> Array:
-    """Return the screw of a pin in its play.
+def end_screws(geometry: Geometry, joint: str) -> Array:
+    """Return the screws for unit displacements of a sleeve's ends across its axis.
 
     Parameters
     ----------
-    wrench : (n, 6) float
-        At the sleeve's centre, on the moving side [N, N m].
-    axis : (3,) float
-        Of the sleeve, unit vector.
-    length : float
-        Of the sleeve [m].
-    radial : float
-        Half the diametral clearance [m].
+    geometry : Geometry
+        Of the wrist.
+    joint : str
+        The joint.
 
     Returns
     -------
-    (n, 6) float
-        At the sleeve's centre [m, rad].
+    (4, 6) float
+        Upper end along u and v, lower end along u and v; at O in the joint's home frame.
     """
-    force = wrench[:, :3] - (wrench[:, :3] @ axis)[:, None] * axis
-    couple = cross(wrench[:, 3:], axis) / length
-    ends = (0.5 * force + couple, 0.5 * force - couple)
-    upper, lower = (
-        radial * end / np.sqrt(lengths(end) ** 2 + SMALL_FORCE**2)[:, None] for end in ends
-    )
-    return np.concatenate([0.5 * (upper + lower), cross(axis, upper - lower) / length], axis=1)
+    axis, length = geometry.axes[joint], geometry.bushings[joint].length
+    across = cross_axes(geometry, joint)[:2]
+    turn = cross(axis, across) / length
+    local = np.concatenate([np.tile(0.5 * across, (2, 1)), np.concatenate([turn, -turn])], axis=1)
+    return screw_from(bushing_centre(geometry, joint), local)

@@ -1,0 +1,156 @@
+"""Where a pin comes to rest in its play, when flanges may hold it off the wall.
+
+Inside its play the pin is free, so a flange that touches pushes it away instead of being pressed by
+it.  The pin's two ends find the least of a convex energy (load, walls, flanges), by Newton's method
+with Armijo's rule:
+
+    Phi(x) = -F x + sum over ends wall(|x_end|) + 1/2 lambda' A lambda
+    0 <= lambda  perpendicular to  gap + B x + A lambda >= 0,       grad Phi = wall - F - B' lambda
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.contacts import Held, solve_contacts
+
+SMALL_FORCE = 1e-2
+"""An end that carries less radial force than this does not reach its wall altogether [N]."""
+
+WALLS = (1e6, 1e7, 1e8)
+"""Stiffness of the walls [N/m], from soft ones to find the way to the last, into which 1 N presses
+an end by 10 nm."""
+
+FORCE_TOLERANCE, ROUGH_TOLERANCE = 1e-8, 1e-2
+"""Force out of balance at which a pin rests, against the largest on it and 1 N; the second one on
+the way, between softer walls."""
+
+MAX_STEPS, MAX_HALVINGS, ARMIJO = 60, 40, 1e-4
+
+
+@dataclass(frozen=True)
+class Play:
+    """Pins of one joint at n samples.
+
+    Parameters
+    ----------
+    radial : float
+        How far an end may move from the middle [m], above 0.
+    force : (n, 4) float
+        Radial force on the upper and the lower end with all flanges open [N].
+    gap : (n, m) float
+        Openings of the flange sectors with the pin in the middle [m].
+    opening : (n, m, 4) float
+        B, what the ends' displacements open.
+    approach : (n, m, m) float
+        A, flexibility of the flanges [m/N].
+    """
+
+    radial: float
+    force: Array
+    gap: Array
+    opening: Array
+    approach: Array
+
+    def resting(self) -> Array:
+        """Return the displacements of both ends, (n, 4) [m].
+
+        Returns
+        -------
+        (n, 4) float
+            Upper end, lower end; each across the axis.
+        """
+        x = self._unhindered()
+        gap = self.gap + (self.opening @ x[..., None])[..., 0]
+        held = np.flatnonzero((gap < 0.0).any(axis=1))
+        if len(held):
+            x[held] = self.take(held)._hindered(x[held])
+        return x
+
+    def _hindered(self, x: Array) -> Array:
+        """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
+        for wall in WALLS:
+            tolerance = FORCE_TOLERANCE if wall == WALLS[-1] else ROUGH_TOLERANCE
+            x = self._newton(x, wall, tolerance)
+        return x
+
+    def _newton(self, x: Array, wall: float, tolerance: float) -> Array:
+        x, rows, left = x.copy(), np.arange(len(x)), self
+        for _ in range(MAX_STEPS):
+            energy, gradient, active = left._state(x[rows], wall)
+            bound = tolerance * (1.0 + np.abs(left.force).max(axis=1))
+            moving = np.abs(gradient).max(axis=1) > bound
+            if not moving.any():
+                break
+            rows, left = rows[moving], left.take(moving)
+            energy, gradient = energy[moving], gradient[moving]
+            hessian = left._hessian(x[rows], wall, active[moving])
+            step = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
+            slope = np.einsum("ni,ni->n", gradient, step)
+            size = np.ones(len(rows))
+            for _ in range(MAX_HALVINGS):
+                tried = left._state(x[rows] + size[:, None] * step, wall)[0]
+                # Rounding of the energy is no reason to stay.
+                short = tried > energy + ARMIJO * size * slope + 1e-14 * np.abs(energy)
+                if not short.any():
+                    break
+                size[short] *= 0.5
+            x[rows] += size[:, None] * step
+        return x
+
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Play:
+        """Return some of the samples."""
+        return Play(
+            self.radial, self.force[rows], self.gap[rows], self.opening[rows], self.approach[rows]
+        )
+
+    @property
+    def _centring(self) -> float:
+        return SMALL_FORCE / self.radial
+
+    def _unhindered(self) -> Array:
+        """Return the displacements with all flanges open: along the forces."""
+        ends = self.force.reshape(-1, 2, 2)
+        size = np.linalg.norm(ends, axis=-1, keepdims=True)
+        pressed = self.radial + (size - SMALL_FORCE) / (self._centring + WALLS[-1])
+        moved = np.where(size < SMALL_FORCE, size / self._centring, pressed)
+        direction = np.divide(ends, size, out=np.zeros_like(ends), where=size > 0.0)
+        return (moved * direction).reshape(-1, 4)
+
+    def _state(self, x: Array, stiffness: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return energy (n,), its gradient (n, 4) and the touching sectors at displacements x."""
+        gap = self.gap + (self.opening @ x[..., None])[..., 0]
+        flange, active = solve_contacts(self.approach, gap, None)
+        size, into, direction = self._at_walls(x)
+        wall = self._centring * x.reshape(-1, 2, 2) + stiffness * into[..., None] * direction
+        pressed = 0.5 * (self._centring * size**2 + stiffness * into**2).sum(axis=1)
+        bent = 0.5 * np.einsum("ni,nij,nj->n", flange, self.approach, flange)
+        pushed = (np.swapaxes(self.opening, -1, -2) @ flange[..., None])[..., 0]
+        energy = pressed + bent - np.einsum("ni,ni->n", self.force, x)
+        return energy, wall.reshape(-1, 4) - self.force - pushed, active
+
+    def _hessian(self, x: Array, stiffness: float, active: NDArray[np.bool_]) -> Array:
+        held = Held.of(self.approach, active).stiffness
+        hessian: Array = np.swapaxes(self.opening, -1, -2) @ held @ self.opening
+        size, into, direction = self._at_walls(x)
+        along = direction[..., :, None] * direction[..., None, :]
+        share = np.divide(into, size, out=np.zeros_like(into), where=size > 0.0)
+        normal = np.where(into > 0.0, stiffness, 0.0)[..., None, None] * along
+        across = stiffness * share[..., None, None] * (np.eye(2) - along)
+        blocks = self._centring * np.eye(2) + across + normal
+        hessian[:, :2, :2] += blocks[:, 0]
+        hessian[:, 2:, 2:] += blocks[:, 1]
+        return hessian
+
+    def _at_walls(self, x: Array) -> tuple[Array, Array, Array]:
+        """Return how far each end is off the middle, how far in its wall, and its direction."""
+        ends = x.reshape(-1, 2, 2)
+        size = np.linalg.norm(ends, axis=-1)
+        direction = np.divide(
+            ends, size[..., None], out=np.zeros_like(ends), where=size[..., None] > 0.0
+        )
+        return size, np.maximum(size - self.radial, 0.0), direction
