@@ -55,12 +55,14 @@ def draw_page(scale: Scale, entries: dict[str, Entry], path: Path) -> None:
         turned = panel.twinx()
         turn = np.degrees(np.linalg.norm(change[:, 3:], axis=1)) * 1e3
         turned.plot(scale.time_s, turn, color="0.6", linewidth=0.7, label="φ")
+        # From zero: a constant turn would show its rounding else.
+        turned.set_ylim(0.0, 1.1 * float(turn.max()) + 1e-3)
         turned.set_ylabel("φ [mdeg]", fontsize=7, color="0.5")
         for side in (panel, turned):
             side.tick_params(labelsize=6)
             side.ticklabel_format(useOffset=False)
         panel.set_title(
-            f"{effect}@{hidden.component}\n{hidden.magnitude:.3g} {entry.unit.strip('-')}, {note}",
+            f"{effect}@{hidden.component}\n{hidden.magnitude:.3g} {entry.unit}, {note}",
             fontsize=7,
         )
         progress(number + 1, len(entries))

@@ -334,7 +334,8 @@ def resonance(d: Draw) -> Law:
 
 def oil_film(d: Draw) -> Law:
     """Return a floating pin."""
-    return OilFilm(d.component, d.seat, d.magnitude, 0.3)
+    lift = d.magnitude * unit(np.cross(d.seat.axis, d.direction()))
+    return OilFilm(d.component, d.seat, lift, 0.3)
 
 
 def head_change(d: Draw) -> Law:

@@ -10,7 +10,7 @@ from wrist_stiffness.mechanism.vectors import cross, dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.joint_friction import BODIES_JOINED
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Law, at_component
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -66,7 +66,7 @@ class Resonance(Law):
 
 
 class OilFilm(Law):
-    """A turning pin floats up on its lubricant, sideways to the force that presses it down.
+    """A turning pin floats up on its lubricant, away from the groove that feeds it.
 
     Parameters
     ----------
@@ -74,40 +74,30 @@ class OilFilm(Law):
         Passive joint.
     seat : Seat
         Of its bushing.
-    lift : float
-        Greatest lift [m].
+    lift : (3,) float
+        Greatest lift, across the axis with the wrist at home [m].
     speed : float
         Turning speed at which three quarters of it are there [rad/s].
     """
 
-    def __init__(self, joint: str, seat: Seat, lift: float, speed: float) -> None:
-        self._joint = joint
-        self._seat, self._lift, self._speed = seat, lift, speed
-        self._state: tuple[float, Array] | None = None
+    def __init__(self, joint: str, seat: Seat, lift: Array, speed: float) -> None:
+        self._joint, self._seat, self._lift, self._speed = joint, seat, lift, speed
+        self._past: tuple[float, float] | None = None
 
-    @property
-    def flows(self) -> str:
-        """The joint."""
-        return self._joint
-
-    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+    def screws(self, block: Block) -> Array:
         """Lift by the speed of the joint's turn."""
-        joint = self._joint
-        inner, outer = BODIES_JOINED[joint]
+        inner, outer = BODIES_JOINED[self._joint]
         bodies = block.configuration.rotations
         relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
         trace = np.einsum("nii->n", relative)
         turn = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
-        before, past = (block.time_s[0], turn[0]) if self._state is None else self._state
+        before, past = (block.time_s[0], turn[0]) if self._past is None else self._past
         steps = np.diff(block.time_s, prepend=before)
         moved = np.diff(turn, prepend=past)
         rate = np.divide(moved, steps, out=np.zeros_like(moved), where=steps > 0.0)
-        to_origin = self._seat.to_origin(block.rotation(joint))
-        push = np.einsum("nji,nj->ni", to_origin, wrench)[:, :3]
-        size = np.sqrt(dot(push, push) + 1e-4)[:, None]
-        side = cross(np.broadcast_to(self._seat.axis, push.shape), push) / size
-        lift = self._lift * np.tanh(np.abs(rate) / self._speed)[:, None]
-        screw = np.concatenate([lift * side, np.zeros_like(side)], axis=-1)
-        if remember:
-            self._state = float(block.time_s[-1]), turn[-1]
-        return np.einsum("nij,nj->ni", to_origin, screw)
+        self._past = float(block.time_s[-1]), float(turn[-1])
+        home = np.concatenate([self._lift, np.zeros(3)])
+        screw = self._seat.to_origin(block.rotation(self._joint)) @ home
+        return at_component(
+            block, self._joint, np.tanh(np.abs(rate) / self._speed)[:, None] * screw
+        )
