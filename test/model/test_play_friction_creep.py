@@ -232,3 +232,16 @@ def test_unloaded_creep_comes_back(weightless, make):
     gone = session.advance(Sample(40.0, theta, Load(np.zeros(6)))).twist
     assert np.linalg.norm(kept) > 1e-8
     assert np.linalg.norm(gone) < 1e-9 * np.linalg.norm(kept)
+
+
+def test_uncertain_width_of_a_gap_shows_after_a_motion(model, make):
+    """Half the width's uncertainty behind, as a turn of the motor; only a memory can know it."""
+    loaded = model.with_effects(make.effect("backlash@motor_1", width_mdeg=(40.0, 10.0)))
+    session, plain = loaded.session(), model.session()
+    for time, angle in ((0.0, 0.0), (1.0, 5.0), (2.0, 10.0)):
+        sample = Sample(time, np.radians([angle, 5.0]), Load(np.zeros(6)))
+        unsure, sure = session.advance(sample), plain.advance(sample)
+    column = model.table.mechanism.jacobian(sure.configuration)[:, 0]
+    added = unsure.covariance[3:, 3:] - sure.covariance[3:, 3:]
+    expected = np.outer(column, column) * np.radians(5e-3) ** 2
+    assert np.allclose(added, expected, atol=0.02 * np.abs(expected).max())
