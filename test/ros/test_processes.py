@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -110,7 +111,10 @@ def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path
     assert differing <= int(late[-1])
 
 
-def test_the_cell_stops_when_it_is_interrupted(tmp_path):
+@pytest.mark.parametrize(
+    ("ending", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)]
+)
+def test_a_signal_ends_the_cell_with_all_its_nodes(tmp_path, ending, code):
     path = tmp_path / "interrupted.mcap"
     with subprocess.Popen(
         [sys.executable, "-m", "wrist_stiffness", "cell", "--record", str(path)],
@@ -122,13 +126,16 @@ def test_the_cell_stops_when_it_is_interrupted(tmp_path):
             while not list(tmp_path.glob(f".{path.name}.*")) and time.monotonic() < end_s:
                 assert process.poll() is None
                 os.sched_yield()
-            process.send_signal(signal.SIGINT)
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            process.send_signal(ending)
             _, errors = process.communicate(timeout=DEADLINE_S)
         finally:
             process.kill()
-    assert process.returncode == 130
+    assert process.returncode == code
     assert "Traceback" not in errors
     assert open_recording(path).damage == ""
+    assert len(children) == 5
+    assert [child for child in children if Path(f"/proc/{child}").exists()] == []
 
 
 def test_the_cell_says_which_node_failed(tmp_path, capfd):

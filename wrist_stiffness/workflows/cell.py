@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from types import FrameType
+from typing import NoReturn
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
@@ -47,7 +50,7 @@ def run_cell(
     seed: int = 0,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Run predictor, corrector and virtual cell until the motion is over.
+    """Run predictor, corrector and virtual cell until the motion is over; in the main thread.
 
     The same motion runs twice, first with the corrector off and then with it on, so that before
     and after can be compared; the notes in the recording say where the second one begins.
@@ -123,6 +126,8 @@ def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.P
         **os.environ,
     }
     running: dict[str, subprocess.Popen[bytes]] = {}
+    # By itself SIGTERM would end this process without the `finally`, and leave the nodes behind.
+    previous = signal.signal(signal.SIGTERM, _leave)
     try:
         for node in nodes:
             # In a session of their own: an interrupt reaches them once, from here.
@@ -139,3 +144,8 @@ def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.P
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        signal.signal(signal.SIGTERM, previous)
+
+
+def _leave(number: int, frame: FrameType | None) -> NoReturn:
+    raise SystemExit(128 + number)
