@@ -24,7 +24,8 @@ from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.operators import pack
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
-from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.lookup.verification import interpolation_errors, unseen_poses
+from wrist_stiffness.mechanism.components import ELASTIC, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
 from wrist_stiffness.mechanism.kinematics import Configuration
@@ -36,9 +37,6 @@ GRIDS = (5, 9, 13, 17, 21, 25, 31, 37)
 
 DOMAIN_FACTOR = 4.0
 """The whole map may err by this times the tolerance of the operative workspace."""
-
-UNSEEN_POSES = 400
-UNSEEN_SEED = 20150226
 
 MESH_FACTORS = (2.25, 1.5, 1.0)
 """Element sizes of the mesh study over those of the table, which is the last."""
@@ -184,63 +182,6 @@ def _on_grid(header: TableHeader, components: ElasticComponents, geometry: Geome
             configuration, contact_operators(configuration, components, np.zeros(3)), geometry
         ),
     )
-
-
-def unseen_poses(workspace: Workspace, count: int = UNSEEN_POSES) -> Array:
-    """Return random poses in the map domain that no grid contains, (count, 2) [rad]."""
-    rng = np.random.default_rng(UNSEEN_SEED)
-    lower, upper = workspace.rectangle
-    poses = rng.uniform(lower, upper, (4 * count, 2))
-    return poses[workspace.domain(poses)][:count]
-
-
-def interpolation_errors(table: Table) -> dict[str, Any]:
-    """Compare the table's splines with the closed form at poses they never saw.
-
-    Parameters
-    ----------
-    table : Table
-        With its grid.
-
-    Returns
-    -------
-    dict
-        Largest error relative to the local value, by region and quantity: `predicted` through the
-        spline of the operators with contact solved, `map` through the spline of s and phi itself
-        (the paper's way), and the leave-one-out error of the map.
-    """
-    workspace = table.workspace
-    poses = unseen_poses(workspace)
-    configuration = table.mechanism.forward(poses)
-    # Columns 3 and 4 of the map are |s| and phi.
-    exact = rated_map(
-        configuration, table.operators_at(configuration, "closed_form"), table.geometry
-    )[:, 3:]
-    predicted = rated_map(
-        configuration, table.operators_at(configuration, "spline"), table.geometry
-    )[:, 3:]
-    load_only = rated_map(
-        configuration,
-        contact_operators(configuration, table.components, np.zeros(3)),
-        table.geometry,
-    )[:, 3:]
-    mapped = table.map_spline(poses)[:, 3:]
-    operative = workspace.operative(poses)
-    leave_one_out = np.abs(table.map_spline.leave_one_out()[:, 3:]) / table.map_values[:, 3:]
-    inside = workspace.operative(table.nodes)
-    return {
-        "unseen_poses": len(poses),
-        "predicted": _by_region(np.abs(predicted - exact) / exact, operative),
-        "map": _by_region(np.abs(mapped - load_only) / load_only, operative),
-        "leave_one_out": _by_region(leave_one_out, inside),
-    }
-
-
-def _by_region(relative: Array, operative: np.ndarray) -> dict[str, dict[str, float]]:
-    return {
-        region: {name: float(np.max(rows[:, i])) for i, name in enumerate(("s", "phi"))}
-        for region, rows in (("operative", relative[operative]), ("domain", relative))
-    }
 
 
 def _worst(errors: Mapping[str, Any], region: str) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.lookup.verification import interpolation_errors, unseen_poses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry_file import load_geometry
 
@@ -65,9 +66,6 @@ def check(
     TableError, GeometryError
         If a file cannot be read at all.
     """
-    from wrist_stiffness.fem.solids import MeshSettings
-    from wrist_stiffness.fem.sweep import BuildSettings, build_table, interpolation_errors
-
     table = load_table(path)
     findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]
     if geometry is not None:
@@ -95,6 +93,10 @@ def check(
                 )
             )
     if rebuild:
+        # Only this needs the mesher.
+        from wrist_stiffness.fem.solids import MeshSettings
+        from wrist_stiffness.fem.sweep import BuildSettings, build_table
+
         header = table.header
         sizes = MeshSettings(**{key: 1e-3 * v for key, v in header.mesh["sizes_mm"].items()})
         settings = BuildSettings(
@@ -124,8 +126,6 @@ def _difference(old: Array, new: Array) -> float:
 
 
 def _definiteness(table: Table) -> Finding:
-    from wrist_stiffness.fem.sweep import unseen_poses
-
     configuration = table.mechanism.forward(unseen_poses(table.workspace))
     lowest = min(
         float(
