@@ -194,7 +194,7 @@ def smooth_field(table: Observations, rng: np.random.Generator, n_out: int) -> n
     """Random smooth functions of pose and load with unit mean square, (n, n_out)."""
     names = ("q1", "q2", "q3", "fx", "fy", "fz")
     x = np.column_stack([table.covariate(name) for name in names])
-    x = x / x.std(axis=0)
+    x = x / np.where(x.std(axis=0) > 0, x.std(axis=0), 1.0)
     waves = np.cos(x @ rng.normal(0, 0.7, (6, 12)) + rng.uniform(0, 2 * np.pi, 12))
     field = waves @ rng.normal(size=(12, n_out))
     return field / np.sqrt(np.mean(field**2, axis=0))
@@ -311,13 +311,15 @@ def hide(
             columns = effect.evaluate(table, shape)
         else:
             columns = np.stack(effect(table, pose_of(table), ()), axis=2)
-        plausible = np.linalg.norm(columns, axis=(0, 1))
+        length = np.linalg.norm(columns, axis=(0, 1))
+        plausible = np.where(length > 0, length, 1.0)
         change = (columns / plausible) @ (
             rng.choice([-1, 1], columns.shape[2]) * rng.uniform(0.5, 1.0, columns.shape[2])
         )
         change = change * (1 + law_error * smooth_field(table, rng, 6))
         white = (change - change.mean(axis=0)) / NOISE
-        values += change * size / np.sqrt(np.mean(white**2))
+        strength = np.sqrt(np.mean(white**2))
+        values += change * (size / strength if strength > 0 else 1.0)
     for nuisance in base():
         columns = nuisance.columns(table)
         values += columns @ rng.normal(0, 1e-4, columns.shape[2])
