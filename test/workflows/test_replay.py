@@ -7,12 +7,15 @@ from rosbags.typesys import Stores, get_typestore
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import (
+    Float64,
     Header,
     JointState,
     String,
+    Temperature,
     Vector3,
     Wrench,
     WrenchStamped,
@@ -130,6 +133,88 @@ def test_recording_of_rosbags_with_foreign_names(tmp_path, capsys):
         for i in range(5)
     ]
     assert np.array_equal(shifts(tmp_path / "out"), np.array(wanted))
+
+
+# Of the bushing the temperature counts, of the platform the humidity.
+WARM_AND_HUMID = """schema: 1
+name: warm and humid
+table: {path: TABLE}
+effects:
+- effect: thermal_softening
+  component: joint_1
+  parameters: {softening_percent_per_K: 5.0}
+- effect: formula
+  id: swelling
+  component: platform
+  direction: [0, 0, 1, 0, 0, 0]
+  expression: "growth_um * humidity"
+  covariates: [humidity]
+  parameters: {growth_um: 0.1}
+"""
+
+
+@pytest.fixture
+def warm_and_humid(tmp_path):
+    path = tmp_path / "model.yaml"
+    path.write_text(
+        WARM_AND_HUMID.replace("TABLE", str(shipped_file("precomputed/palmieri2015.npz")))
+    )
+    return path
+
+
+# t [ms]       0        10      20           30      35        40
+# load        -1 N
+# joint_1     30 degC          40 degC
+# humidity     50 %            70 %                  90 %
+# joints                10                   30                40
+def warm_timeline(covariate="/covariates/humidity"):
+    return [
+        (0, "/load_estimate", load(0, (0.0, 0.0, -1.0))),
+        (0, "/temperatures", Temperature(Header(0, "joint_1"), 30.0)),
+        (0, covariate, Float64(50.0)),
+        (10, "/joint_states", joints(10 * MILLISECOND, (5.0, 10.0))),
+        (20, "/temperatures", Temperature(Header(20 * MILLISECOND, "joint_1"), 40.0)),
+        (20, covariate, Float64(70.0)),
+        (30, "/joint_states", joints(30 * MILLISECOND, (5.0, 10.0))),
+        (35, covariate, Float64(90.0)),
+        (40, "/joint_states", joints(40 * MILLISECOND, (5.0, 10.0))),
+    ]
+
+
+@pytest.mark.parametrize("covariate", ["/covariates/humidity", "/hygrometer"])
+def test_temperatures_and_covariates_are_heard_as_by_the_nodes(tmp_path, warm_and_humid, covariate):
+    source = write(tmp_path / "in", warm_timeline(covariate))
+    names = {} if covariate.startswith("/covariates") else {"/covariates/humidity": covariate}
+    summary = replay(source, warm_and_humid, tmp_path / "out", topics=names)
+    assert not summary.warnings
+    wanted = (
+        load_model(warm_and_humid)
+        .batch(
+            Block(
+                time=np.array([0.010, 0.030, 0.040]),
+                theta=np.tile(np.radians((5.0, 10.0)), (3, 1)),
+                load=np.tile([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], (3, 1)),
+                temperatures={"joint_1": np.array([30.0, 40.0, 40.0])},
+                covariates={"humidity": np.array([50.0, 70.0, 90.0])},
+            )
+        )
+        .twist
+    )
+    # Shift and translation of a twist differ by the angle times itself, 1e-4 of it; the humidity
+    # alone moves the platform by 5 um.
+    assert np.allclose(shifts(tmp_path / "out"), wanted[:, :3], atol=1e-9)
+
+
+def test_what_the_model_had_to_leave_out_is_said(tmp_path, warm_and_humid, capsys):
+    timeline = [row for row in warm_timeline() if row[1] in ("/load_estimate", "/joint_states")]
+    # Somebody else's topic of that name is no thermometer; no node would hear it.
+    timeline.append((50, "/temperatures", String("warm")))
+    source = write(tmp_path / "in", timeline)
+    summary = replay(source, warm_and_humid, tmp_path / "out")
+    assert sorted(summary.warnings.values()) == [3, 3]
+    command = ["replay", str(source), "-o", str(tmp_path / "again")]
+    assert main([*command, "--model", str(warm_and_humid)]) == 0
+    assert "3 predictions: thermal_softening@joint_1: " in capsys.readouterr().out
 
 
 FAULTS = {

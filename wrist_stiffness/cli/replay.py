@@ -82,6 +82,8 @@ def _run(arguments: argparse.Namespace) -> int:
         print(f"input is damaged: {summary.damage}")
     if summary.replaced:
         print(f"{summary.replaced} outputs of an earlier run in the input left out")
+    for warning, count in summary.warnings.most_common():
+        print(f"{count} predictions: {warning}")
     for reason, count in summary.refused.most_common():
         print(f"{count} refused, the first: {reason}")
     print(f"written: {arguments.output}")
@@ -93,6 +95,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 "predictions": summary.predictions,
                 "commands": summary.commands,
                 "corrections": summary.corrections,
+                "warnings": dict(summary.warnings),
                 "refused": dict(summary.refused),
                 "damage": summary.damage,
             },

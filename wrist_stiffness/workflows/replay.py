@@ -19,6 +19,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.messages import (
+    Float64,
     Float64MultiArray,
     Header,
     JointState,
@@ -28,11 +29,19 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovariance,
     PoseWithCovarianceStamped,
     Quaternion,
+    Temperature,
     WrenchStamped,
 )
 from wrist_stiffness.recording.reader import Recording, open_recording
-from wrist_stiffness.recording.topics import JOINT_STATES, LOAD_ESTIMATE, MOTOR_COMMANDS
+from wrist_stiffness.recording.topics import (
+    COVARIATES,
+    JOINT_STATES,
+    LOAD_ESTIMATE,
+    MOTOR_COMMANDS,
+    TEMPERATURES,
+)
 from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.workflows.signals_ahead import SignalsAhead
 
 POSE_ERROR_PREDICTED = "/pose_error_predicted"
 POSE_ERROR_RESIDUAL = "/pose_error_residual"
@@ -45,8 +54,16 @@ OUTPUTS = (
     MOTOR_POSITIONS_CORRECTED,
 )
 
-LOOKAHEAD_NS = 1_000_000_000
-"""Loads are read this far ahead: by stamp they may belong to a joint state logged before them."""
+TYPES: dict[str, type[Message]] = {
+    JOINT_STATES: JointState,
+    LOAD_ESTIMATE: WrenchStamped,
+    MOTOR_COMMANDS: JointState,
+    TEMPERATURES: Temperature,
+}
+"""Topics that are used, besides those below `/covariates/`."""
+
+REQUIRED = (JOINT_STATES, LOAD_ESTIMATE)
+MOTOR_TOPICS = (JOINT_STATES, MOTOR_COMMANDS)
 
 PROGRESS_EVERY = 500
 
@@ -69,6 +86,9 @@ class ReplaySummary:
     refused : Counter
         Samples without a result. Reasons that differ only in their numbers are one, told by the
         first of them.
+    warnings : Counter
+        Predictions by what the model had to leave out of them, such as an effect whose temperature
+        the recording lacks.
     replaced : int
         Outputs of an earlier run in the input, left out.
     shift_norm_um, phi_mdeg : list of float
@@ -82,6 +102,7 @@ class ReplaySummary:
     commands: int = 0
     corrections: int = 0
     refused: Counter[str] = field(default_factory=Counter)
+    warnings: Counter[str] = field(default_factory=Counter)
     replaced: int = 0
     shift_norm_um: list[float] = field(default_factory=list)
     phi_mdeg: list[float] = field(default_factory=list)
@@ -136,15 +157,14 @@ def replay(
     settings = settings or StreamSettings()
     error_model = load_model(model)
     source = open_recording(recording)
-    names = {
-        name: (topics or {}).get(name, name)
-        for name in (JOINT_STATES, LOAD_ESTIMATE, MOTOR_COMMANDS)
+    names = _actual_names(source, topics or {})
+    signals = {
+        actual: standard for standard, actual in names.items() if standard not in MOTOR_TOPICS
     }
-    _require_topics(source, names)
     summary = ReplaySummary()
     predicting = PredictionStream(error_model, settings)
     correcting = CorrectionStream(error_model, settings, enabled=True)
-    loads = _LoadsAhead(source, names[LOAD_ESTIMATE], predicting, correcting, summary)
+    ahead = SignalsAhead(source, signals, (predicting, correcting), summary.refuse)
     total = sum(topic.count for topic in source.topics)
     with RecordingWriter(output, overwrite=overwrite) as writer:
         for done, raw in enumerate(source.raw_messages()):
@@ -155,9 +175,9 @@ def replay(
                 summary.replaced += 1
                 continue
             writer.write_raw(raw.channel, raw.payload, raw.log_time_ns)
-            if topic not in (names[JOINT_STATES], names[MOTOR_COMMANDS]):
+            if topic not in (names[JOINT_STATES], names.get(MOTOR_COMMANDS)):
                 continue
-            loads.read_until(raw.log_time_ns + LOOKAHEAD_NS)
+            ahead.read_for(raw.log_time_ns)
             try:
                 state = decode(JointState, raw.payload)
                 answer = _predict if topic == names[JOINT_STATES] else _correct
@@ -176,62 +196,32 @@ def replay(
     return summary
 
 
-def _require_topics(source: Recording, names: Mapping[str, str]) -> None:
+def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str]:
+    """Return the actual by the standard name of every topic that is there to be used."""
     present = {topic.name: topic for topic in source.topics}
-    for standard, wanted in (
-        (JOINT_STATES, JointState),
-        (LOAD_ESTIMATE, WrenchStamped),
-        (MOTOR_COMMANDS, JointState),
-    ):
-        topic = present.get(names[standard])
+    covariates = (name for name in (*present, *chosen) if name.startswith(COVARIATES))
+    types: dict[str, type[Message]] = {**TYPES, **dict.fromkeys(covariates, Float64)}
+    names = {}
+    for standard, wanted in types.items():
+        actual = chosen.get(standard, standard)
+        topic = present.get(actual)
         if topic is None:
-            if names[standard] == MOTOR_COMMANDS:
+            if standard not in REQUIRED and standard not in chosen:
                 continue
             found = ", ".join(present) or "none"
             raise RecordingError(
-                f"{source.path}: no topic {names[standard]} (it has {found}); "
+                f"{source.path}: no topic {actual} (it has {found}); "
                 f"name it with --topic {standard}:=ACTUAL"
             )
         if topic.ros_type != wanted.ros_type:
+            if standard not in MOTOR_TOPICS and standard not in (*REQUIRED, *chosen):
+                # Somebody else's topic of that name: a node would not hear it either.
+                continue
             raise RecordingError(
                 f"{source.path}: {topic.name} is {topic.ros_type}, not {wanted.ros_type}"
             )
-
-
-class _LoadsAhead:
-    """Feeds loads to the streams, a fixed time ahead of the joint states."""
-
-    def __init__(
-        self,
-        source: Recording,
-        topic: str,
-        predicting: PredictionStream,
-        correcting: CorrectionStream,
-        summary: ReplaySummary,
-    ) -> None:
-        self._messages: Iterator[tuple[str, int, Message]] = source.messages([topic])
-        self._next = next(self._messages, None)
-        self._streams = (predicting, correcting)
-        self._summary = summary
-
-    def read_until(self, log_time_ns: int) -> None:
-        while self._next is not None and self._next[1] <= log_time_ns:
-            topic, _, message = self._next
-            self._next = next(self._messages, None)
-            if not isinstance(message, WrenchStamped):
-                self._summary.refuse(topic, f"{message.ros_type} is no WrenchStamped")
-                continue
-            force, torque = message.wrench.force, message.wrench.torque
-            try:
-                for stream in self._streams:
-                    stream.loads.add(
-                        message.header.stamp_ns,
-                        message.header.frame_id,
-                        (force.x, force.y, force.z),
-                        (torque.x, torque.y, torque.z),
-                    )
-            except WristError as error:
-                self._summary.refuse(topic, error)
+        names[standard] = actual
+    return names
 
 
 def _predict(
@@ -241,6 +231,7 @@ def _predict(
     sample = predicting.on_joint_state(state.header.stamp_ns, state.name, state.position)
     prediction = sample.prediction
     summary.predictions += 1
+    summary.warnings.update(prediction.warnings)
     summary.shift_norm_um.append(1e6 * prediction.shift_norm)
     summary.phi_mdeg.append(1e3 * float(np.degrees(prediction.phi)))
     header = Header(state.header.stamp_ns, BASE_FRAME)
