@@ -53,6 +53,37 @@ def test_wrist_error_is_one_line_on_stderr(capsys):
     assert (out, err) == ("", "wrist-stiffness: error: link_1: radius_mm is -3, must be > 0\n")
 
 
+def test_line_break_in_a_name_stays_within_the_line(capsys):
+    assert main(TRY, [command(raising(GeometryError("a\nb: cannot be read")))]) == 2
+    assert capsys.readouterr().err == "wrist-stiffness: error: a\\nb: cannot be read\n"
+
+
+PRINTING = (
+    "import sys; from types import SimpleNamespace as S; from wrist_stiffness.cli.main import "
+    "main\n"
+    "run = lambda arguments: print('answer') or 0\n"
+    "add = lambda commands: commands.add_parser('try').set_defaults(run=run)\n"
+    "sys.exit(main(['try'], [S(add_parser=add)]))\n"
+)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_full_disk_behind_stdout_is_one_line():
+    with open("/dev/full", "w") as full:
+        ran = subprocess.run([sys.executable, "-c", PRINTING], stdout=full, stderr=subprocess.PIPE)
+    assert ran.returncode == 2
+    assert ran.stderr == (
+        b"wrist-stiffness: error: the output cannot be written: No space left on device\n"
+    )
+
+
+def test_closed_stdout_is_quiet():
+    ran = subprocess.run(
+        ["sh", "-c", 'exec "$0" -c "$1" >&-', sys.executable, PRINTING], stderr=subprocess.PIPE
+    )
+    assert (ran.returncode, ran.stderr) == (0, b"")
+
+
 def test_a_fault_of_the_program_is_not_hidden():
     with pytest.raises(ZeroDivisionError):
         main(TRY, [command(raising(ZeroDivisionError()))])

@@ -1,6 +1,7 @@
 """The command `wrist-stiffness`: runs one command, turns errors into exit codes."""
 
 import argparse
+import errno
 import os
 import sys
 from collections.abc import Iterable, Sequence
@@ -99,21 +100,37 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
     try:
         code: int = arguments.run(arguments)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # None where the caller closed it
+            sys.stdout.flush()
     except WristError as error:
-        print(f"{PROG}: error: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return _refuse(str(error))
     except ModuleNotFoundError as error:
         library = str(error.name).partition(".")[0]
         if library not in EXTRA_OF:
             raise
         advice = f"pip install 'wrist_stiffness[{EXTRA_OF[library]}]'"
-        print(f"{PROG}: error: {library} is not installed; {advice}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return _refuse(f"{library} is not installed; {advice}")
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Python flushes stdout once more at exit, which would print a traceback.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return EXIT_PIPE_CLOSED
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        # Workflows turn errors of their own files into a WristError: this one is of stdout.
+        _discard_output()
+        return _refuse(f"the output cannot be written: {error.strerror}")
     return code
+
+
+def _refuse(reason: str) -> int:
+    # A file's name may hold a line break.
+    line = reason.replace("\n", "\\n")
+    print(f"{PROG}: error: {line}", file=sys.stderr)
+    return EXIT_BAD_INPUT
+
+
+def _discard_output() -> None:
+    # Python flushes stdout once more at exit, which would print a traceback.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
