@@ -145,3 +145,15 @@ def test_a_missing_parent_folder_is_named(tmp_path):
         RecordingWriter(tmp_path / "nowhere" / "bag"),
     ):
         pass
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_the_current_folder_is_no_name_for_a_recording(tmp_path, monkeypatch, overwrite):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    monkeypatch.chdir(tmp_path)
+    with (
+        pytest.raises(RecordingError, match="overwritten"),
+        RecordingWriter("", overwrite=overwrite),
+    ):
+        pass
+    assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]

@@ -61,7 +61,7 @@ class RecordingWriter:
         self.path = Path(path)
         self._overwrite = overwrite
         self._is_folder = self.path.suffix != ".mcap"
-        self._partial = self.path.with_name(f".{self.path.name}.{os.getpid()}.partial")
+        self._partial = self.path.parent / f".{self.path.name}.{os.getpid()}.partial"
         self._stream: BinaryIO | None = None
         self._channels: dict[str, tuple[Channel, int]] = {}
         self._counts: Counter[str] = Counter()
