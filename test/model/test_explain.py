@@ -130,6 +130,8 @@ def test_command_prints_a_table_and_writes_json(model_path, tmp_path, capsys):
         (["--load", "1"], "--load takes 3 or 6 numbers, not 1"),
         (["--measured", "0", "0", "0", "0", "0", "0", "2"], "length 2.0000, not 1"),
         (["--measured", "nan", "0", "0", "0", "0", "0", "1"], "all finite"),
+        (["--measured", "300", "0", "0", "0", "0", "0", "1"], "more than 100 mm"),
+        (["--temperature", "link1=25"], "temperature of 'link1': no such place"),
         (["--temperature", "link_1=warm"], "--temperature link_1=warm: write NAME=NUMBER"),
         (["--load", "0", "0", "-9"], "9 N"),
     ],

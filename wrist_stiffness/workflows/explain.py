@@ -16,9 +16,15 @@ from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.model.block import Load, Sample
 from wrist_stiffness.model.budget import Budget, budget
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.places import BODY
 
 QUATERNION_TOLERANCE = 1e-3
 """A typed quaternion is made unit if its length is this close to 1."""
+
+FARTHEST_MM = 100.0
+"""A measured point farther from O is a unit mistake: the wrist is not much larger itself."""
+
+TEMPERATURES = (*BODY, "ambient")
 
 UM, MDEG = 1e6, 180e3 / np.pi
 
@@ -136,6 +142,11 @@ def explain(
     WristError
         If the model cannot be read, or a value is out of range.
     """
+    for name in temperatures or {}:
+        if name not in TEMPERATURES:
+            raise InputError(
+                f"temperature of {name!r}: no such place; known are {', '.join(TEMPERATURES)}"
+            )
     error_model = load_model(model)
     sample = Sample(
         0.0,
@@ -171,11 +182,17 @@ def measured_twist(pose: Sequence[float], platform: Array) -> Array:
     Raises
     ------
     InputError
-        If a number is not finite or the quaternion is not of unit length.
+        If a number is not finite, the point is farther from O than any wrist bends, or the
+        quaternion is not of unit length.
     """
     values = np.array(pose, dtype=float)
     if values.shape != (7,) or not np.isfinite(values).all():
         raise InputError(f"measured pose {values.tolist()}: needs x y z qx qy qz qw, all finite")
+    if np.abs(values[:3]).max() > 1e-3 * FARTHEST_MM:
+        millimetres = (1e3 * values[:3]).tolist()
+        raise InputError(
+            f"measured pose: O at {millimetres} mm is more than {FARTHEST_MM:g} mm from its place"
+        )
     length = float(np.linalg.norm(values[3:]))
     if abs(length - 1.0) > QUATERNION_TOLERANCE:
         raise InputError(
