@@ -44,3 +44,10 @@ def test_blanks_are_left_out(rng):
     first = contrasts(table.with_values(values))[0]
     assert first.condition == "approach"
     assert first.size == pytest.approx(2.5, abs=4 * first.uncertainty)
+
+
+def test_a_slope_is_told_over_two_standard_deviations(rng):
+    first = contrasts(observed(rng, lambda c: 0.2 * c["load"]))[0]
+    assert first.condition == "load"
+    # 0.2 um per newton over twice 10 N; the spread of 300 loads is known to 4 %.
+    assert first.size == pytest.approx(4.0, rel=0.12)
