@@ -38,7 +38,7 @@ GRIDS = (5, 9, 13, 17, 21, 25, 31, 37)
 DOMAIN_FACTOR = 4.0
 """The whole map may err by this times the tolerance of the operative workspace."""
 
-MESH_FACTORS = (2.25, 1.5, 1.0)
+MESH_FACTORS = (1.5625, 1.25, 1.0)
 """Element sizes of the mesh study over those of the table, which is the last."""
 
 MESH_POSES = 12

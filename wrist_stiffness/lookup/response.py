@@ -72,7 +72,8 @@ def respond(
         force, closed = solve_contact(operators.approach, gap, active)
     else:
         m = gap.shape[-1]
-        force, closed = solve_contacts(operators.approach.reshape(-1, m, m), gap.reshape(-1, m))
+        n = int(np.prod(gap.shape[:-1]))
+        force, closed = solve_contacts(operators.approach.reshape(n, m, m), gap.reshape(n, m))
         force, closed = force.reshape(gap.shape), closed.reshape(gap.shape)
     moved = free + np.einsum("...im,...m->...i", operators.force_twist, force)
     return Response(moved, force, closed)

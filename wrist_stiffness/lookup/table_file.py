@@ -33,6 +33,9 @@ from wrist_stiffness.mechanism.components import (
 SCHEMA = 1
 MAGIC = "wrist_stiffness table"
 
+ZIP = b"PK"
+"""How the archive that is an `.npz` file begins."""
+
 UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; moment) at O in F"
 
 
@@ -108,8 +111,13 @@ def load_table(path: str | Path) -> Table:
     """
     try:
         # Opened here, because numpy leaves a damaged file open.
-        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            arrays = {key: archive[key] for key in archive.files}
+        with open(path, "rb") as stream:
+            # NumPy would take any other file for a pickle, and advise to trust it.
+            if stream.read(len(ZIP)) != ZIP:
+                raise TableError(f"{path}: damaged or not a table: not an .npz file")
+            stream.seek(0)
+            with np.load(stream, allow_pickle=False) as archive:
+                arrays = {key: archive[key] for key in archive.files}
     except FileNotFoundError as error:
         raise TableError(f"{path}: no such file") from error
     except OSError as error:

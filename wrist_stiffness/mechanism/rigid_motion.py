@@ -10,10 +10,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.vectors import cross
+from wrist_stiffness.mechanism.vectors import cross, dot, skew
 
 SMALL_ANGLE = 1e-4
 """Below this the series of the coefficients is exact to double precision."""
+
+SERIES_ANGLE = 0.02
+"""Below this three terms of a series are exact to double precision."""
+
+COSINE_OF_LARGE_ANGLE = -0.5
+"""Below this cosine the sine of the angle no longer tells the angle well."""
 
 
 def exp_twist(twist: Array) -> tuple[Array, Array]:
@@ -32,14 +38,19 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
         Where the point at O goes [m].
     """
     v, w = twist[..., :3], twist[..., 3:]
-    angle = np.sqrt(np.sum(w * w, axis=-1))[..., None]
+    angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE
     safe = np.where(small, 1.0, angle)
-    first = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
-    second = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
+    sine = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
+    first = 0.5 * np.where(small, 1.0 - angle**2 / 24.0, np.sin(safe / 2.0) / (safe / 2.0)) ** 2
+    # Here the closed form is a difference of nearly equal numbers.
+    series = 1.0 / 6.0 - angle**2 / 120.0 + angle**4 / 5040.0
+    second = np.where(angle < SERIES_ANGLE, series, (safe - np.sin(safe)) / safe**3)
     wv = cross(w, v)
     shift = v + first * wv + second * cross(w, wv)
-    return Rotation.from_rotvec(w.reshape(-1, 3)).as_matrix().reshape(*w.shape, 3), shift
+    turn = skew(w)
+    rotation: Array = np.eye(3) + sine[..., None] * turn + first[..., None] * (turn @ turn)
+    return rotation, shift
 
 
 def log_motion(rotation: Array, shift: Array) -> Array:
@@ -57,8 +68,22 @@ def log_motion(rotation: Array, shift: Array) -> Array:
     (..., 6) float
         Twist at O in F [m, rad].
     """
-    w = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec().reshape(shift.shape)
-    angle = np.sqrt(np.sum(w * w, axis=-1))[..., None]
+    # Twice the sine of the angle times the axis.
+    w = np.empty(shift.shape)
+    w[..., 0] = rotation[..., 2, 1] - rotation[..., 1, 2]
+    w[..., 1] = rotation[..., 0, 2] - rotation[..., 2, 0]
+    w[..., 2] = rotation[..., 1, 0] - rotation[..., 0, 1]
+    sine = 0.5 * np.sqrt(dot(w, w))
+    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1.0)
+    if np.any(cosine < COSINE_OF_LARGE_ANGLE):
+        # The sine fades towards a half turn; measured poses can be anywhere.
+        w = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec().reshape(shift.shape)
+    else:
+        turned = sine > 0.0
+        w *= np.where(turned, 0.5 * np.arctan2(sine, cosine) / np.where(turned, sine, 1.0), 0.5)[
+            ..., None
+        ]
+    angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE
     safe = np.where(small, 1.0, angle)
     half = 0.5 * safe
