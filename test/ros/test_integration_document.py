@@ -8,9 +8,9 @@ import pytest
 
 from wrist_stiffness.compensation.correction import correct
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.parameters import COMMON, CORRECTION, MONITOR, PREDICTION
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.ros.recorder import TOPICS
-from wrist_stiffness.ros.settings import COMMON, CORRECTION, MONITOR, PREDICTION
 
 TEXT = (Path(__file__).parents[2] / "docs/integration.md").read_text(encoding="utf-8")
 LAST_DIGIT = 0.02  # um or mdeg; the document has two digits

@@ -14,6 +14,7 @@ from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
 from wrist_stiffness.compensation.correction import Correction
+from wrist_stiffness.compensation.parameters import CORRECTION, correction_settings
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import CorrectionStream
@@ -21,7 +22,6 @@ from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run
-from wrist_stiffness.ros.settings import CORRECTION, correction_settings
 from wrist_stiffness.ros.wrist_node import WristNode
 
 

@@ -13,6 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 
 from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED, MonitorStream
+from wrist_stiffness.compensation.parameters import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
@@ -20,7 +21,6 @@ from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.parameters import values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
-from wrist_stiffness.ros.settings import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.ros.wrist_node import WristNode
 
 

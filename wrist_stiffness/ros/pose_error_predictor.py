@@ -16,6 +16,7 @@ from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.parameters import PREDICTION, prediction_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
@@ -25,7 +26,6 @@ from wrist_stiffness.ros.load_wait import LoadWait
 from wrist_stiffness.ros.markers import wrist_markers
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
-from wrist_stiffness.ros.settings import PREDICTION, prediction_settings
 from wrist_stiffness.ros.wrist_node import WristNode
 
 MICROMETRES = 1e6

@@ -9,6 +9,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from wrist_stiffness.compensation.parameters import ParameterEntry
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording import RecordingWriter, topics
 from wrist_stiffness.recording.channel import Channel, channel_of
@@ -27,7 +28,7 @@ from wrist_stiffness.recording.messages import (
     Temperature,
     WrenchStamped,
 )
-from wrist_stiffness.ros.parameters import ParameterEntry, declare
+from wrist_stiffness.ros.parameters import declare
 from wrist_stiffness.ros.qos import NOTES_QOS, RECORDING_QOS
 from wrist_stiffness.ros.run import run
 

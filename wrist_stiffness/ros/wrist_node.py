@@ -21,6 +21,12 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from wrist_stiffness.compensation.parameters import (
+    COMMON,
+    ParameterEntry,
+    model_path,
+    stream_settings,
+)
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
@@ -28,9 +34,8 @@ from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.conversions import nanoseconds, three
 from wrist_stiffness.ros.health import Health
-from wrist_stiffness.ros.parameters import ParameterEntry, declare, values_of
+from wrist_stiffness.ros.parameters import declare, values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
-from wrist_stiffness.ros.settings import COMMON, model_path, stream_settings
 
 REPORT_EVERY_S = 1.0
 

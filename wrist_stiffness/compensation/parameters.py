@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,54 @@ from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.ros.parameters import ParameterEntry, check_choices
 from wrist_stiffness.shipped import shipped_file
+
+ParameterValue = bool | int | float | str
+
+
+@dataclass(frozen=True)
+class ParameterEntry:
+    """One parameter of a node.
+
+    Parameters
+    ----------
+    name : str
+        With its unit at the end where it has one.
+    default : bool, int, float or str
+        Also says the type.
+    text : str
+        What it does, one line.
+    lower, upper : float or None
+        Range of a number.
+    choices : tuple of str
+        Allowed texts; empty for any.
+    fixed : bool
+        Can only be set at the start.
+    """
+
+    name: str
+    default: ParameterValue
+    text: str
+    lower: float | None = None
+    upper: float | None = None
+    choices: tuple[str, ...] = ()
+    fixed: bool = False
+
+
+def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) -> None:
+    """Refuse a text that is not among its choices, which ROS itself cannot check.
+
+    Raises
+    ------
+    InputError
+        With the parameter, its value and the choices.
+    """
+    for entry in entries:
+        if entry.choices and values[entry.name] not in entry.choices:
+            raise InputError(
+                f"{entry.name}: {values[entry.name]!r} is not one of {', '.join(entry.choices)}"
+            )
+
 
 SHIPPED_MODEL = "config/palmieri2015_model.yaml"
 
