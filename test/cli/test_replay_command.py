@@ -45,6 +45,7 @@ def test_summary_is_told_to_people_and_programs(recording, capsys):
         "predictions": 8,
         "commands": 10,
         "corrections": 10,
+        "warnings": {},
         "damage": "",
     }
 

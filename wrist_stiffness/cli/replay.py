@@ -42,6 +42,11 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         metavar="NAME",
         help="name of motor 1, then of motor 2 (default: motor_1_joint, motor_2_joint)",
     )
+    parser.add_argument(
+        "--parameters",
+        metavar="FILE",
+        help="the nodes' ROS 2 parameter file: sensor frames, objective, contact policy ...",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing OUT")
     parser.add_argument("--json", metavar="FILE", help="write the summary here as well")
     parser.set_defaults(run=_run)
@@ -51,17 +56,16 @@ def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.compensation.intake import MotorNames
-    from wrist_stiffness.compensation.settings import StreamSettings
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.recording.topics import parse_topic_remaps
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.parameter_file import node_settings
     from wrist_stiffness.workflows.replay import replay
 
     if len(arguments.joint) not in (0, 2):
         raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")
-    settings = StreamSettings(motors=MotorNames(*arguments.joint))
+    settings = node_settings(arguments.parameters, arguments.joint)
     summary = replay(
         arguments.recording,
         arguments.model or shipped_file("config/palmieri2015_model.yaml"),

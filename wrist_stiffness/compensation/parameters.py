@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import radians
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.shipped import shipped_file
 
 ParameterValue = bool | int | float | str
 
@@ -66,8 +64,6 @@ def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) 
                 f"{entry.name}: {values[entry.name]!r} is not one of {', '.join(entry.choices)}"
             )
 
-
-SHIPPED_MODEL = "config/palmieri2015_model.yaml"
 
 COMMON = (
     ParameterEntry("autostart", True, "configure and activate at the start", fixed=True),
@@ -320,8 +316,3 @@ def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
             lowpass_s=values["contact_lowpass_s"],
         ),
     )
-
-
-def model_path(named: str) -> Path:
-    """Return the path of the model file that a parameter names, or of the shipped one."""
-    return Path(named) if named else shipped_file(SHIPPED_MODEL)

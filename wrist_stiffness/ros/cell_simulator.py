@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool
 
 from wrist_stiffness.compensation.intake import BASE_FRAME, MotorNames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.parameters import ParameterEntry, model_path
+from wrist_stiffness.compensation.parameters import ParameterEntry
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.conversions import (
@@ -25,7 +25,7 @@ from wrist_stiffness.ros.conversions import (
     pose_message_stamped,
     wrench_message,
 )
-from wrist_stiffness.ros.parameters import declare
+from wrist_stiffness.ros.parameters import declare, model_path
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell

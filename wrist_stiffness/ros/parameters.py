@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from wrist_stiffness.compensation.parameters import ParameterEntry
+from wrist_stiffness.shipped import shipped_file
+
+SHIPPED_MODEL = "config/palmieri2015_model.yaml"
 
 
 def descriptor(entry: ParameterEntry) -> ParameterDescriptor:
@@ -51,3 +55,8 @@ def declare(node: Node, entries: Sequence[ParameterEntry]) -> None:
 def values_of(node: Node, entries: Sequence[ParameterEntry]) -> Mapping[str, Any]:
     """Return the present values by name."""
     return {entry.name: node.get_parameter(entry.name).value for entry in entries}
+
+
+def model_path(named: str) -> Path:
+    """Return the path of the model file that a parameter names, or of the shipped one."""
+    return Path(named) if named else shipped_file(SHIPPED_MODEL)

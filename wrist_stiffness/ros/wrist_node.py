@@ -24,7 +24,6 @@ from std_srvs.srv import Trigger
 from wrist_stiffness.compensation.parameters import (
     COMMON,
     ParameterEntry,
-    model_path,
     stream_settings,
 )
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -34,7 +33,7 @@ from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.conversions import nanoseconds, three
 from wrist_stiffness.ros.health import Health
-from wrist_stiffness.ros.parameters import declare, values_of
+from wrist_stiffness.ros.parameters import declare, model_path, values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 
 REPORT_EVERY_S = 1.0

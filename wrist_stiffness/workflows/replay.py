@@ -41,6 +41,7 @@ from wrist_stiffness.recording.topics import (
     TEMPERATURES,
 )
 from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.workflows.parameter_file import node_settings
 from wrist_stiffness.workflows.signals_ahead import SignalsAhead
 
 POSE_ERROR_PREDICTED = "/pose_error_predicted"
@@ -119,7 +120,7 @@ def replay(
     recording: str | Path,
     model: str | Path,
     output: str | Path,
-    settings: StreamSettings | None = None,
+    settings: tuple[StreamSettings, StreamSettings] | None = None,
     topics: Mapping[str, str] | None = None,
     overwrite: bool = False,
     progress: Progress = lambda done, of: None,
@@ -134,7 +135,7 @@ def replay(
         Model file.
     output : path
         Folder or `.mcap` file to write: the input, plus the outputs that the nodes would have sent.
-    settings : StreamSettings, optional
+    settings : (StreamSettings, StreamSettings), optional
         As the nodes'; the defaults if None.
     topics : mapping, optional
         Actual by standard topic name.
@@ -154,7 +155,7 @@ def replay(
         If the model or the recording cannot be used, or no joint state at all can be predicted;
         then nothing is written.
     """
-    settings = settings or StreamSettings()
+    prediction, correction = settings or node_settings(None)
     error_model = load_model(model)
     source = open_recording(recording)
     names = _actual_names(source, topics or {})
@@ -162,8 +163,8 @@ def replay(
         actual: standard for standard, actual in names.items() if standard not in MOTOR_TOPICS
     }
     summary = ReplaySummary()
-    predicting = PredictionStream(error_model, settings)
-    correcting = CorrectionStream(error_model, settings, enabled=True)
+    predicting = PredictionStream(error_model, prediction)
+    correcting = CorrectionStream(error_model, correction, enabled=True)
     ahead = SignalsAhead(source, signals, (predicting, correcting), summary.refuse)
     total = sum(topic.count for topic in source.topics)
     with RecordingWriter(output, overwrite=overwrite) as writer:
