@@ -165,6 +165,7 @@ def test_statistics_are_those_of_the_closed_form(tmp_path, monkeypatch, capsys):
     [
         (["--load", "1", "2"], "3 or 6 numbers, not 2"),
         (["--load", "0", "0", "-50"], "50 N"),
+        (["--load", "0", "0", "0"], "load: all numbers are 0"),
         (["--load", "0", "0", "nan"], "nan"),
         (["-o", "a_file"], "a_file: cannot be made"),
     ],
@@ -180,7 +181,8 @@ def test_show_refuses(small_table, tmp_path, monkeypatch, refused, options, name
     [
         (["-o", "table.txt"], "table.txt: a table's name ends in .npz"),
         (["-o", "nowhere/table.npz"], "nowhere: no such folder"),
-        (["-o", "table.npz", "--grid", "1"], "1 x 1"),
+        (["-o", "table.npz", "--grid", "2"], "2 x 2 is outside 3 x 3 to 61 x 61"),
+        (["-o", "table.npz", "--grid", "100000"], "100000 x 100000 is outside"),
         (["-o", "table.npz", "--tolerance", "0"], "tolerance 0 is not above 0"),
         (["-o", "table.npz", "--tolerance", "nan"], "tolerance nan is not above 0"),
         (["-o", "table.npz", "--interface", "soft"], "'soft'"),

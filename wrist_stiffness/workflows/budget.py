@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.rated_load import RATED_FORCE
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
@@ -42,7 +43,15 @@ class Push:
 
     @classmethod
     def of_millimetres(cls, load: Sequence[float], point_mm: Sequence[float]) -> Push:
-        """Return a load from 3 or 6 numbers [N, N m] and its point in U [mm]."""
+        """Return a load from 3 or 6 numbers [N, N m] and its point in U [mm].
+
+        Raises
+        ------
+        InputError
+            If all numbers are zero: no load, no shares of it.
+        """
+        if not np.any(load):
+            raise InputError("load: all numbers are 0, there is nothing to share out")
         whole = np.concatenate([np.array(load, dtype=float), np.zeros(6 - len(load))])
         return cls(whole[:3], whole[3:], 1e-3 * np.array(point_mm, dtype=float))
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.geometry_file import load_geometry
+from wrist_stiffness.mechanism.geometry_file import geometry_from_values
+from wrist_stiffness.mechanism.yaml_block import read_yaml
 from wrist_stiffness.workflows.budget import PER_AXIS, Push, budget
 
 Progress = Callable[[int, int], None]
@@ -23,7 +23,8 @@ FINE = 161
 
 PICTURED_POSE = np.radians([25.0, -20.0])
 
-MIN_PER_AXIS = 2
+MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
+"""The corners alone carry no plane to be judged inside; the splines' matrices grow with n^4."""
 
 MICRO = 1e6
 CENTIDEGREES = 100.0 * 180.0 / np.pi
@@ -82,13 +83,13 @@ def build(
         raise InputError(f"{output.parent}: no such folder")
     if not tolerance > 0.0:
         raise InputError(f"tolerance {tolerance:g} is not above 0")
-    if per_axis is not None and per_axis < MIN_PER_AXIS:
-        raise InputError(f"a grid of {per_axis} x {per_axis} carries no spline, at least 2 x 2")
-    load_geometry(geometry)
-    try:
-        values = yaml.safe_load(Path(geometry).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise GeometryError(f"{geometry}: cannot be read: {error.strerror}") from error
+    if per_axis is not None and not MIN_PER_AXIS <= per_axis <= MAX_PER_AXIS:
+        raise InputError(
+            f"a grid of {per_axis} x {per_axis} is outside {MIN_PER_AXIS} x {MIN_PER_AXIS} "
+            f"to {MAX_PER_AXIS} x {MAX_PER_AXIS}"
+        )
+    values = read_yaml(geometry, GeometryError)
+    geometry_from_values(values, str(geometry))
     settings = BuildSettings(
         evaluation=evaluation,
         interface=interface,  # type: ignore[arg-type]
