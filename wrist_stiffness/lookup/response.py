@@ -1,7 +1,7 @@
 """Platform twist under a load: the linear part, and contact where flanges touch.
 
-0 <= lambda  perpendicular to  gap + B' W + sum_k N_k delta_k + A lambda >= 0
-xi = C W + weight twist + sum_k G_k delta_k + B lambda
+0 <= lambda  perpendicular to  gap + B' W + A lambda >= 0
+xi = C W + weight twist + B lambda
 """
 
 from __future__ import annotations
@@ -38,8 +38,6 @@ class Response:
 def respond(
     operators: ContactOperators,
     wrench: Array,
-    twist: Array | None = None,
-    opening: Array | None = None,
     active: NDArray[np.bool_] | None = None,
 ) -> Response:
     """Solve for the platform's twist under a load, with contact.
@@ -50,10 +48,6 @@ def respond(
         Of shape (...).
     wrench : (..., 6) float
         Load on the platform at O in F [N, N m].
-    twist : (..., 6) float, optional
-        Twist that other screws at components add by G [m, rad].
-    opening : (..., m) float, optional
-        Opening of the gaps by the same screws [m].
     active : (m,) bool, optional
         First guess of the sectors in contact, for a single pose.
 
@@ -63,11 +57,7 @@ def respond(
         Twist, contact forces and active sectors of shape (...).
     """
     free = operators.weight_twist + np.einsum("...ij,...j->...i", operators.compliance, wrench)
-    if twist is not None:
-        free = free + twist
     gap = operators.gap + np.einsum("...im,...i->...m", operators.force_twist, wrench)
-    if opening is not None:
-        gap = gap + opening
     if gap.ndim == 1:
         force, closed = solve_contact(operators.approach, gap, active)
     else:
