@@ -1,9 +1,12 @@
 """Replay: the nodes' own path over recordings, among them one that this project did not write."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import RecordingError
@@ -39,6 +42,10 @@ def load(stamp_ns, force, frame="wrist_base"):
     return WrenchStamped(Header(stamp_ns, frame), Wrench(Vector3(*force), Vector3()))
 
 
+COMMAND = dataclasses.replace(
+    joints(30 * MILLISECOND, (6.0, 10.0)), velocity=(0.1, 0.2), effort=(0.3, 0.4)
+)
+
 # t [ms]      0     10    20    30
 # load       -1 N        -2 N (logged at 31: late, but by its stamp it belongs to the state at 20)
 # joints           10    20    30
@@ -47,7 +54,7 @@ TIMELINE = [
     (10, "/joint_states", joints(10 * MILLISECOND, (5.0, 10.0))),
     (20, "/joint_states", joints(20 * MILLISECOND, (5.0, 10.0))),
     (30, "/joint_states", joints(30 * MILLISECOND, (6.0, 10.0))),
-    (30, "/motor_commands", joints(30 * MILLISECOND, (6.0, 10.0))),
+    (30, "/motor_commands", COMMAND),
     (31, "/load_estimate", load(20 * MILLISECOND, (0.0, 0.0, -2.0))),
 ]
 
@@ -90,6 +97,28 @@ def test_output_holds_the_input_and_is_the_same_every_time(tmp_path):
         assert outputs(tmp_path / "a.mcap", topic) == outputs(source, topic)
     corrected = outputs(tmp_path / "a.mcap", "/motor_commands_corrected")
     assert [message.header.frame_id for message in corrected] == ["wrist_corrected"]
+    assert [(m.velocity, m.effort) for m in corrected] == [((0.1, 0.2), (0.3, 0.4))]
+
+
+def test_the_residual_is_what_the_sent_angles_leave(tmp_path):
+    """A second command, for the first one's correction starts at zero and changes nothing yet."""
+    later = dataclasses.replace(COMMAND, header=Header(90 * MILLISECOND))
+    timeline = [*TIMELINE, (90, "/load_estimate", load(89 * MILLISECOND, (0.0, 0.0, -2.0)))]
+    replay(
+        write(tmp_path / "in", [*timeline, (90, "/motor_commands", later)]), MODEL, tmp_path / "out"
+    )
+    model = load_model(MODEL)
+    sent = outputs(tmp_path / "out", "/motor_commands_corrected")[-1].position
+    said = outputs(tmp_path / "out", "/pose_error_residual")[-1].pose.pose.orientation
+    error = model.predict(np.array(sent), Load(np.array([0.0, 0.0, -2.0, 0.0, 0.0, 0.0])))
+    desired = model.table.mechanism.forward(np.radians((6.0, 10.0))).platform
+    left = Rotation.from_matrix(
+        error.motion[0] @ error.configuration.platform @ desired.T
+    ).as_rotvec()
+    rotvec = Rotation.from_quat((said.x, said.y, said.z, said.w)).as_rotvec()
+    assert np.linalg.norm(np.array(sent) - later.position) > 1e-5
+    # The residual is moved by the rigid Jacobian: off by the square of the correction, 1e-8 rad.
+    assert np.allclose(rotvec, left, rtol=0.0, atol=3e-8)
 
 
 def test_replay_of_a_replay_replaces_the_outputs(tmp_path):
