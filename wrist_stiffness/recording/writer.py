@@ -162,7 +162,7 @@ class RecordingWriter:
             return
         if not self._overwrite:
             raise RecordingError(f"{self.path} exists already and is not overwritten")
-        if self.path.is_dir() != self._is_folder or not _is_only_recording(self.path):
+        if self.path.is_dir() != self._is_folder or not is_only_recording(self.path):
             raise RecordingError(f"{self.path} is not only a recording and is never overwritten")
 
     def _register(self, channel: Channel) -> int:
@@ -254,7 +254,8 @@ class _PlainDumper(yaml.SafeDumper):
         return True
 
 
-def _is_only_recording(path: Path) -> bool:
+def is_only_recording(path: Path) -> bool:
+    """Tell whether an existing path holds nothing but a recording and may be replaced."""
     if path.is_file():
         return True
     return all(entry.name == METADATA_FILE or entry.suffix == ".mcap" for entry in path.iterdir())

@@ -12,6 +12,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording.writer import is_only_recording
 from wrist_stiffness.workflows.before_after import Pass, before_and_after
 from wrist_stiffness.workflows.cell import run_cell
 from wrist_stiffness.workflows.compare_runs import RunComparison, compare_runs
@@ -75,19 +76,21 @@ def run_demo(
     Raises
     ------
     WristError
-        If a step fails.
+        If a step fails, or the folder holds something else under a recording's name.
     """
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
-    for name in (LIVE, REPLAYED, *PICTURES):
-        left = folder / name
-        if left.is_dir():
-            shutil.rmtree(left)
-        else:
-            left.unlink(missing_ok=True)
+    left_over = [folder / name for name in (LIVE, REPLAYED) if (folder / name).exists()]
+    for left in left_over:
+        if not left.is_dir() or not is_only_recording(left):
+            raise InputError(f"{left} is not only a recording and is never overwritten")
+    for left in left_over:
+        shutil.rmtree(left)
+    for name in PICTURES:
+        (folder / name).unlink(missing_ok=True)
     table = load_model(model).table
     pictures = draw_maps(table, folder)
     run_cell(Path(model), seconds, folder / LIVE, progress=progress("live nodes"))
