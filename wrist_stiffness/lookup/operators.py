@@ -58,6 +58,38 @@ def pack(operators: ContactOperators) -> Array:
     )
 
 
+def column_sizes(columns: Array, sectors: int) -> Array:
+    """Return the natural size of each spline column, to compare tables by.
+
+    A factor's entry is measured by its row, whose length is the root of a diagonal flexibility:
+    an entry that vanishes by symmetry is rounding and has no size of its own.
+
+    Parameters
+    ----------
+    columns : (n, columns) float
+        As `pack` orders them.
+    sectors : int
+        Flange sectors m.
+
+    Returns
+    -------
+    (columns,) float
+        Positive, in the columns' units.
+    """
+    size = 6 + sectors
+    rows, _ = np.tril_indices(size)
+    largest = np.max(np.abs(columns), axis=0)
+    sizes = np.empty(columns.shape[1])
+    for row in range(size):
+        belongs = np.flatnonzero(rows == row)
+        sizes[belongs] = np.linalg.norm(largest[belongs])
+    gaps = slice(len(rows), len(rows) + sectors)
+    shift, turn = slice(gaps.stop, gaps.stop + 3), slice(gaps.stop + 3, gaps.stop + 6)
+    for group in (gaps, shift, turn):
+        sizes[group] = np.max(largest[group], initial=0.0)
+    return np.where(sizes > 0.0, sizes, 1.0)
+
+
 def unpack(
     columns: Array, components: ElasticComponents, configuration: Configuration
 ) -> ContactOperators:
