@@ -176,6 +176,16 @@ def test_show_refuses(small_table, tmp_path, monkeypatch, refused, options, name
     assert named in refused("table", "show", small_table[1], *options)
 
 
+def test_picture_that_cannot_be_written_is_one_line_and_leaves_nothing(
+    small_table, tmp_path, refused
+):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    (tmp_path / "map_s.png").mkdir()
+    line = refused("table", "show", small_table[1], "-o", tmp_path)
+    assert "map_s.png: cannot be written: Is a directory" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["map_s.png"]
+
+
 @pytest.mark.parametrize(
     ("options", "named"),
     [

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wrist_stiffness.workflows.before_after import Pass
-from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 
 def draw_before_after(before: Pass, after: Pass, path: Path) -> None:
@@ -45,4 +45,4 @@ def draw_before_after(before: Pass, after: Pass, path: Path) -> None:
         plot.set_ylim(bottom=0.0)
         plot.legend(fontsize=7, markerscale=4, loc="upper right")
         plot.grid(alpha=0.3)
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)

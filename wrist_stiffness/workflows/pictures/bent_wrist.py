@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.vectors import cross, unit
 from wrist_stiffness.workflows.budget import Push
-from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 SHOWN_M = 0.010
 """The largest displacement is drawn about this long."""
@@ -126,7 +126,7 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
         fontsize=9,
     )
     figure.colorbar(colours, ax=plot, shrink=0.7, label="displacement [µm]")
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)
 
 
 def _frame_screws(laws: Array, screws: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC
 from wrist_stiffness.workflows.budget import Budget
-from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 
 def draw_budget(table: Table, budget: Budget, load: str, path: Path) -> None:
@@ -64,4 +64,4 @@ def draw_budget(table: Table, budget: Budget, load: str, path: Path) -> None:
     where.set_aspect("equal")
     where.set_xlabel("motor 1 angle θ₁ [deg]")
     where.set_ylabel("motor 2 angle θ₂ [deg]")
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)

@@ -8,7 +8,7 @@ import numpy as np
 
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 
 def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, path: Path) -> None:
@@ -56,4 +56,4 @@ def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, p
     )
     figure.colorbar(filled, ax=plot, format="%.3g")
     plot.legend(loc="upper right", fontsize=7)
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.paper_figures import PUBLISHED, UNITS, PaperExperiment
-from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 S, PHI = 3, 4
 NAMES = {S: "shift s", PHI: "turn φ"}
@@ -54,7 +54,7 @@ def draw_paper_map(experiment: PaperExperiment, column: int, path: Path) -> None
         plot.clabel(lines, fontsize=7, fmt="%g")
         _frame(plot, experiment, title)
     figure.colorbar(filled, ax=figure.axes, label=f"{NAMES[column]} [{UNITS[column]}]")
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)
 
 
 def draw_spline_error(experiment: PaperExperiment, path: Path) -> None:
@@ -85,7 +85,7 @@ def draw_spline_error(experiment: PaperExperiment, path: Path) -> None:
         plot.clabel(lines, fontsize=7, fmt="%g")
         _frame(plot, experiment, f"{NAMES[column]}: spline minus solved")
     figure.colorbar(filled, ax=figure.axes, label="percent of the local value", extend="both")
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)
 
 
 def draw_hull(experiment: PaperExperiment, path: Path) -> None:
@@ -127,7 +127,7 @@ def draw_hull(experiment: PaperExperiment, path: Path) -> None:
         plot.set_zlabel("$s_z$ [µm]")
         plot.set_title(title, fontsize=9)
         plot.set_box_aspect((1.0, 1.0, 1.2), zoom=0.95)
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)
 
 
 def draw_variants(
@@ -171,7 +171,7 @@ def draw_variants(
         plot.set_title(title, fontsize=9)
     turns.set_yticklabels([])
     shifts.legend(fontsize=7)
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)
 
 
 def _grid(experiment: PaperExperiment) -> tuple[list[Array], Array]:
