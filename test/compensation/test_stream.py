@@ -7,7 +7,7 @@ from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import correct, residual_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
-from wrist_stiffness.errors import InputError, StaleLoadError, UnreachablePoseError
+from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, UnreachablePoseError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 
 NAMES = ("motor_1_joint", "motor_2_joint")
@@ -148,6 +148,26 @@ def test_after_a_fault_the_correction_fades_and_then_commands_pass_unchanged(mod
         before = delta
     assert command.theta.tolist() == theta.tolist()
     assert command.frame_id == "wrist_corrected"
+
+
+def test_load_beyond_the_table_is_a_fault_even_where_contact_is_frozen(model):
+    """The payload stands in for the load of a contact, but not for one that nobody can believe."""
+    driver = corrector(model, settings=StreamSettings())
+    driver.settle()
+    first = driver.send(load=20.0 * DOWN)
+    assert isinstance(first.fault, LoadRangeError)
+    for _ in range(60):
+        command = driver.send(load=20.0 * DOWN, seconds=0.01)
+    assert command.theta.tolist() == THETA.tolist()
+
+
+def test_a_command_without_a_stamp_is_not_corrected(model):
+    stream = CorrectionStream(model, EVERY_LOAD, enabled=True)
+    stream.loads.add(0, "wrist_base", DOWN[:3], DOWN[3:])
+    command = stream.on_command(0, "", ("motor_1_joint", "motor_2_joint"), THETA)
+    assert isinstance(command.fault, StaleLoadError)
+    assert "no stamp" in str(command.fault)
+    assert command.theta.tolist() == THETA.tolist()
 
 
 def test_switching_off_fades_too(model):

@@ -20,7 +20,7 @@ def live_run(path, used_loads):
     model = load_model(MODEL)
     with RecordingWriter(path) as writer:
         for i, used in enumerate(used_loads):
-            ns = i * MILLISECOND
+            ns = (i + 1) * MILLISECOND
             force = Wrench(Vector3(0.0, 0.0, -0.1 * i), Vector3())
             writer.write("/load_estimate", WrenchStamped(Header(ns, "wrist_base"), force), ns)
             names = ("motor_1_joint", "motor_2_joint")

@@ -254,7 +254,7 @@ FAULTS = {
     "named twice": (joints(MILLISECOND, (1.0, 2.0), ("motor_1_joint",) * 2), "named 2 times"),
     "NaN": (joints(MILLISECOND, (1.0, np.nan)), "not finite"),
     "out of domain": (joints(MILLISECOND, (89.0, 0.0)), "outside the table's domain"),
-    "before any load": (joints(0, (1.0, 2.0)), "no load estimate with a stamp before"),
+    "no stamp": (joints(0, (1.0, 2.0)), "has no stamp"),
     "stale load": (joints(900 * MILLISECOND, (1.0, 2.0)), "older than the joint state"),
 }
 
@@ -294,8 +294,10 @@ def test_nothing_is_written_where_no_sample_can_be_used(tmp_path, message, text)
 
 def test_reasons_that_differ_in_numbers_are_one_and_names_keep_theirs(tmp_path):
     timeline = [(0, "/load_estimate", load(0, (0.0, 0.0, -1.0)))]
-    timeline += [(0, "/joint_states", joints(0, (1.0, 2.0)))]
-    timeline += [(i, "/joint_states", joints(i * MILLISECOND, (80.0 + i, 0.0))) for i in range(5)]
+    timeline += [(0, "/joint_states", joints(MILLISECOND, (1.0, 2.0)))]
+    timeline += [
+        (i, "/joint_states", joints((i + 2) * MILLISECOND, (80.0 + i, 0.0))) for i in range(5)
+    ]
     for name in MOTORS:
         timeline += [(9, "/joint_states", joints(9 * MILLISECOND, (1.0, 2.0), (name, "x")))]
     summary = replay(write(tmp_path / "in", timeline), MODEL, tmp_path / "out")

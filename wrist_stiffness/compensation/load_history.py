@@ -90,6 +90,8 @@ class LoadHistory:
         StaleLoadError
             If there is none, or it is older than the age limit.
         """
+        if stamp_ns == 0:
+            raise StaleLoadError("the sample has no stamp (zero), so no load belongs to it")
         place = bisect.bisect_right(self._stamps, stamp_ns) - 1
         if place < 0:
             raise StaleLoadError("no load estimate with a stamp before the joint state")

@@ -342,6 +342,9 @@ class CorrectionStream(Stream):
 
     def _load(self, stamp_ns: int) -> Load:
         _, measured = self.loads.at(stamp_ns)
+        # A payload may stand in for it, but a load beyond the table is a fault in any case; turning
+        # a wrench changes neither of its sizes, so its frame does not matter.
+        self.running_model().model.table.check_load(measured.wrench)
         return self.contact.load(stamp_ns, measured, self.settings.contact)
 
     def _correction(self, stamp_ns: int, load: Load, theta: Array) -> Correction:

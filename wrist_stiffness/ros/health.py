@@ -24,7 +24,9 @@ class Health:
         self._good = self._good_before = 0
         self._faults: Counter[str] = Counter()
         self._faults_before = 0
-        self._last = ""
+        self._newest = ""
+        self._last: dict[str, str] = {}
+        self._fresh: dict[str, str] = {}
 
     @property
     def faults(self) -> int:
@@ -37,8 +39,10 @@ class Health:
 
     def fault(self, error: WristError) -> None:
         """Count a fault by the kind of error."""
-        self._faults[type(error).__name__] += 1
-        self._last = str(error)
+        kind = type(error).__name__
+        self._faults[kind] += 1
+        # By kind: a load that is refused is soon followed by many samples without a load.
+        self._last[kind] = self._fresh[kind] = self._newest = str(error)
 
     def report(self, facts: Mapping[str, str], missing: str, restriction: str) -> DiagnosticStatus:
         """Return the state since the last report.
@@ -62,10 +66,11 @@ class Health:
         good = self._good - self._good_before
         faults = self.faults - self._faults_before
         self._good_before, self._faults_before = self._good, self.faults
+        said, self._fresh = list(self._fresh.values()), {}
         if missing:
             level, message = DiagnosticStatus.ERROR, missing
         elif faults:
-            level, message = DiagnosticStatus.WARN, f"{faults} refused: {self._last}"
+            level, message = DiagnosticStatus.WARN, f"{faults} refused: {'; '.join(said)}"
         elif restriction:
             level, message = DiagnosticStatus.WARN, restriction
         elif not good:
@@ -75,7 +80,8 @@ class Health:
         values = {
             "samples": str(self._good),
             **{f"refused {reason}": str(count) for reason, count in sorted(self._faults.items())},
-            "last fault": self._last,
+            "last fault": self._newest,
+            **{f"last {reason}": text for reason, text in sorted(self._last.items())},
             **facts,
         }
         return DiagnosticStatus(
