@@ -127,6 +127,13 @@ def test_a_tolerance_that_no_grid_meets(values, store, table, monkeypatch):
         build_table(values, replace(COARSE, per_axis=None, tolerance=1e-12), condenser=store)
 
 
+def test_a_table_that_is_interpolated_states_that_error_too(values, store, table):
+    by_spline = build_table(values, replace(COARSE, evaluation="spline"), condenser=store)
+    worst = max(by_spline.header.errors["predicted"]["operative"].values())
+    added = by_spline.header.errors["stated_relative"] - table.header.errors["stated_relative"]
+    assert added == pytest.approx(worst, rel=1e-9)
+
+
 def test_header_says_where_it_comes_from(table, tmp_path):
     save_table(table, tmp_path / "t.npz")
     header = load_table(tmp_path / "t.npz").header

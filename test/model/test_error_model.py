@@ -68,6 +68,14 @@ def test_covariance_is_positive_and_holds_the_encoder_step(model):
     assert by_step <= np.trace(covariance[3:, 3:]) <= 1.5 * by_step
 
 
+def test_stated_error_is_the_rms_length_of_the_shifts_error(model):
+    """The encoder only turns the platform about O, so the shift's block is the table's alone."""
+    made = model.predict(POSE, load(0.0, 0.0, -1.0))
+    stated = model.table.header.errors["stated_relative"]
+    rms = np.sqrt(np.trace(made.covariance[:3, :3]))
+    assert rms == pytest.approx(stated * np.linalg.norm(made.twist[:3]), rel=1e-12)
+
+
 def test_motion_is_the_exponential_of_the_twist(model):
     made = model.predict(POSE, load(0.5, 0.0, -1.0))
     rotation, shift = made.motion

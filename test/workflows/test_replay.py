@@ -327,6 +327,13 @@ def test_truncated_recording_gives_what_is_there(tmp_path):
     assert np.array_equal(part, whole[: len(part)])
 
 
+def test_recording_cut_in_its_first_chunk_says_so(tmp_path):
+    source = write(tmp_path / "in.mcap", TIMELINE)
+    (tmp_path / "cut.mcap").write_bytes(source.read_bytes()[:300])
+    with pytest.raises(RecordingError, match="nothing can be read: .*cut"):
+        replay(tmp_path / "cut.mcap", MODEL, tmp_path / "out.mcap")
+
+
 def test_recordings_that_cannot_be_used(tmp_path, capsys):
     only_loads = write(tmp_path / "loads", [(0, "/load_estimate", load(0, (0.0, 0.0, -1.0)))])
     with pytest.raises(RecordingError, match="no topic /joint_states"):

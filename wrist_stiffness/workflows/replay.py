@@ -209,6 +209,8 @@ def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str
         if topic is None:
             if standard not in REQUIRED and standard not in chosen:
                 continue
+            if source.damage and not present:
+                raise RecordingError(f"{source.path}: nothing can be read: {source.damage}")
             found = ", ".join(present) or "none"
             raise RecordingError(
                 f"{source.path}: no topic {actual} (it has {found}); "
