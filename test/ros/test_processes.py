@@ -141,7 +141,7 @@ def test_a_signal_ends_the_cell_with_all_its_nodes(tmp_path, ending, code):
 def test_the_cell_says_which_node_failed(tmp_path, capfd):
     (tmp_path / "taken").mkdir()
     with pytest.raises(InputError, match="node recorder ended with code 2"):
-        run_cell(seconds=1.0, record=tmp_path / "taken")
+        run_cell(seconds=20.0, record=tmp_path / "taken")
     assert "exists already" in capfd.readouterr().err
 
 
@@ -149,3 +149,9 @@ def test_the_cell_refuses_wrong_input(tmp_path, capsys):
     assert command_line.main(["cell", "--seconds", "-1"]) == 2
     assert command_line.main(["cell", "--model", str(tmp_path / "none.yaml")]) == 2
     assert "none.yaml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1.0, float("nan"), float("inf")])
+def test_a_run_too_short_for_two_motions_is_refused_before_it_starts(seconds):
+    with pytest.raises(InputError, match="is not 2 or more"):
+        run_cell(seconds=seconds)
