@@ -20,7 +20,7 @@ def recording(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with RecordingWriter("run") as writer:
         for i in range(10):
-            header = Header(i * MILLISECOND, "wrist_base")
+            header = Header((i + 1) * MILLISECOND, "wrist_base")
             load = WrenchStamped(header, Wrench(Vector3(0.0, 0.0, -1.0), Vector3()))
             angles = (float(np.radians(170.0 if i > 7 else i)), 0.1)
             command = JointState(header, MOTORS, (0.01 * i, 0.1))
