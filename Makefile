@@ -29,7 +29,7 @@ demo: $(READY)
 # The workers share the cores: threads of their own below them would only get in the way.
 test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(RUN) pytest -n $(TESTERS) test
+	$(RUN) pytest -n $(TESTERS) $(PYTEST_ARGS) test
 
 lint: $(READY)
 	$(RUN) ruff check .
