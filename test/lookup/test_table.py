@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.errors import LoadRangeError, TableError
-from wrist_stiffness.lookup.operators import pack, unpack
+from wrist_stiffness.lookup.operators import column_sizes, pack, unpack
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table_file import load_table, save_table
@@ -57,6 +57,19 @@ def test_spline_agrees_with_closed_form_to_the_stated_error(shipped, poses):
     # The stated error is a maximum over 400 poses; twice that bounds another sample.
     assert found[0] <= 2.0 * stated["s"]
     assert found[1] <= 2.0 * stated["phi"]
+
+
+def test_an_entry_that_vanishes_is_measured_by_its_row(shipped):
+    """Rounding of a zero of the factor is no difference; a real one of a part in 1e5 is."""
+    sectors = len(shipped.components.sectors.gap)
+    values = shipped.operators.copy()
+    values[:, 1] = 1e-22
+    sizes = column_sizes(values, sectors)
+    assert np.all(sizes > 0.0)
+    assert 1e-22 / sizes[1] < 1e-12
+    # The second row's diagonal, whose root it is.
+    assert sizes[1] == sizes[2] >= np.max(np.abs(values[:, 2]))
+    assert np.max(np.abs(1e-5 * values) / sizes) > 1e-6
 
 
 def test_interpolated_compliance_is_positive_definite_everywhere(shipped):
