@@ -8,7 +8,7 @@ PACKAGE = "wrist_stiffness"
 SOURCE = Path(__file__).parents[1] / PACKAGE
 
 ONLINE = {"mechanism", "lookup", "model"}
-CORE = ONLINE | {"fem", "compensation", "diagnosis", "recording", "simulation"}
+CORE = ONLINE | {"fem", "campaign", "compensation", "diagnosis", "recording", "simulation"}
 ROOMS_USED = {
     "mechanism": set(),
     "lookup": {"mechanism"},
@@ -16,6 +16,7 @@ ROOMS_USED = {
     "model": {"mechanism", "lookup"},
     "compensation": ONLINE,
     "diagnosis": ONLINE,
+    "campaign": ONLINE | {"compensation", "diagnosis", "recording"},
     "recording": set(),
     "simulation": {"mechanism", "lookup", "recording"},
     "workflows": CORE | {"shipped"},
