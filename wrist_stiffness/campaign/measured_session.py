@@ -66,7 +66,7 @@ class MeasuredSession:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """Which of the six components of each pose error were measured, (n, 6)."""
-        turned = np.isfinite(self.rotation).all(axis=(1, 2))
+        turned = np.isfinite(self.rotation.sum(axis=(1, 2)))
         return np.hstack([np.isfinite(self.shift), np.repeat(turned[:, None], 3, axis=1)])
 
     def take(self, rows: slice | NDArray[np.bool_]) -> MeasuredSession:
