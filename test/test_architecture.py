@@ -24,10 +24,12 @@ ROOMS_USED = {
     "ros": CORE | {"workflows", "shipped"},
     "web": CORE | {"workflows", "shipped"},
     "errors": set(),
+    "atomic_file": set(),
     "shipped": set(),
     "__main__": {"cli"},
     "__init__": set(),
 }
+COMMON = {"errors", "atomic_file"}
 ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both
@@ -59,7 +61,7 @@ def violations(module, text):
         if first == "":
             found.append(f"{module}: relative import {name}")
         elif first == PACKAGE:
-            if second in ROOMS_USED and second not in ROOMS_USED[room] | {room, "errors"}:
+            if second in ROOMS_USED and second not in ROOMS_USED[room] | COMMON | {room}:
                 found.append(f"{module}: {room} uses {second}")
         elif first == DRAWING:
             if not (room == "workflows" and inside) and Path(module).stem != "plotting":

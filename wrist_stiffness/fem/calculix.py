@@ -6,7 +6,6 @@ weight is CalculiX's own.  Units of the deck: N, mm, t, s.
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.fem.solids import MILLIMETRES
@@ -54,10 +54,8 @@ def write_deck(
     closed : (m,) bool
         Flange sectors in contact; their gaps are held at zero.
     """
-    partial = path.with_suffix(".partial")
-    with partial.open("w") as deck:
+    with replacing(path) as written, written.open("w") as deck:
         deck.writelines(line + "\n" for line in _deck(model, wrench, gravity, closed))
-    os.replace(partial, path)
 
 
 def run_deck(path: Path) -> Array:

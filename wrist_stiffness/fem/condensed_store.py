@@ -7,7 +7,6 @@ decides its numbers: dimensions, element sizes, interface model and solver versi
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import zipfile
 from dataclasses import asdict, dataclass, fields
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import TableError
 from wrist_stiffness.fem.parts import Solid, assemble_body
 from wrist_stiffness.fem.solids import MeshSettings
@@ -90,15 +90,13 @@ class CondensedStore:
         condensed = condense_solid(solid, sizes, interface)
         try:
             self.folder.mkdir(exist_ok=True)
-            partial = path.with_suffix(f".{os.getpid()}.part")
-            with partial.open("wb") as stream:
+            with replacing(path) as written, written.open("wb") as stream:
                 np.savez(
                     stream,
                     nodes=condensed.nodes,
                     elements=condensed.elements,
                     **asdict(condensed.element),
                 )
-            os.replace(partial, path)
         except OSError as error:
             raise TableError(f"{self.folder}: cannot be written: {error.strerror}") from error
         return condensed

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -19,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import TableError, WristError
 from wrist_stiffness.lookup.operators import column_count
 from wrist_stiffness.lookup.table import EVALUATIONS, MAP_COLUMNS, Table, TableHeader
@@ -47,7 +46,8 @@ def save_table(table: Table, path: str | Path) -> Table:
     table : Table
         What to write.
     path : path
-        Ends in `.npz`; an older file is replaced only when the new one is complete.
+        Ends in `.npz`; an older file is replaced only when the new one is complete, a device or
+        pipe is written to.
 
     Returns
     -------
@@ -77,15 +77,9 @@ def save_table(table: Table, path: str | Path) -> Table:
         },
     }
     try:
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(descriptor, "wb") as stream:
-                np.savez_compressed(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
-            os.chmod(name, 0o644)
-            os.replace(name, path)
-        except BaseException:
-            os.unlink(name)
-            raise
+        # A stream, because numpy adds .npz to a name without it.
+        with replacing(path) as written, written.open("wb") as stream:
+            np.savez_compressed(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
     except OSError as error:
         raise TableError(f"{path}: cannot be written: {error.strerror}") from error
     return replace(table, checksum=checksum)

@@ -9,6 +9,7 @@ from typing import Any
 
 import yaml
 
+from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import EVALUATIONS, Evaluation
 from wrist_stiffness.lookup.table_file import load_table
@@ -84,7 +85,8 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
     model : ErrorModel
         Read from a file, perhaps with other effects.
     path : path
-        File to write; an older one is replaced.  Paths in it are relative to it.
+        File to write; an older one is replaced, a device or pipe is written to.  Paths in it are
+        relative to it.
 
     Raises
     ------
@@ -106,13 +108,12 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
     }
     if model.lineage:
         content["lineage"] = [step.as_values() for step in model.lineage]
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    text = yaml.safe_dump(
+        content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
+    )
     try:
-        text = yaml.safe_dump(
-            content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
-        )
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
+        with replacing(path) as written:
+            written.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 

@@ -9,7 +9,6 @@ The prose of the page is written by hand; what stands between `<!-- begin NAME -
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.geometry_file import load_geometry
@@ -248,9 +248,8 @@ def write_page(folder: Path) -> None:
     pictures.draw_hull(shipped, drawn / "paper-figure-7.png")
     pictures.draw_spline_error(shipped, drawn / "paper-grid-error.png")
     pictures.draw_variants(predicted, budgets, drawn / "paper-variants.png")
-    temporary = page.with_name(f".{page.name}.{os.getpid()}.part")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, page)
+    with replacing(page) as written:
+        written.write_text(text, encoding="utf-8")
 
 
 def main() -> int:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
+from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
 
 DPI = 130
@@ -33,12 +33,8 @@ def save_figure(figure: Any, path: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        try:
-            figure.savefig(partial, dpi=DPI, format="png")
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+        with replacing(path) as written:
+            figure.savefig(written, dpi=DPI, format="png")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error

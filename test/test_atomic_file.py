@@ -1,0 +1,63 @@
+"""A file that the project writes is complete or not there, and never in the place of a device."""
+
+import os
+import threading
+
+import pytest
+
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.shipped import shipped_file
+
+
+def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    received = []
+    reader = threading.Thread(target=lambda: received.append(pipe.read_text()))
+    reader.start()
+    # Opened here too, so that the reader ends even if nothing is written.
+    guard = os.open(pipe, os.O_WRONLY)
+    save_model(load_model(shipped_file("config/palmieri2015_model.yaml")), pipe)
+    os.close(guard)
+    reader.join()
+    assert pipe.is_fifo()
+    assert received[0].startswith("schema: 1")
+
+
+def test_a_link_stays_a_link_to_the_new_file(tmp_path):
+    target, link = tmp_path / "old", tmp_path / "latest"
+    target.write_text("old")
+    link.symlink_to(target)
+    with replacing(link) as written:
+        written.write_text("new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+def test_what_stops_half_way_leaves_the_old_file_alone(tmp_path):
+    path = tmp_path / "model.yaml"
+    path.write_text("old")
+
+    def interrupted():
+        with replacing(path) as written:
+            written.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_model_that_cannot_be_put_in_its_place_leaves_nothing_beside(tmp_path, monkeypatch):
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+    def refuse(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(InputError, match="No space left"):
+        save_model(model, tmp_path / "m.yaml")
+    assert list(tmp_path.iterdir()) == []

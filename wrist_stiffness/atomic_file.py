@@ -1,0 +1,44 @@
+"""Files that are complete or not there at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Give the path to write to; what was written there takes its place when all went well.
+
+    A device or a pipe is written to directly: renaming onto /dev/null would put a file in its
+    place, for every program of the machine.  A link stays a link to the new file.
+
+    Parameters
+    ----------
+    path : path
+        File to write; an older one stays until the new one is complete.
+
+    Yields
+    ------
+    Path
+        A temporary file in the same folder, or the device itself.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; the temporary file is gone then.
+    """
+    target = Path(path)
+    if target.exists() and not target.is_file():
+        yield target
+        return
+    target = target.resolve()
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
