@@ -152,6 +152,10 @@ class ErrorModel:
             parts = effect.law.changed(parts, self.table.geometry, effect.component, effect.si)
         return parts
 
+    @property
+    def _changes_of_parts(self) -> list[Effect]:
+        return [effect for effect in self.effects if effect.stage == "parts"]
+
     @cached_property
     def variations(self) -> tuple[ErrorModel, ...]:
         """The model with each uncertain parameter moved by its standard uncertainty."""
@@ -243,6 +247,9 @@ class ErrorModel:
             One for each addition.
         """
         models = [self.with_effects(*self.effects, *extra) for extra in additions]
+        for model in models[1:]:
+            if model._changes_of_parts == models[0]._changes_of_parts:
+                model.__dict__["parts"] = models[0].parts
         accepted = self.accepts(block)
         usable, rows = block.take(accepted), np.flatnonzero(accepted)
         twists, measured = np.full((2, len(models), len(block), 6), np.nan)
