@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file

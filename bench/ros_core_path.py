@@ -9,9 +9,10 @@ from collections.abc import Callable
 import numpy as np
 
 from wrist_stiffness.compensation.contact_policy import ContactSettings
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.monitor_stream import MonitorStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 
 pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered", "ignore:invalid value")

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.simulation.environment import EnvironmentSpring
 

@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import residual_twist
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block, Sample
 from wrist_stiffness.model.effect import Effect

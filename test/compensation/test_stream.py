@@ -5,8 +5,9 @@ import pytest
 
 from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import correct, residual_twist
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, UnreachablePoseError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 

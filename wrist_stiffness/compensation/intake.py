@@ -16,6 +16,7 @@ from wrist_stiffness.model.error_model import Load
 BASE_FRAME = "wrist_base"
 PLATFORM_FRAME = "wrist_platform"
 CORRECTED_FRAME = "wrist_corrected"
+JOINT_STATE, COMMAND = "joint state", "command"
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,15 @@ class MotorNames:
     motor_1: str = "motor_1_joint"
     motor_2: str = "motor_2_joint"
 
-    def places(self, names: Sequence[str]) -> tuple[int, int]:
+    def places(self, names: Sequence[str], what: str = JOINT_STATE) -> tuple[int, int]:
         """Return where the motors stand in a list of joint names.
+
+        Parameters
+        ----------
+        names : sequence of str
+            In any order, other joints ignored.
+        what : str
+            What the names are of, for the message.
 
         Raises
         ------
@@ -43,15 +51,17 @@ class MotorNames:
         for motor in (self.motor_1, self.motor_2):
             count = list(names).count(motor)
             if count != 1:
-                what = "is missing" if count == 0 else f"is named {count} times"
+                count_text = "is missing" if count == 0 else f"is named {count} times"
                 raise InputError(
-                    f"joint state: {motor} {what} among {', '.join(names) or 'no names'}"
+                    f"{what}: {motor} {count_text} among {', '.join(names) or 'no names'}"
                 )
             found.append(list(names).index(motor))
         return found[0], found[1]
 
-    def angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
-        """Return the motor angles of a joint state.
+    def angles(
+        self, names: Sequence[str], positions: Sequence[float], what: str = JOINT_STATE
+    ) -> Array:
+        """Return the motor angles of a joint state or command.
 
         Parameters
         ----------
@@ -59,6 +69,8 @@ class MotorNames:
             In any order, other joints ignored.
         positions : sequence of float
             One a name [rad].
+        what : str
+            What the angles are of, for the message.
 
         Returns
         -------
@@ -70,13 +82,33 @@ class MotorNames:
         InputError
             If a motor is missing, named twice, without a position or not finite.
         """
-        places = self.places(names)
+        places = self.places(names, what)
         if len(positions) != len(names):
-            raise InputError(f"joint state: {len(positions)} positions for {len(names)} names")
+            raise InputError(f"{what}: {len(positions)} positions for {len(names)} names")
         theta = np.array([positions[place] for place in places], dtype=float)
         if not np.all(np.isfinite(theta)):
-            raise InputError(f"joint state: motor angles ({theta[0]}, {theta[1]}) are not finite")
+            raise InputError(f"{what}: motor angles ({theta[0]}, {theta[1]}) are not finite")
         return theta
+
+    def speeds(self, names: Sequence[str], velocities: Sequence[float]) -> Array | None:
+        """Return the motor speeds of a joint state or command whose angles are usable.
+
+        Parameters
+        ----------
+        names : sequence of str
+            In any order, other joints ignored.
+        velocities : sequence of float
+            One a name, or none at all, as many drivers send it [rad/s].
+
+        Returns
+        -------
+        (2,) float or None
+            Motor speeds [rad/s]; None where the message does not have both of them.
+        """
+        if len(velocities) != len(names):
+            return None
+        speeds = np.array([velocities[place] for place in self.places(names)], dtype=float)
+        return speeds if np.all(np.isfinite(speeds)) else None
 
 
 @dataclass(frozen=True)

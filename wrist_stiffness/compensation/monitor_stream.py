@@ -24,6 +24,9 @@ from wrist_stiffness.model.error_model import ErrorModel
 
 JOINT_STATES_KEPT = 1024
 
+JointStateKept = tuple[int, Array, Array | None]
+"""Stamp [ns], motor angles [rad] and, where given, motor speeds [rad/s]."""
+
 NOT_MEASURED = 1.0
 """A variance of this or more says that a component is not measured [m^2, rad^2]."""
 
@@ -72,15 +75,21 @@ class MonitorStream(Stream):
         super().__init__(model, settings)
         self._monitoring = monitoring
         self._age_limit_ns = round(joint_age_limit_s * NANOSECONDS)
-        self._joints: deque[tuple[int, Array]] = deque(maxlen=JOINT_STATES_KEPT)
+        self._joints: deque[JointStateKept] = deque(maxlen=JOINT_STATES_KEPT)
         self._judged: ErrorModel | None = None
         self.monitor = ResidualMonitor(monitoring)
 
     def on_joint_state(
-        self, stamp_ns: int, names: Sequence[str], positions: Sequence[float]
+        self,
+        stamp_ns: int,
+        names: Sequence[str],
+        positions: Sequence[float],
+        velocities: Sequence[float] = (),
     ) -> None:
         """Keep a joint state (see `MotorNames.angles` for its errors)."""
-        self._joints.append((stamp_ns, self.settings.motors.angles(names, positions)))
+        motors = self.settings.motors
+        theta, theta_dot = motors.angles(names, positions), motors.speeds(names, velocities)
+        self._joints.append((stamp_ns, theta, theta_dot))
 
     def on_pose(
         self,
@@ -121,9 +130,9 @@ class MonitorStream(Stream):
         norm = float(np.linalg.norm(numbers[3:]))
         if abs(norm - 1.0) > UNIT_TOLERANCE:
             raise InputError(f"measured pose: quaternion has the norm {norm:.4g}, not 1")
-        theta = self._angles_at(stamp_ns)
+        theta, theta_dot = self._joints_at(stamp_ns)
         running = self.running_model()
-        prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1])
+        prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1], theta_dot)
         rotation = Rotation.from_quat(numbers[3:]).as_matrix()
         residual = residual_of_pose(rotation, numbers[:3], prediction)
         noise = self._monitoring.noise**2
@@ -136,14 +145,14 @@ class MonitorStream(Stream):
         self.monitor.add(residual, np.diag(prediction.covariance) + excess)
         return MonitoredPose(residual, prediction.covariance + np.diag(noise))
 
-    def _angles_at(self, stamp_ns: int) -> Array:
-        older = (entry for entry in reversed(self._joints) if entry[0] <= stamp_ns)
-        joint_stamp_ns, theta = next(older, (None, None))
-        if joint_stamp_ns is None or theta is None:
+    def _joints_at(self, stamp_ns: int) -> tuple[Array, Array | None]:
+        newest = next((kept for kept in reversed(self._joints) if kept[0] <= stamp_ns), None)
+        if newest is None:
             raise InputError("measured pose: no joint state with a stamp before it")
+        joint_stamp_ns, theta, theta_dot = newest
         if stamp_ns - joint_stamp_ns > self._age_limit_ns:
             raise InputError(
                 f"measured pose: newest joint state is {(stamp_ns - joint_stamp_ns) * 1e-9:.3f} s "
                 f"older (limit {self._age_limit_ns * 1e-9:g} s)"
             )
-        return theta
+        return theta, theta_dot

@@ -40,7 +40,9 @@ class RunningModel:
         self._last_ns = 0
         self._active: NDArray[np.bool_] | None = None
 
-    def advance(self, stamp_ns: int, theta: Array, load: Load) -> Prediction:
+    def advance(
+        self, stamp_ns: int, theta: Array, load: Load, theta_dot: Array | None = None
+    ) -> Prediction:
         """Predict a sample and remember it.
 
         Parameters
@@ -51,6 +53,8 @@ class RunningModel:
             Motor angles [rad].
         load : Load
             What acts on the platform.
+        theta_dot : (2,) float, optional
+            Motor speeds; where absent the difference to the sample before [rad/s].
 
         Returns
         -------
@@ -65,21 +69,23 @@ class RunningModel:
         session = self._session_at(stamp_ns)
         if session is None:
             return self._predict(theta, load)
-        prediction = session.advance(self._sample(stamp_ns, theta, load))
+        prediction = session.advance(self._sample(stamp_ns, theta, load, theta_dot))
         self._last_ns = stamp_ns
         return prediction
 
-    def remember(self, stamp_ns: int, theta: Array, load: Load) -> None:
-        """Take in what the motors were told; as `advance`, where there is something to remember."""
-        if self._session is not None:
-            self.advance(stamp_ns, theta, load)
+    @property
+    def remembers(self) -> bool:
+        """Whether predictions depend on the samples before."""
+        return self._session is not None
 
-    def preview(self, stamp_ns: int, load: Load) -> Callable[[Array], Prediction]:
+    def preview(
+        self, stamp_ns: int, load: Load, theta_dot: Array | None = None
+    ) -> Callable[[Array], Prediction]:
         """Return the prediction as a function of the motor angles, to be tried and forgotten."""
         session = self._session_at(stamp_ns)
         if session is None:
             return lambda theta: self._predict(theta, load)
-        return lambda theta: session.preview(self._sample(stamp_ns, theta, load))
+        return lambda theta: session.preview(self._sample(stamp_ns, theta, load, theta_dot))
 
     def _predict(self, theta: Array, load: Load) -> Prediction:
         # The flanges that touched last are a good guess.  It saves time and leaves no trace: the
@@ -93,11 +99,12 @@ class RunningModel:
             self._session = self.model.session()
         return self._session
 
-    def _sample(self, stamp_ns: int, theta: Array, load: Load) -> Sample:
+    def _sample(self, stamp_ns: int, theta: Array, load: Load, theta_dot: Array | None) -> Sample:
         return Sample(
             stamp_ns / NANOSECONDS,
             theta,
             load,
+            theta_dot,
             temperatures=self._temperatures.at(stamp_ns),
             covariates=self._covariates.at(stamp_ns),
         )

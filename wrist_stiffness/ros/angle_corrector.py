@@ -14,10 +14,10 @@ from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
 from wrist_stiffness.compensation.correction import Correction
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.parameters import CORRECTION, correction_settings
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
@@ -103,7 +103,11 @@ class AngleCorrector(WristNode):
         stamp_ns = nanoseconds(message.header.stamp)
         try:
             command = self.stream.on_command(
-                stamp_ns, message.header.frame_id, message.name, message.position
+                stamp_ns,
+                message.header.frame_id,
+                message.name,
+                message.position,
+                message.velocity,
             )
         except WristError as error:
             self.warn(error)

@@ -82,7 +82,7 @@ class ModelMonitor(WristNode):
     def _on_joints(self, message: JointState) -> None:
         try:
             self.stream.on_joint_state(
-                nanoseconds(message.header.stamp), message.name, message.position
+                nanoseconds(message.header.stamp), message.name, message.position, message.velocity
             )
         except WristError as error:
             self.warn(error)

@@ -100,7 +100,7 @@ class PoseErrorPredictor(WristNode):
         stamp_ns = nanoseconds(message.header.stamp)
         try:
             prediction = self.stream.on_joint_state(
-                stamp_ns, message.name, message.position
+                stamp_ns, message.name, message.position, message.velocity
             ).prediction
         except WristError as error:
             self.warn(error)

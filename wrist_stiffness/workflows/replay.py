@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.intake import BASE_FRAME, CORRECTED_FRAME
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import CorrectionStream, PredictionStream
+from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import RecordingError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
@@ -231,7 +232,9 @@ def _predict(
     state: JointState, predicting: PredictionStream, _: CorrectionStream, summary: ReplaySummary
 ) -> Iterator[tuple[str, Message]]:
     summary.joint_states += 1
-    sample = predicting.on_joint_state(state.header.stamp_ns, state.name, state.position)
+    sample = predicting.on_joint_state(
+        state.header.stamp_ns, state.name, state.position, state.velocity
+    )
     prediction = sample.prediction
     summary.predictions += 1
     summary.warnings.update(prediction.warnings)
@@ -246,7 +249,7 @@ def _correct(
 ) -> Iterator[tuple[str, Message]]:
     summary.commands += 1
     corrected = correcting.on_command(
-        state.header.stamp_ns, state.header.frame_id, state.name, state.position
+        state.header.stamp_ns, state.header.frame_id, state.name, state.position, state.velocity
     )
     if corrected.fault is not None:
         summary.refuse(MOTOR_COMMANDS, corrected.fault)

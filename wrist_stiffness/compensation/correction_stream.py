@@ -1,0 +1,281 @@
+"""Commands and trajectories on their way to the motors; never worse than no correction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.compensation.contact_policy import ContactGuard
+from wrist_stiffness.compensation.correction import Correction, as_applied, correct
+from wrist_stiffness.compensation.intake import COMMAND, CORRECTED_FRAME
+from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.safety import (
+    AppliedCorrection,
+    guard_weight,
+    within_joint_limits,
+)
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import Stream
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.error_model import ErrorModel, Load
+
+TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
+
+
+@dataclass(frozen=True)
+class CorrectedCommand:
+    """What to send to the motors for one command.
+
+    Parameters
+    ----------
+    frame_id : str
+        For the header: `wrist_corrected` where correction is on or still fades out.
+    positions : (n,) float
+        All joints of the command, the motors corrected [rad].
+    theta : (2,) float
+        Corrected motor angles [rad].
+    correction : Correction or None
+        As it is applied, with the residual that remains; None while none can be had.
+    fault : WristError or None
+        Why none can be had although correction is on (what was applied before then fades out), or
+        why the model could not remember the command.
+    """
+
+    frame_id: str
+    positions: Array
+    theta: Array
+    correction: Correction | None
+    fault: WristError | None
+
+
+@dataclass(frozen=True)
+class CorrectedTrajectory:
+    """What to send for a whole trajectory.
+
+    Parameters
+    ----------
+    frame_id : str
+        For the header: `wrist_corrected` where correction is on.
+    positions : (m, n) float
+        Of all points and joints [rad].
+    fault : WristError or None
+        Why it passes unchanged although correction is on.
+    """
+
+    frame_id: str
+    positions: Array
+    fault: WristError | None
+
+
+class CorrectionStream(Stream):
+    """Corrected motor angles for every command; never worse than no correction.
+
+    Parameters
+    ----------
+    model : ErrorModel or None
+        May be replaced between samples; without one commands pass unchanged.
+    settings : StreamSettings
+        Names, frames, objective, limits.
+    enabled : bool
+        Whether commands are corrected; else they pass unchanged.
+
+    Attributes
+    ----------
+    contact : ContactGuard
+        Whether the load says that there is contact.
+    """
+
+    def __init__(self, model: ErrorModel | None, settings: StreamSettings, enabled: bool) -> None:
+        super().__init__(model, settings)
+        self.contact = ContactGuard()
+        self._applied = AppliedCorrection()
+        self._enabled = enabled
+
+    @property
+    def enabled(self) -> bool:
+        """Whether commands are corrected; switching it on takes the present load as payload."""
+        return self._enabled
+
+    @enabled.setter
+    def enabled(self, enabled: bool) -> None:
+        self._enabled = enabled
+        self.contact.forget()
+
+    def tare(self) -> Load:
+        """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
+        zero = super().tare()
+        self.contact.forget()
+        return zero
+
+    def on_command(
+        self,
+        stamp_ns: int,
+        frame_id: str,
+        names: Sequence[str],
+        positions: Sequence[float],
+        velocities: Sequence[float] = (),
+    ) -> CorrectedCommand:
+        """Correct a command.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Its stamp [ns].
+        frame_id : str
+            Its header's frame; `wrist_corrected` marks a command that was corrected already.
+        names, positions, velocities : sequence
+            As in sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are
+            taken as differences of the angles.
+
+        Returns
+        -------
+        CorrectedCommand
+            With the fault, and on the way to no correction, wherever one cannot be had safely.
+
+        Raises
+        ------
+        InputError
+            If a motor is missing or an angle is not finite: such a command is not to be forwarded.
+        """
+        theta = self._motor_angles(names, positions)
+        theta_dot = self.settings.motors.speeds(names, velocities)
+        sent = np.array(positions, dtype=float)
+        if frame_id == CORRECTED_FRAME:
+            self._applied.reset()
+            self._remember(stamp_ns, theta, None, theta_dot)
+            twice = InputError(TWICE) if self.enabled else None
+            return CorrectedCommand(frame_id, sent, theta, None, twice)
+        correction: Correction | None = None
+        fault: WristError | None = None
+        load: Load | None = None
+        if self.enabled:
+            try:
+                load = self._load(stamp_ns)
+                correction = self._correction(stamp_ns, load, theta, theta_dot)
+            except WristError as error:
+                fault = error
+        delta = self._advance(stamp_ns, theta, correction)
+        if correction is not None:
+            mechanism = self.running_model().model.table.mechanism
+            correction = as_applied(mechanism, correction, delta)
+        forgotten = self._remember(stamp_ns, theta + delta, load, theta_dot)
+        if self.enabled:
+            fault = fault or forgotten
+        sent[list(self.settings.motors.places(names))] = theta + delta
+        marked = self.enabled or bool(np.any(delta))
+        return CorrectedCommand(
+            CORRECTED_FRAME if marked else frame_id, sent, theta + delta, correction, fault
+        )
+
+    def on_trajectory(
+        self,
+        stamp_ns: int,
+        frame_id: str,
+        names: Sequence[str],
+        points: Sequence[Sequence[float]],
+    ) -> CorrectedTrajectory:
+        """Correct every point of a trajectory under the load at its start.
+
+        A trajectory is a plan: it is neither slewed nor held by the hysteresis.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Its start [ns].
+        frame_id : str
+            Its header's frame.
+        names : sequence of str
+            Joint names.
+        points : sequence of sequences
+            Positions of every point [rad].
+
+        Returns
+        -------
+        CorrectedTrajectory
+            Unchanged as a whole, with the fault, if one point cannot be corrected.
+
+        Raises
+        ------
+        InputError
+            If a motor is missing or an angle is not finite: it is not to be forwarded.
+        """
+        angles = [self._motor_angles(names, positions) for positions in points]
+        sent = np.array(points, dtype=float).reshape(len(points), len(names))
+        if not self.enabled:
+            return CorrectedTrajectory(frame_id, sent, None)
+        try:
+            if frame_id == CORRECTED_FRAME:
+                raise InputError(TWICE)
+            load = self._load(stamp_ns)
+            corrected = [self._within_limits(stamp_ns, load, theta) for theta in angles]
+        except WristError as error:
+            return CorrectedTrajectory(CORRECTED_FRAME, sent, error)
+        sent[:, list(self.settings.motors.places(names))] = np.reshape(corrected, (-1, 2))
+        return CorrectedTrajectory(CORRECTED_FRAME, sent, None)
+
+    def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
+        theta = self.settings.motors.angles(names, positions, COMMAND)
+        if not np.all(np.isfinite(positions)):
+            raise InputError(f"{COMMAND}: position {list(positions)} is not finite")
+        return theta
+
+    def _remember(
+        self, stamp_ns: int, theta: Array, load: Load | None, theta_dot: Array | None
+    ) -> WristError | None:
+        """Remember what the motors are told, corrected or not; return why that is not possible.
+
+        The load is the one that is corrected for, else the measured one: a contact that is not
+        followed must not come back by way of the memory.
+        """
+        running = self._running
+        if running is None or not running.remembers:
+            return None
+        try:
+            if load is None:
+                _, load = self.loads.at(stamp_ns)
+            running.advance(stamp_ns, theta, load, theta_dot)
+        except WristError as error:
+            return error
+        return None
+
+    def _load(self, stamp_ns: int) -> Load:
+        _, measured = self.loads.at(stamp_ns)
+        # A payload may stand in for it, but a load beyond the table is a fault in any case; turning
+        # a wrench changes neither of its sizes, so its frame does not matter.
+        self.running_model().model.table.check_load(measured.wrench)
+        return self.contact.load(stamp_ns, measured, self.settings.contact)
+
+    def _correction(
+        self, stamp_ns: int, load: Load, theta: Array, theta_dot: Array | None = None
+    ) -> Correction:
+        """Return the correction that is wanted: faded by the guards, refused beyond the limit."""
+        running = self.running_model()
+        table = running.model.table
+        platform = table.geometry.platform
+        objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
+        predict = running.preview(stamp_ns, load, theta_dot)
+        correction = correct(predict, table.mechanism, theta, objective)
+        largest = float(np.max(np.abs(correction.delta)))
+        if largest > self.settings.correction_limit:
+            raise InputError(
+                f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
+                f"{np.degrees(self.settings.correction_limit):g} deg"
+            )
+        weight = guard_weight(
+            table.workspace, correction.prediction.configuration, self.settings.safety
+        )
+        return as_applied(table.mechanism, correction, weight * correction.delta)
+
+    def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
+        if self.model is None:
+            return np.zeros(2)
+        wanted = np.zeros(2) if correction is None else correction.delta
+        limits = self.model.table.geometry.limits
+        return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
+
+    def _within_limits(self, stamp_ns: int, load: Load, theta: Array) -> Array:
+        limits = self.running_model().model.table.geometry.limits
+        return within_joint_limits(theta, self._correction(stamp_ns, load, theta).delta, limits)
