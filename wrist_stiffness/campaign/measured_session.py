@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,14 +18,16 @@ from wrist_stiffness.model.block import Block
 class MeasuredSession:
     """Measured poses of the platform with the signals that belong to them, in the order of time.
 
-    Between two sessions the instruments or the machine were set up anew.
+    Between two sessions the instruments or the machine were set up anew.  Rows in which nothing was
+    measured carry the path of angles and load between two measurements, which friction, backlash
+    and creep remember.
 
     Parameters
     ----------
     name : str
         For reports: the recording's file name.
     block : Block
-        Signals at the stamps of the n measurements.
+        Signals at the stamps of the n rows.
     shift : (n, 3) float
         Measured position of the platform's point O in F [m]; NaN = not measured.
     rotation : (n, 3, 3) float
@@ -35,6 +37,11 @@ class MeasuredSession:
         first [m, rad].
     notes : dict
         What the recording says of itself: sensor, wrist, session, load source.
+    remarks : tuple of str
+        What could not be used of the recording or was put right, a line for each.
+    clock_offset_s : (float, float), optional
+        Pose sensor's clock minus the joint states', estimate and one standard uncertainty, where
+        the motion tells it [s].
 
     Raises
     ------
@@ -48,6 +55,8 @@ class MeasuredSession:
     rotation: Array
     covariance: Array | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    clock_offset_s: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes."""
@@ -60,7 +69,7 @@ class MeasuredSession:
                 raise InputError(f"{self.name}: {name} has shape {found}, not {shape}")
 
     def __len__(self) -> int:
-        """Return the number of measurements."""
+        """Return the number of rows."""
         return len(self.block)
 
     @property
@@ -70,12 +79,10 @@ class MeasuredSession:
         return np.hstack([np.isfinite(self.shift), np.repeat(turned[:, None], 3, axis=1)])
 
     def take(self, rows: slice | NDArray[np.bool_]) -> MeasuredSession:
-        """Return some of the measurements, in their order."""
-        return MeasuredSession(
-            self.name,
-            self.block.take(rows),
-            self.shift[rows],
-            self.rotation[rows],
-            self.covariance,
-            self.notes,
+        """Return some of the rows, in their order."""
+        return replace(
+            self,
+            block=self.block.take(rows),
+            shift=self.shift[rows],
+            rotation=self.rotation[rows],
         )
