@@ -76,7 +76,7 @@ class Block:
         """Return the number of samples."""
         return len(self.time)
 
-    def take(self, rows: slice | NDArray[np.bool_]) -> Block:
+    def take(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Block:
         """Return some of the samples, in their order."""
         return Block(
             self.time[rows],
