@@ -1,0 +1,333 @@
+"""From measured sessions to the table that the statistics take: one residual twist a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
+from wrist_stiffness.diagnosis import Observations, Quantity
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.error_model import ErrorModel
+
+QUANTITIES = (
+    Quantity("s", "um", (0, 1, 2), 1e6),
+    Quantity("phi", "mdeg", (3, 4, 5), 180e3 / np.pi),
+)
+
+LOST = 8.0
+"""Robust standard deviations from its dwell's median at which one measurement is a lost beam."""
+
+MAD_TO_SIGMA = 1.4826
+
+SAME_POSE_COUNTS, SAME_LOAD = 2.5, 0.02
+"""Two dwells repeat one condition within so many encoder counts and this share of the load."""
+
+FEWEST_FOR_NOISE = 30
+"""Steps between neighbouring measurements of dwells from which their scatter is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitSession:
+    """One session as units.
+
+    Parameters
+    ----------
+    name : str
+        Of the session.
+    cut : Cut
+        Its units, and the moments that tell its path.
+    shift, turn : (u, 3) float
+        Mean measured pose error of each unit against the rigid wrist: shift of O [m] and rotation
+        vector [rad]; NaN = not measured.
+    samples : (u,) float
+        Measurements in each mean.
+    lost : int
+        Measurements left out as lost beams.
+    white : (6,) float
+        Scatter of one measurement, NaN where it is not known [m, rad].
+    """
+
+    name: str
+    cut: Cut
+    shift: Array
+    turn: Array
+    samples: Array
+    lost: int
+    white: Array
+
+    @property
+    def block(self) -> Block:
+        """Signals at the moments that are kept."""
+        return self.cut.block
+
+    def mean(self, values: Array) -> Array:
+        """Return the means over units (u, ...) of values at the kept moments (k, ...)."""
+        flat = values.reshape(len(values), -1)
+        used, units = self.cut.unit >= 0, len(self.cut.dwell)
+        weighted = flat[used] * self.cut.weight[used, None]
+        sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
+        mean: Array = np.stack(sums, axis=1).reshape(units, *values.shape[1:])
+        return mean
+
+    def residual(self, twist: Array) -> Array:
+        """Return log(T_measured T_predicted^-1) at O in F, (u, 6) [m, rad].
+
+        Parameters
+        ----------
+        twist : (u, 6) float
+            Predicted pose error of each unit [m, rad].
+        """
+        rotation, shift = exp_twist(twist)
+        known: Mask = np.isfinite(self.turn).all(axis=1)
+        measured = Rotation.from_rotvec(np.where(known[:, None], self.turn, 0.0)).as_matrix()
+        # Without a measured rotation the predicted one stands in: then s is compared with s.
+        measured = np.where(known[:, None, None], measured, rotation)
+        left = measured @ np.swapaxes(rotation, -1, -2)
+        moved = self.shift - (left @ shift[..., None])[..., 0]
+        out = log_motion(left, np.nan_to_num(moved))
+        out[:, :3][~np.isfinite(self.shift)] = np.nan
+        out[~known, 3:] = np.nan
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Sessions, what a model predicts of them, and the table of the difference.
+
+    Parameters
+    ----------
+    sessions : tuple of UnitSession
+        Sessions as units.
+    predicted : (u, 6) float
+        Predicted pose error of the units of all sessions, what the sensor would say [m, rad].
+    observations : Observations
+        Residuals and conditions of all units.
+    unit : tuple of (n,) int
+        For each session the row in the table of each measurement, -1 for none.
+    """
+
+    sessions: tuple[UnitSession, ...]
+    predicted: Array
+    observations: Observations
+    unit: tuple[Labels, ...]
+
+
+def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
+    """Compare a model with what was measured, unit by unit.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Predicts.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+
+    Returns
+    -------
+    Observed
+        Only of units that lie in the table's domain and load range.
+
+    Raises
+    ------
+    InputError
+        If no unit is left, or the sessions do not measure the same wrist's signals.
+    """
+    if not sessions:
+        raise InputError("no session to compare the model with")
+    cuts = tuple(as_units(model, session) for session in sessions)
+    predicted = np.concatenate([predict_units(model, each) for each in cuts])
+    return tabulate(model, cuts, predicted)
+
+
+def predict_units(model: ErrorModel, session: UnitSession) -> Array:
+    """Return the predicted pose error of each unit as the sensor says it, (u, 6) [m, rad]."""
+    return session.mean(model.batch(session.block).measured)
+
+
+def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
+    """Cut a session into units and average what was measured.
+
+    Measurements outside the model's domain or load range belong to no unit.
+    """
+    accepted = model.accepts(session.block)
+    if not accepted.any():
+        raise InputError(
+            f"{session.name}: none of {len(session)} measurements lies in the table's domain and "
+            "load range"
+        )
+    session = session.take(accepted)
+    parts = cut(
+        session.block, model.table.geometry.limits.encoder_step, session.measured.any(axis=1)
+    )
+    nominal = model.table.mechanism.forward(session.block.theta).platform
+    error = session.rotation @ np.swapaxes(nominal, -1, -2)
+    known = np.isfinite(error).all(axis=(1, 2))
+    turn = np.full((len(session), 3), np.nan)
+    turn[known] = Rotation.from_matrix(error[known]).as_rotvec()
+    values = np.concatenate([session.shift, turn], axis=1)
+    units = len(parts.dwell)
+    lost = _lost(values, parts)
+    label = np.where(lost, -1, parts.label)
+    mean, count = _means(values, label, units)
+    return UnitSession(
+        session.name,
+        parts,
+        mean[:, :3],
+        mean[:, 3:],
+        np.maximum(count.max(axis=1), 1.0),
+        int(lost.sum()),
+        _white(values, label, parts, session.covariance),
+    )
+
+
+def _means(values: Array, label: Labels, units: int) -> tuple[Array, Array]:
+    mean, count = np.full((2, units, values.shape[1]), np.nan)
+    for column, each in enumerate(values.T):
+        good = np.isfinite(each) & (label >= 0)
+        count[:, column] = np.bincount(label[good], minlength=units)
+        total = np.bincount(label[good], each[good], minlength=units)
+        mean[:, column] = np.where(
+            count[:, column] > 0, total / np.maximum(count[:, column], 1.0), np.nan
+        )
+    return mean, count
+
+
+def _lost(values: Array, parts: Cut) -> Mask:
+    """Tell which measurements lie far from the median of their dwell, (n,)."""
+    rows = np.flatnonzero((parts.label >= 0) & parts.dwell[parts.label])
+    lost = np.zeros(len(values), dtype=bool)
+    if len(rows) == 0:
+        return lost
+    label = parts.label[rows]
+    for column in values.T:
+        order = rows[np.lexsort((column[rows], label))]
+        count = np.bincount(label)
+        good = np.bincount(label, np.isfinite(column[rows])).astype(int)
+        # NaN sort to the end of their dwell.
+        first = np.cumsum(count) - count
+        middle = column[order[np.minimum(first + good // 2, len(order) - 1)]]
+        off = np.abs(column[rows] - middle[label])
+        usual = MAD_TO_SIGMA * float(np.nanmedian(off)) if np.isfinite(off).any() else 0.0
+        # A dwell in which the wrist settles or creeps is no dropout: its own spread counts too.
+        own = np.sqrt(np.bincount(label, np.nan_to_num(np.minimum(off, 1e3 * usual)) ** 2))
+        own /= np.sqrt(np.maximum(count, 1))
+        lost[rows] |= off > LOST * np.maximum(usual, 0.5 * np.minimum(own, 4.0 * usual)[label])
+    return lost
+
+
+def _white(values: Array, label: Labels, parts: Cut, stated: Array | None) -> Array:
+    """Return the scatter of one measurement from neighbours in dwells, else as stated, (6,)."""
+    inside = (label[1:] == label[:-1]) & (label[1:] >= 0) & parts.dwell[label[1:]]
+    step = np.abs(np.diff(values, axis=0)[inside])
+    white = np.full(values.shape[1], np.nan)
+    for column, each in enumerate(step.T):
+        good = each[np.isfinite(each)]
+        if len(good) >= FEWEST_FOR_NOISE:
+            white[column] = MAD_TO_SIGMA / np.sqrt(2.0) * np.median(good)
+        elif stated is not None and stated[column, column] > 0.0:
+            white[column] = np.sqrt(stated[column, column])
+    return white
+
+
+def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:
+    """Return the table of residuals of units against a prediction of them, (u, 6)."""
+    ends = np.cumsum([len(each.cut.dwell) for each in sessions])
+    parts = np.split(predicted, ends[:-1])
+    values = np.concatenate(
+        [each.residual(part) for each, part in zip(sessions, parts, strict=True)]
+    )
+    used = np.isfinite(values).any(axis=1)
+    if not used.any():
+        raise InputError("no unit of the sessions was measured: every pose is blank")
+    theta = np.concatenate([each.mean(each.block.theta) for each in sessions])
+    observations = Observations(
+        values,
+        _covariates(sessions),
+        _covariance(model, sessions, theta),
+        np.concatenate([each.mean(each.block.time) for each in sessions]),
+        np.repeat(np.arange(len(sessions)), [len(each.cut.dwell) for each in sessions]),
+        _replicates(model, sessions, theta),
+        np.concatenate([each.samples for each in sessions]),
+        QUANTITIES,
+    )
+    row = np.where(used, np.cumsum(used) - 1, -1)
+    starts = ends - [len(each.cut.dwell) for each in sessions]
+    labels = tuple(
+        np.where(each.cut.label >= 0, row[start + each.cut.label], -1)
+        for each, start in zip(sessions, starts, strict=True)
+    )
+    kept = replace(observations.take(used), row=None)
+    return Observed(sessions, predicted, kept, labels)
+
+
+def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
+    """Return the conditions of each unit by name."""
+    columns: list[dict[str, Array]] = []
+    for each in sessions:
+        block, parts = each.block, each.cut
+        load = each.mean(block.load)
+        own = {
+            **{f"theta_{i + 1}": each.mean(block.theta[:, i]) for i in range(2)},
+            **{f"approach_{i + 1}": each.mean(parts.sense[parts.kept, i]) for i in range(2)},
+            **{f"speed_{i + 1}": each.mean(parts.speed[:, i]) for i in range(2)},
+            **dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), load.T, strict=True)),
+            "force": np.linalg.norm(load[:, :3], axis=1),
+            "moment": np.linalg.norm(load[:, 3:], axis=1),
+            "held_s": each.mean(parts.held_s[parts.kept]),
+            "loaded_at_rest": np.rint(each.mean(parts.at_rest[parts.kept].astype(float))),
+            "time_s": each.mean(block.time),
+            **{f"T_{name}": each.mean(value) for name, value in block.temperatures.items()},
+            **{name: each.mean(value) for name, value in block.covariates.items()},
+        }
+        columns.append(own)
+    common = [name for name in columns[0] if all(name in own for own in columns)]
+    return {name: np.concatenate([own[name] for own in columns]) for name in common}
+
+
+def _covariance(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Array | None:
+    """Return the covariance of each unit on its own: white noise and the hidden encoder count."""
+    mechanism, step = model.table.mechanism, model.table.geometry.limits.encoder_step
+    jacobian = np.zeros((len(theta), 6, 2))
+    jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
+    counts = jacobian @ np.swapaxes(jacobian, -1, -2) * step**2 / 12.0
+    white = np.stack([each.white for each in sessions])
+    seen = np.concatenate([np.concatenate([e.shift, e.turn], axis=1) for e in sessions])
+    if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():
+        return None
+    variance = np.nan_to_num(white, nan=1.0) ** 2
+    own = np.concatenate(
+        [v / each.samples[:, None] for v, each in zip(variance, sessions, strict=True)]
+    )
+    return np.asarray(counts + own[:, :, None] * np.eye(6))
+
+
+def _replicates(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Labels:
+    """Return the number of the condition that each dwell repeats after a new approach, -1 else."""
+    step = model.table.geometry.limits.encoder_step
+    labels = []
+    number, start = 0, 0
+    for each in sessions:
+        units = len(each.cut.dwell)
+        pose, load = theta[start : start + units], each.mean(each.block.load)
+        range_ = np.repeat([np.linalg.norm(load[:, i : i + 3], axis=1).max() for i in (0, 3)], 3)
+        own = np.full(units, -1)
+        for i in np.flatnonzero(each.cut.dwell):
+            if own[i] >= 0:
+                continue
+            alike = each.cut.dwell & (own < 0)
+            alike &= (np.abs(pose - pose[i]) <= SAME_POSE_COUNTS * step).all(axis=1)
+            alike &= (np.abs(load - load[i]) <= SAME_LOAD * range_ + 1e-12).all(axis=1)
+            if alike.sum() > 1:
+                own[alike] = number
+                number += 1
+        labels.append(own)
+        start += units
+    return np.concatenate(labels)

@@ -1,0 +1,268 @@
+"""Cut one session into units: what counts as one measurement, and the moments that tell its path.
+
+A unit is a dwell (angles and load at rest) or a single moment in motion.  The path between them
+matters to effects with a memory, so moments are kept that tell it: both ends of every rest,
+log-spaced moments within, regular ones in motion, and the turning points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
+
+Labels = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+WINDOW_S = 0.15
+"""Means over this time before and after a sample are compared to tell rest from change."""
+
+PATH_S = 0.1
+"""Time between the moments that are kept in motion."""
+
+UNIT_EVERY = 5
+"""One kept moment in so many counts as a unit in motion."""
+
+SPARSE_S = 1.0
+"""Samples further apart than this are poses measured one by one, each at rest."""
+
+FEWEST_IN_DWELL = 3
+"""Samples that make a dwell."""
+
+COUNTS = 1.5
+"""Encoder counts by which a motor at rest may seem to move."""
+
+SIGNIFICANT = 5.0
+"""Standard deviations by which a noisy load must change to change."""
+
+LEAST_LOAD_CHANGE = 2e-3
+"""Share of the load's range below which it rests whatever its noise."""
+
+FIRST_S, GROWTH = 0.05, 2.0
+"""First moment kept after the start of a rest, and the ratio of one to the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Units of n samples and the moments that are kept of them.
+
+    Parameters
+    ----------
+    label : (n,) int
+        Unit of each sample in the order of time, -1 for none.
+    dwell : (u,) bool
+        Whether a unit is a dwell.
+    kept : (k,) int
+        Samples that are kept.
+    block : Block
+        Their signals, smoothed: means of angles and load over a rest, motor speeds over a window.
+    unit : (k,) int
+        Unit of each kept sample, -1 for none.
+    weight : (k,) float
+        Its share of the unit's mean; the shares of a unit add up to 1.
+    held_s : (n,) float
+        Time since anything changed [s].
+    speed : (k, 2) float
+        Motor speeds at the kept samples [rad/s].
+    at_rest : (n,) bool
+        Whether the load changed after the last motion rather than before it.
+    sense : (n, 2) float
+        Sign of each motor's last motion, 0 before the first.
+    """
+
+    label: Labels
+    dwell: Mask
+    kept: Labels
+    block: Block
+    unit: Labels
+    weight: Array
+    held_s: Array
+    speed: Array
+    at_rest: Mask
+    sense: Array
+
+
+def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
+    """Find the units of a session, at a cost linear in its samples.
+
+    Parameters
+    ----------
+    block : Block
+        Signals at the stamps of the measurements.
+    encoder_step : float
+        [rad].
+    measured : (n,) bool
+        Where anything was measured; the other samples only tell the path.
+    """
+    n = len(block)
+    step = float(np.median(np.diff(block.time))) if n > 1 else np.inf
+    sparse = step > SPARSE_S
+    before, after = _windows(block.time, max(WINDOW_S, 1.5 * step) if not sparse else 0.0)
+    turning = _changes(block.theta, before, after, np.full(2, COUNTS * encoder_step), 0.0)
+    loading = _changes(block.load, before, after, *_load_tolerance(block.load))
+    speed = block.theta_dot
+    if speed is None:
+        speed = np.zeros((n, 2)) if sparse else _speed(block, before, after)
+    stretch, resting = _stretches(turning | loading, block.theta, encoder_step, sparse)
+    sense = _last_sign(block.theta, speed, turning, sparse)
+    last_turn, last_load = _last(turning, block.time), _last(loading, block.time)
+    start = np.searchsorted(stretch, np.arange(stretch[-1] + 1))
+    held_s: Array = np.where(resting, block.time - block.time[start[stretch]], 0.0)
+    kept, in_motion = _moments(block.time, stretch, start, resting, speed, measured)
+    smooth = _smoothed(block, before, after, stretch, resting, speed)
+    label, dwell = _units(stretch, resting, kept, in_motion)
+    unit = label[kept]
+    return Cut(
+        label,
+        dwell,
+        kept,
+        smooth.take(kept),
+        unit,
+        _weights(block.time[kept], unit, len(dwell)),
+        held_s,
+        np.where(resting[kept, None], 0.0, speed[kept]),
+        last_load > last_turn,
+        sense,
+    )
+
+
+def _windows(time: Array, width: float) -> tuple[Labels, Labels]:
+    """Return the first sample of the window before each sample and the end of the one after."""
+    first = np.searchsorted(time, time - width, side="left")
+    end = np.searchsorted(time, time + width, side="right")
+    return first, end
+
+
+def _window_means(values: Array, first: Labels, end: Labels) -> Array:
+    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    return (total[end] - total[first]) / np.maximum(end - first, 1)[:, None]
+
+
+def _changes(values: Array, first: Labels, end: Labels, level: Array, noise: Array | float) -> Mask:
+    """Tell where the means before and after a sample differ by more than level and noise, (n,)."""
+    here = np.arange(len(values))
+    # Sums of differences to the first value: no digits are lost in a long recording.
+    values = values - values[0]
+    early, late = _window_means(values, first, here + 1), _window_means(values, here, end)
+    spread = noise * np.sqrt(1.0 / (here + 1 - first) + 1.0 / (end - here))[:, None]
+    return np.asarray((np.abs(late - early) > level + spread).any(axis=1))
+
+
+def _load_tolerance(load: Array) -> tuple[Array, Array]:
+    """Return how far each component may move without changing, and its noise times a margin."""
+    step = np.abs(np.diff(load, axis=0))
+    noise = 1.4826 / np.sqrt(2.0) * (np.median(step, axis=0) if len(step) else np.zeros(6))
+    level = np.repeat([np.ptp(load[:, i : i + 3], axis=0).max() for i in (0, 3)], 3)
+    return LEAST_LOAD_CHANGE * level, SIGNIFICANT * noise
+
+
+def _speed(block: Block, first: Labels, end: Labels) -> Array:
+    """Return the mean motor speeds over the windows, (n, 2) [rad/s]."""
+    last = end - 1
+    span = block.time[last] - block.time[first]
+    step = block.theta[last] - block.theta[first]
+    return np.divide(step, span[:, None], out=np.zeros_like(step), where=span[:, None] > 0.0)
+
+
+def _stretches(
+    changing: Mask, theta: Array, encoder_step: float, sparse: bool
+) -> tuple[Labels, Mask]:
+    """Return the number of the stretch of rest or of change of each sample, and which rest."""
+    n = len(changing)
+    if sparse:
+        return np.arange(n), np.ones(n, dtype=bool)
+    starts = np.flatnonzero(np.diff(changing, prepend=~changing[0]))
+    stretch = np.repeat(np.arange(len(starts)), np.diff(starts, append=n))
+    span = np.maximum.reduceat(theta, starts) - np.minimum.reduceat(theta, starts)
+    # A motion slower than the windows can see is no rest.
+    creeping = (span > 2.0 * COUNTS * encoder_step).any(axis=1)
+    short = np.diff(starts, append=n) < FEWEST_IN_DWELL
+    resting = (~changing[starts] & ~creeping & ~short)[stretch]
+    starts = np.flatnonzero(np.diff(resting, prepend=~resting[0]) | np.diff(stretch, prepend=-1))
+    # Neighbouring stretches without rest are one; two rests are never neighbours.
+    merged = [0, *(s for s in starts[1:] if resting[s] or resting[s - 1])]
+    return np.repeat(np.arange(len(merged)), np.diff(merged, append=n)), resting
+
+
+def _last(event: Mask, time: Array) -> Array:
+    """Return the time of the last event up to each sample, minus infinity before the first."""
+    return np.maximum.accumulate(np.where(event, time, -np.inf))
+
+
+def _last_sign(theta: Array, speed: Array, turning: Mask, sparse: bool) -> Array:
+    if sparse:
+        moved = np.sign(np.diff(theta, axis=0, prepend=theta[:1]))
+    else:
+        moved = np.where(turning[:, None], np.sign(speed), 0.0)
+    last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(theta))[:, None], 0), axis=0)
+    return np.take_along_axis(moved, last, axis=0)
+
+
+def _moments(
+    time: Array, stretch: Labels, start: Labels, resting: Mask, speed: Array, measured: Mask
+) -> tuple[Labels, Mask]:
+    """Return the samples to keep, and which of all are regular measured ones in motion."""
+    n = len(time)
+    end = np.append(start[1:], n) - 1
+    keep, regular = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    keep[start], keep[end] = True, True
+    turned = np.diff(np.sign(speed), axis=0, prepend=np.sign(speed[:1])) != 0.0
+    keep |= turned.any(axis=1) & ~resting
+    grid = np.floor((time - time[0]) / PATH_S + 1e-6)
+    keep |= (np.diff(grid, prepend=-1.0) > 0.0) & ~resting
+    seen = np.flatnonzero(measured & ~resting)
+    regular[seen] = np.diff(grid[seen], prepend=-1.0) > 0.0
+    since = time - time[start[stretch]]
+    with np.errstate(divide="ignore"):
+        octave = np.floor(np.log(np.maximum(since, 1e-12) / FIRST_S) / np.log(GROWTH))
+    keep |= resting & (octave >= 0) & (np.diff(octave, prepend=-np.inf) != 0.0)
+    return np.flatnonzero(keep | regular), regular
+
+
+def _units(stretch: Labels, resting: Mask, kept: Labels, regular: Mask) -> tuple[Labels, Mask]:
+    """Return the unit of each sample and which units are dwells."""
+    chosen = np.zeros(len(stretch), dtype=bool)
+    chosen[np.flatnonzero(regular)[::UNIT_EVERY]] = True
+    starts = chosen | (resting & (np.diff(stretch, prepend=-1) != 0))
+    label = np.where(chosen | resting, np.cumsum(starts) - 1, -1)
+    return label, resting[starts]
+
+
+def _smoothed(
+    block: Block, first: Labels, end: Labels, stretch: Labels, resting: Mask, speed: Array
+) -> Block:
+    """Return the block with means of angles and load over rests, and over short windows else."""
+    size = np.bincount(stretch)
+
+    def mean(values: Array) -> Array:
+        columns = [np.bincount(stretch, column) / size for column in values.T]
+        return np.stack(columns, axis=1)[stretch]
+
+    rests = resting[:, None]
+    near = np.minimum(np.arange(len(stretch)) - first, end - 1 - np.arange(len(stretch))) // 3
+    here = np.arange(len(stretch))
+    # Short and symmetric, so that a ramp is not shifted.
+    local = _window_means(block.load, here - near, here + near + 1)
+    return replace(
+        block,
+        theta=np.where(rests, mean(block.theta), block.theta),
+        load=np.where(rests, mean(block.load), local),
+        theta_dot=np.where(rests, 0.0, speed),
+    )
+
+
+def _weights(time: Array, unit: Labels, n_units: int) -> Array:
+    """Return the shares of kept moments in the means of their units: the trapezoid rule."""
+    same = unit[1:] == unit[:-1]
+    half = 0.5 * np.where(same, np.diff(time), 0.0)
+    weight = np.append(half, 0.0) + np.append(0.0, half)
+    used = unit >= 0
+    total = np.bincount(unit[used], weight[used], minlength=n_units)
+    alone = total == 0.0
+    count = np.bincount(unit[used], minlength=n_units)
+    share = np.where(alone[unit], 1.0 / count[unit], weight / np.where(alone, 1.0, total)[unit])
+    return np.where(used, share, 0.0)
