@@ -1,14 +1,19 @@
 """Models with a memory in the streams, and the slow signals that effects need."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.held_signals import HeldSignals
+from wrist_stiffness.compensation.monitor import MonitorSettings
+from wrist_stiffness.compensation.monitor_stream import MonitorStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
@@ -16,6 +21,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
 
@@ -115,6 +121,87 @@ def test_commands_are_corrected_from_the_commanded_history(loose):
     assert max(missed[1:10]) < 1e-9
     assert max(missed[12:]) < 1e-9
     assert added[5] - added[15] == pytest.approx(2.0 * half, rel=0.05)
+
+
+AT_ONCE = StreamSettings(
+    contact=ContactSettings("gain", gain=1.0),
+    safety=SafetySettings(slew=1e3, deadband_steps=0.0),
+)
+NOT_CORRECTED = {
+    "disabled": (False, AT_ONCE, ""),
+    "beyond the limit": (True, replace(AT_ONCE, correction_limit=1e-9), ""),
+    "corrected by another": (True, AT_ONCE, "wrist_corrected"),
+}
+
+
+@pytest.mark.parametrize(
+    ("enabled", "settings", "frame"), NOT_CORRECTED.values(), ids=NOT_CORRECTED
+)
+def test_commands_that_were_not_corrected_are_remembered_too(loose, enabled, settings, frame):
+    """The motor came from above, which only the memory knows when the correction begins."""
+    stream = CorrectionStream(loose, settings, enabled)
+    truth = loose.session()
+
+    def send(i, degrees, marked=""):
+        theta, stamp = np.radians([degrees, 0.0]), SECOND + i * SECOND // 10
+        stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
+        command = stream.on_command(stamp, marked, NAMES, theta)
+        return theta, command, truth.advance(Sample(stamp / SECOND, command.theta, Load(DOWN)))
+
+    for i in range(5):
+        theta, command, _ = send(i, 1.0 - 0.1 * i, frame)
+        assert np.array_equal(command.theta, theta)
+    stream.enabled, stream.settings = True, AT_ONCE
+    theta, command, prediction = send(5, 0.5)
+    desired = loose.table.mechanism.forward(theta).platform
+    left = residual_twist(prediction, desired)[3:]
+    # The residual is moved by the rigid Jacobian: off by 1e-3 of the correction.
+    half = 0.5 * np.radians(1e-3 * BACKLASH_MDEG)
+    assert np.linalg.norm(command.correction.after[3:] - left) < 0.01 * half
+    assert np.linalg.norm(command.correction.before[3:]) > 0.5 * half
+
+
+@pytest.fixture(scope="module")
+def speedy(model):
+    """A shift of 1 mm along x for every rad/s of motor 1, on top of the elastic error."""
+    law = FormulaLaw("speedy", "frame", np.eye(6)[0], "1e-3 * theta_dot_1", [], [])
+    return model.with_effects(Effect(law, "frame", {}))
+
+
+NAN = float("nan")
+# 0.01 rad in 0.1 s before the sample.
+SPEEDS = {
+    "given": (NAMES, (0.3, 0.0), 0.3),
+    "other order": (NAMES[::-1], (0.0, 0.3), 0.3),
+    "absent": (NAMES, (), 0.1),
+    "not finite": (NAMES, (NAN, 0.0), 0.1),
+    "too few": (NAMES, (0.3,), 0.1),
+}
+
+
+@pytest.mark.parametrize(("names", "speeds", "wanted"), SPEEDS.values(), ids=SPEEDS)
+def test_speeds_are_used_where_given_and_else_differences(model, speedy, names, speeds, wanted):
+    predicting = PredictionStream(speedy, StreamSettings())
+    correcting = CorrectionStream(speedy, replace(AT_ONCE, objective="tool_point"), enabled=False)
+    monitoring = MonitorStream(speedy, StreamSettings(), MonitorSettings(np.ones(6)), 1.0)
+    plain = model.predict(np.array([0.01, 0.0]), Load(DOWN))
+    rotation, shift = plain.motion
+    quaternion = Rotation.from_matrix(rotation @ plain.configuration.platform).as_quat()
+    for stamp, first in ((SECOND, 0.0), (SECOND + SECOND // 10, 0.01)):
+        angles = [first, 0.0] if names == NAMES else [0.0, first]
+        for stream in (predicting, correcting, monitoring):
+            stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
+        predicted = predicting.on_joint_state(stamp, names, angles, speeds).prediction
+        monitoring.on_joint_state(stamp, names, angles, speeds)
+        residual = monitoring.on_pose(stamp, "wrist_base", shift, quaternion).residual
+        correcting.enabled = stamp > SECOND
+        command = correcting.on_command(stamp, "", names, angles, speeds)
+    for found in (
+        predicted.twist - plain.twist,
+        -residual,
+        command.correction.before - plain.twist,
+    ):
+        assert found[0] == pytest.approx(1e-3 * wanted, rel=1e-3)
 
 
 @given(
