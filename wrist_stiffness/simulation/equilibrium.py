@@ -144,29 +144,31 @@ class Pose:
         """
         ops, n_k = self.operators, self.operators.screw_gap
         free = self._weight.wrench + (self._carry @ load[:, None, :, None])[..., 0]
-        gap = ops.gap + np.einsum("nim,ni->nm", ops.force_twist, load)
+        gap = ops.gap + _times(np.swapaxes(ops.force_twist, -1, -2), load)
         given = screws
         if extra is not None:
             free = free + extra
             given = given + (self.flexibility @ extra[..., None])[..., 0]
             gap = gap + np.einsum("nmi,nmi->nm", self._sector_screw, extra.take(self._own, axis=1))
-        gap = gap + np.einsum("nmki,nki->nm", n_k, given)
+        n, m = gap.shape
+        flat = n_k.reshape(n, m, given[0].size)
+        gap = gap + _times(flat, given.reshape(n, -1))
         force, closed = self._contact(gap, free, bends)
-        through = free + np.einsum("nmki,nm->nki", n_k, force)
+        through = free + _times(np.swapaxes(flat, -1, -2), force).reshape(free.shape)
         total = given.copy()
         for k, law in bends:
             total[:, k] += law(through[:, k])[0]
         twist = (
             ops.weight_twist
-            + (ops.compliance @ load[..., None])[..., 0]
-            + np.einsum("nim,nm->ni", ops.force_twist, force)
+            + _times(ops.compliance, load)
+            + _times(ops.force_twist, force)
             + platform_twist(self.projectors, total)
         )
         elastic = (self.flexibility @ (through - (0.0 if extra is None else extra))[..., None])[
             ..., 0
         ]
         belongs = np.eye(elastic.shape[1])[self._own]
-        own = np.einsum("nmi,nm,mk->nki", self._sector_screw, force, belongs)
+        own = belongs.T @ (self._sector_screw * force[..., None])
         whole = total + elastic + own
         halves = whole.reshape(*whole.shape[:2], 2, 3)
         slips = np.einsum("nkji,nkhi->njh", self.rows, halves)
@@ -183,34 +185,44 @@ class Pose:
 
         def bent(at: Array) -> list[tuple[Array, Array, Array]]:
             return [
-                (n_k[:, :, k], *law(free[:, k] + np.einsum("nmi,nm->ni", n_k[:, :, k], at)))
+                (n_k[:, :, k], *law(free[:, k] + _times(np.swapaxes(n_k[:, :, k], -1, -2), at)))
                 for k, law in bends
             ]
 
         def opening(at: Array) -> Array:
-            out = gap + (approach @ at[..., None])[..., 0]
-            return out + sum(np.einsum("nmi,ni->nm", rows, screw) for rows, screw, _ in bent(at))
+            out = gap + _times(approach, at)
+            return out + sum(_times(rows, screw) for rows, screw, _ in bent(at))
 
+        todo = np.arange(len(gap))
         for _ in range(MAX_STEPS):
-            tangent_gap, tangent = gap, approach
+            tangent_gap, tangent = gap[todo], approach[todo]
             for rows, screw, slope in bent(force):
-                down = rows @ slope
-                linear = screw - np.einsum("nmi,nm->ni", down, force)
-                tangent_gap = tangent_gap + np.einsum("nmi,ni->nm", rows, linear)
-                tangent = tangent + down @ np.swapaxes(rows, -1, -2)
-            new, closed = solve_contacts(tangent, tangent_gap, closed)
-            change = new - force
+                down = rows[todo] @ slope[todo]
+                linear = screw[todo] - _times(np.swapaxes(down, -1, -2), force[todo])
+                tangent_gap = tangent_gap + _times(rows[todo], linear)
+                tangent = tangent + down @ np.swapaxes(rows[todo], -1, -2)
+            new, closed[todo] = solve_contacts(tangent, tangent_gap, closed[todo])
             if not bends:
                 return new, closed
+            change = np.zeros_like(gap)
+            change[todo] = new - force[todo]
             scale = np.max(np.abs(new), axis=1, initial=SMALL_FORCE)
-            if np.all(np.abs(change) <= FORCE_TOLERANCE * scale[:, None]):
-                return new, closed
+            moves = np.any(np.abs(change[todo]) > FORCE_TOLERANCE * scale[:, None], axis=1)
+            if not moves.any():
+                force[todo] = new
+                return force, closed
             force = force + _step_length(opening, force, change)[:, None] * change
+            todo = todo[moves]
         worst = float(np.max(np.abs(change)))
         raise InputError(
             f"true wrist: no equilibrium after {MAX_STEPS} steps; "
             f"flange forces still change by {worst:.2e} N"
         )
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    """Return (n, i, j) times (n, j); a stack of products is several times as fast as einsum."""
+    return np.asarray((matrix @ vector[..., None])[..., 0])
 
 
 def _step_length(opening: Callable[[Array], Array], force: Array, change: Array) -> Array:

@@ -47,9 +47,9 @@ class JointClearance(Law):
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Push both ends of the pin against the bore."""
         to_origin = self.seat.to_origin(block.rotation(self.joint))
-        local = np.einsum("nji,nj->ni", to_origin, wrench)
+        local = wrench[:, None] @ to_origin
         rings = self.seat.rings
-        push = np.einsum("rij,nj->nri", rings, local)
+        push = (local[:, None] @ np.swapaxes(rings, -1, -2))[..., 0, :]
         size = np.sqrt(np.sum(push * push, axis=-1) + (1e-3 * self.squeeze) ** 2)[..., None]
         half, x = self.clearance / 2.0, size / self.squeeze
         if self.form == "algebraic":
@@ -62,9 +62,10 @@ class JointClearance(Law):
         slope = over[..., None] * np.eye(3) + (fall / size)[..., None] * (
             push[..., :, None] * push[..., None, :]
         )
-        screw = np.einsum("rij,nri->nj", rings, displaced)
-        tangent = np.einsum("rij,nrik,rkl->njl", rings, slope, rings)
+        # Sums over both ends; stacks of products, einsum of three is ten times as slow.
+        screw = (displaced[..., None, :] @ rings).sum(axis=1)
+        tangent = (np.swapaxes(rings, -1, -2) @ slope @ rings).sum(axis=1)
         return (
-            np.einsum("nij,nj->ni", to_origin, screw),
+            (to_origin @ screw[:, 0, :, None])[..., 0],
             to_origin @ tangent @ np.swapaxes(to_origin, -1, -2),
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import exp, hypot
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
@@ -20,6 +22,9 @@ BODIES_JOINED = {
 
 
 SLIP_PASSES = 6
+
+Pair = tuple[float, float]
+"""Along the slide and round it [m] or [N]."""
 
 
 class JointFriction(Law):
@@ -61,7 +66,7 @@ class JointFriction(Law):
         self._joint = joint
         self.seat, self._mu, self._preload = seat, mu, preload
         self.stiffness, self._stribeck = stiffness, stribeck
-        self._state: tuple[float, Array, Array] | None = None
+        self._state: tuple[float, Pair, Pair] | None = None
 
     @property
     def rubs(self) -> str:
@@ -81,28 +86,31 @@ class JointFriction(Law):
         free = path - (give @ (acting / to_slip)[..., None])[..., 0]
         budget = self.budget(self.reaction(block, state.through[:, ELASTIC.index(joint)]))
         if self._state is None:
-            before, past, bristle = block.time_s[0], path[0], np.zeros(2)
+            before, past, bristle = float(block.time_s[0]), (path[0, 0], path[0, 1]), (0.0, 0.0)
         else:
             before, past, bristle = self._state
         out = np.empty_like(path)
-        for i, now in enumerate(block.time_s):
-            pull = bristle + free[i] - past
-            force = _implicit(self.stiffness, give[i], pull)
-            moved = free[i] + give[i] @ force - past
-            speed = np.hypot(*moved) / max(now - before, 1e-9)
-            most = budget[i] * (1.0 + self._stribeck * np.exp(-speed / self.STRIBECK_SPEED))
-            if np.hypot(*force) > most:
+        # Plain numbers: the history goes sample by sample, and arrays of two are slow.
+        for i, (now, to, soft, slow) in enumerate(
+            zip(block.time_s.tolist(), free.tolist(), give.tolist(), budget.tolist(), strict=True)
+        ):
+            pull = bristle[0] + to[0] - past[0], bristle[1] + to[1] - past[1]
+            force = _implicit(self.stiffness, soft, pull)
+            at = _given(soft, force, to)
+            speed = hypot(at[0] - past[0], at[1] - past[1]) / max(now - before, 1e-9)
+            most = slow * (1.0 + self._stribeck * exp(-speed / self.STRIBECK_SPEED))
+            if hypot(*force) > most:
                 for _ in range(SLIP_PASSES):
                     # Dragged along, the bristles lie in the direction of slip, which depends on
                     # the friction itself; the secant stiffness finds it.
-                    dragged = pull + give[i] @ force
-                    force = _implicit(most / np.hypot(*dragged), give[i], pull)
-                force *= most / np.hypot(*force)
+                    force = _implicit(most / hypot(*_given(soft, force, pull)), soft, pull)
+                least = most / hypot(*force)
+                force = least * force[0], least * force[1]
             out[i] = force
-            bristle = -out[i] / self.stiffness
-            before, past = now, free[i] + give[i] @ out[i]
+            bristle = -force[0] / self.stiffness, -force[1] / self.stiffness
+            before, past = now, _given(soft, force, to)
         if remember:
-            self._state = float(before), past, bristle
+            self._state = before, past, bristle
         return out * to_slip
 
     def turn_of(self, block: Block) -> Array:
@@ -134,6 +142,15 @@ class JointFriction(Law):
         return np.asarray((on @ pose.flexibility @ np.swapaxes(on, -1, -2)).sum(axis=1))
 
 
-def _implicit(stiffness: float, give: Array, pull: Array) -> Array:
-    """Return the force (2,) of bristles on joint surfaces that themselves give way (2, 2)."""
-    return np.asarray(-np.linalg.solve(np.eye(2) + stiffness * give, stiffness * pull))
+def _implicit(stiffness: float, give: list[list[float]], pull: Pair) -> Pair:
+    """Return the force of bristles on joint surfaces that themselves give way (2, 2)."""
+    (a, b), (c, d) = give
+    a, b, c, d = 1.0 + stiffness * a, stiffness * b, stiffness * c, 1.0 + stiffness * d
+    share = -stiffness / (a * d - b * c)
+    return share * (d * pull[0] - b * pull[1]), share * (a * pull[1] - c * pull[0])
+
+
+def _given(give: list[list[float]], force: Pair, start: Pair) -> Pair:
+    """Return `start` plus what a force moves surfaces that give way (2, 2)."""
+    (a, b), (c, d) = give
+    return start[0] + a * force[0] + b * force[1], start[1] + c * force[0] + d * force[1]
