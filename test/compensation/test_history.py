@@ -29,6 +29,7 @@ SECOND = 1_000_000_000
 NAMES = ("motor_1_joint", "motor_2_joint")
 DOWN = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 BACKLASH_MDEG = 40.0
+AGE_LIMIT_S = 1.0
 
 
 @pytest.fixture(scope="module")
@@ -204,11 +205,25 @@ def test_speeds_are_used_where_given_and_else_differences(model, speedy, names, 
         assert found[0] == pytest.approx(1e-3 * wanted, rel=1e-3)
 
 
+def test_a_temperature_that_is_too_old_is_dropped_with_a_word(warm, model):
+    stream = PredictionStream(warm, StreamSettings(signal_age_limit_s=2.0))
+    stream.temperatures.add("link_1", SECOND, 60.0)
+    hot = predict_all(stream, [3 * SECOND], [[0.1, 0.2]])
+    assert stream.dropped_signals == ()
+    cold = predict_all(stream, [3 * SECOND + 1], [[0.1, 0.2]])
+    assert stream.dropped_signals == ("link_1: older than 2 s, not used",)
+    plain = model.predict(np.array([0.1, 0.2]), Load(DOWN)).twist
+    assert np.allclose(cold[0], plain, rtol=1e-9)
+    assert not np.allclose(hot[0], plain, rtol=1e-3)
+    stream.settings = StreamSettings(signal_age_limit_s=60.0)
+    assert np.array_equal(predict_all(stream, [4 * SECOND], [[0.1, 0.2]]), hot)
+
+
 @given(
     st.lists(st.tuples(st.integers(0, 50), st.floats(-1e3, 1e3)), max_size=20), st.integers(0, 60)
 )
 def test_the_newest_value_that_is_not_younger_is_held(arriving, asked):
-    signals, kept = HeldSignals(), {}
+    signals, kept = HeldSignals(AGE_LIMIT_S), {}
     for stamp, value in arriving:
         signals.add("ambient", stamp, value)
         kept = {other: v for other, v in kept.items() if other < stamp} | {stamp: value}
@@ -218,4 +233,4 @@ def test_the_newest_value_that_is_not_younger_is_held(arriving, asked):
 
 def test_a_signal_that_is_not_finite_is_refused():
     with pytest.raises(InputError, match="ambient: nan"):
-        HeldSignals().add("ambient", 0, float("nan"))
+        HeldSignals(AGE_LIMIT_S).add("ambient", 0, float("nan"))

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
 from wrist_stiffness.compensation.intake import (
     BASE_FRAME,
+    COMMAND,
     PLATFORM_FRAME,
     Frames,
     MotorNames,
@@ -41,6 +42,11 @@ def test_angles_are_found_by_name(names):
 def test_a_joint_state_without_both_angles_is_refused(names, positions, text):
     with pytest.raises(InputError, match=text):
         MotorNames().angles(names, positions)
+
+
+def test_a_command_is_called_a_command():
+    with pytest.raises(InputError, match="command: motor angles"):
+        MotorNames().angles(NAMES, [float("nan"), 0.0], COMMAND)
 
 
 @given(

@@ -102,6 +102,34 @@ def test_a_table_that_was_replaced_by_a_wrong_one_is_not_taken(
     assert "palmieri2015" in values["model"]
 
 
+FAILING_LAW = """
+from wrist_stiffness.model.law import Law
+
+class Failing(Law):
+    id, stage, places, sentence, check, excited_by = "own", "reaction", ("platform",), "", "", ""
+    def __init__(self): 1 / 0
+    def parameters(self, place): return ()
+    def advance(self, at, place, values, state): return None, None
+"""
+
+
+def test_no_model_file_ends_a_node(graph, predictor, model, tmp_path):
+    """A law of the user's own is code, which can fail in any way."""
+    (tmp_path / "own.py").write_text(FAILING_LAW)
+    effect = {"effect": "python", "class": "own.py:Failing", "component": "platform"}
+    content = {"schema": 1, "name": "x", "table": {"path": "table.npz"}, "effects": [effect]}
+    save_table(model.table, tmp_path / "table.npz")
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert predictor.set_parameters([Parameter("model_file", value=str(path))])[0].successful
+    answer = graph.call(Trigger, f"/{PREDICTOR}/reload_model", Trigger.Request())
+    assert not answer.success
+    assert "ZeroDivisionError" in answer.message
+    send_load(graph, predictor, SECOND)
+    graph.joints("/joint_states", SECOND)
+    wait_for(graph, PREDICTED, 1)
+
+
 def test_a_burst_of_joint_states_is_predicted_in_full(graph, predictor):
     send_load(graph, predictor, SECOND)
     for i in range(BURST):

@@ -207,3 +207,11 @@ def test_a_temperature_reaches_the_model_and_a_missing_one_is_reported(graph, mo
     wait_for_predictions(graph, 2)
     cold, hot = (np.array(numbers(message)[:3]) for message in predictions(graph))
     assert np.linalg.norm(hot - cold) > 1e-6
+    # Five minutes later it is too old.
+    graph.load(302 * SECOND)
+    wait_for_load(graph, node, 302 * SECOND)
+    graph.joints("/joint_states", 302 * SECOND)
+    wait_for_predictions(graph, 3)
+    status, _ = graph.status(NAME, lambda status, values: "link_1: older" in status.message)
+    assert status.level == status.WARN
+    assert numbers(predictions(graph)[2])[:3] == cold.tolist()

@@ -292,6 +292,13 @@ def test_nothing_is_written_where_no_sample_can_be_used(tmp_path, message, text)
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
+def test_a_replay_into_its_own_recording_is_refused(tmp_path, capsys):
+    source = write(tmp_path / "in", TIMELINE)
+    assert main(["replay", str(source), "-o", str(source / "out")]) == 2
+    assert "in is a recording itself" in capsys.readouterr().err
+    assert sorted(path.name for path in source.iterdir()) == ["in_0.mcap", "metadata.yaml"]
+
+
 def test_reasons_that_differ_in_numbers_are_one_and_names_keep_theirs(tmp_path):
     timeline = [(0, "/load_estimate", load(0, (0.0, 0.0, -1.0)))]
     timeline += [(0, "/joint_states", joints(MILLISECOND, (1.0, 2.0)))]

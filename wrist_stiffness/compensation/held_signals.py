@@ -6,15 +6,29 @@ import bisect
 
 import numpy as np
 
+from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError
 
 
 class HeldSignals:
-    """To a sample belongs, of every name, the newest value whose stamp is not younger."""
+    """To a sample belongs, of every name, the newest value whose stamp is not younger.
+
+    Parameters
+    ----------
+    age_limit_s : float
+        Oldest value that is still used [s]; may be changed.
+
+    Attributes
+    ----------
+    stale : tuple of str
+        Names whose values were too old for the last sample.
+    """
 
     CAPACITY = 1024
 
-    def __init__(self) -> None:
+    def __init__(self, age_limit_s: float) -> None:
+        self.age_limit_s = age_limit_s
+        self.stale: tuple[str, ...] = ()
         self._stamps: dict[str, list[int]] = {}
         self._values: dict[str, list[float]] = {}
 
@@ -45,10 +59,19 @@ class HeldSignals:
             del stamps[0], values[0]
 
     def at(self, stamp_ns: int) -> dict[str, float]:
-        """Return the values that belong to a stamp [ns] by name; those without one are absent."""
-        found = {}
+        """Return the values that belong to a stamp [ns] by name.
+
+        A name without a value before the stamp, or with too old a one, is absent.
+        """
+        oldest_ns = stamp_ns - round(self.age_limit_s * NANOSECONDS)
+        found, stale = {}, []
         for name, stamps in self._stamps.items():
             place = bisect.bisect_right(stamps, stamp_ns) - 1
-            if place >= 0:
+            if place < 0:
+                continue
+            if stamps[place] < oldest_ns:
+                stale.append(name)
+            else:
                 found[name] = self._values[name][place]
+        self.stale = tuple(stale)
         return found

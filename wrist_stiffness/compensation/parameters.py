@@ -82,6 +82,13 @@ COMMON = (
     ParameterEntry(
         "load_age_limit_s", 0.5, "oldest load that is still used [s]", lower=0.001, upper=3600.0
     ),
+    ParameterEntry(
+        "signal_age_limit_s",
+        300.0,
+        "oldest temperature or covariate that is still used [s]",
+        lower=0.001,
+        upper=86400.0,
+    ),
 )
 
 PREDICTION = (
@@ -255,6 +262,7 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
         motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
         frames=frames_from_yaml(values["frames"]),
         load_age_limit_s=values["load_age_limit_s"],
+        signal_age_limit_s=values["signal_age_limit_s"],
     )
 
 

@@ -25,6 +25,8 @@ class StreamSettings:
         Frames in which loads arrive.
     load_age_limit_s : float
         Oldest load that is still used [s].
+    signal_age_limit_s : float
+        Oldest temperature or covariate that is still used [s].
     load_noise : (6,) float, optional
         Standard deviation of force and moment at O; None leaves it out of covariances [N, N m].
     objective : str
@@ -41,6 +43,7 @@ class StreamSettings:
     motors: MotorNames = field(default_factory=MotorNames)
     frames: Frames = field(default_factory=Frames)
     load_age_limit_s: float = 0.5
+    signal_age_limit_s: float = 300.0
     load_noise: Array | None = None
     objective: ObjectiveName = "pointing"
     correction_limit: float = float(np.radians(0.5))

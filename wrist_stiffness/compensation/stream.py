@@ -39,7 +39,8 @@ class Stream:
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings) -> None:
         self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)
-        self.temperatures, self.covariates = HeldSignals(), HeldSignals()
+        self.temperatures = HeldSignals(settings.signal_age_limit_s)
+        self.covariates = HeldSignals(settings.signal_age_limit_s)
         self._settings = settings
         self.model = model
 
@@ -64,6 +65,15 @@ class Stream:
         self._settings = settings
         self.loads.frames = settings.frames
         self.loads.history.age_limit_s = settings.load_age_limit_s
+        self.temperatures.age_limit_s = settings.signal_age_limit_s
+        self.covariates.age_limit_s = settings.signal_age_limit_s
+
+    @property
+    def dropped_signals(self) -> tuple[str, ...]:
+        """Which temperatures and covariates were too old for the last sample, one text each."""
+        limit_s = self.settings.signal_age_limit_s
+        names = (*self.temperatures.stale, *self.covariates.stale)
+        return tuple(f"{name}: older than {limit_s:g} s, not used" for name in names)
 
     def tare(self) -> Load:
         """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""

@@ -158,6 +158,8 @@ class RecordingWriter:
     def _check_target(self) -> None:
         if not self.path.parent.is_dir():
             raise RecordingError(f"{self.path}: folder {self.path.parent} does not exist")
+        if (self.path.parent / METADATA_FILE).exists():
+            raise RecordingError(f"{self.path}: folder {self.path.parent} is a recording itself")
         if not self.path.exists():
             return
         if not self._overwrite:

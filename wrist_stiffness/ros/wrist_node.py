@@ -114,7 +114,7 @@ class WristNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load the model."""
         try:
-            self._use_model(warmed(load_model(self._model_path())))
+            self._use_model(loaded(self._model_path()))
         except WristError as error:
             self._model_fault = str(error)
             self.warn(error)
@@ -255,21 +255,35 @@ class WristNode(LifecycleNode):
             "loads that came late": str(self.stream.loads.history.late),
             **self.facts(),
         }
+        restrictions = filter(None, (self.restriction(), *self.stream.dropped_signals))
         message = DiagnosticArray(
-            status=[self.health.report(facts, self._model_fault, self.restriction())]
+            status=[self.health.report(facts, self._model_fault, "; ".join(restrictions))]
         )
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
 
-def warmed(model: ErrorModel) -> ErrorModel:
-    """Return a model after a first prediction, which fills what it computes once."""
-    model.predict(np.zeros(2), Load(np.zeros(6)))
+def loaded(path: Path) -> ErrorModel:
+    """Return a model after a first prediction, which fills what it computes once.
+
+    Raises
+    ------
+    WristError
+        If it cannot be loaded, whatever the reason: a model file may name a law of the user's own,
+        which is code, and no file may end a node.
+    """
+    try:
+        model = load_model(path)
+        model.predict(np.zeros(2), Load(np.zeros(6)))
+    except WristError:
+        raise
+    except Exception as error:
+        raise InputError(f"{path}: {type(error).__name__}: {error}") from error
     return model
 
 
 def _load(path: Path, loading: Future) -> None:
     try:
-        loading.set_result(warmed(load_model(path)))
-    except Exception as error:
+        loading.set_result(loaded(path))
+    except WristError as error:
         loading.set_exception(error)

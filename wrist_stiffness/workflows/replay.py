@@ -237,7 +237,7 @@ def _predict(
     )
     prediction = sample.prediction
     summary.predictions += 1
-    summary.warnings.update(prediction.warnings)
+    summary.warnings.update((*prediction.warnings, *predicting.dropped_signals))
     summary.shift_norm_um.append(1e6 * prediction.shift_norm)
     summary.phi_mdeg.append(1e3 * float(np.degrees(prediction.phi)))
     header = Header(state.header.stamp_ns, BASE_FRAME)
