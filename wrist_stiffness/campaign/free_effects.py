@@ -1,0 +1,114 @@
+"""Which parameters a fit may move: effects with a start, a prior and a scope."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.registry import find_law
+
+SET_UP = (
+    ("measurement_frame", ("pose_sensor",)),
+    ("target_mounting", ("pose_sensor",)),
+    ("encoder_offset", MOTORS),
+    ("load_bias", ("load_sensor",)),
+)
+"""What is set up anew in every session."""
+
+BUILT = (
+    ("axis_misalignment", JOINTS),
+    ("flange_contact", PASSIVE_JOINTS),
+    ("link_stiffness", LINKS),
+    ("bushing_stiffness", JOINTS),
+)
+"""What differs from wrist to wrist within its tolerances.  The gaps of the flanges are among them
+because whoever fits a wrist shims them to its axes."""
+
+
+@dataclass(frozen=True)
+class FreeEffect:
+    """An effect whose parameters are fitted.
+
+    Parameters
+    ----------
+    effect : Effect
+        Its values are the start and the mean of the prior.
+    scale : dict of str to float
+        Standard deviation of the prior of each parameter that is free, in the unit of its name;
+        infinite for none.  A parameter that is left out keeps its value.
+    per_session : bool
+        Whether every session has values of its own.
+    """
+
+    effect: Effect
+    scale: Mapping[str, float] = field(default_factory=dict)
+    per_session: bool = False
+
+    @property
+    def step(self) -> dict[str, float]:
+        """Natural size of each free parameter: of its prior, of its value, or 1."""
+        return {
+            key: scale if np.isfinite(scale) else abs(self.effect.estimates[key].value) or 1.0
+            for key, scale in self.scale.items()
+        }
+
+
+def free_all(effect: Effect, per_session: bool = False) -> FreeEffect:
+    """Return an effect with all its parameters free, by the priors of its law."""
+    scale = {parameter.key: parameter.scale for parameter in effect.parameters}
+    return FreeEffect(effect, scale, per_session)
+
+
+def refitted(effect: Effect) -> FreeEffect:
+    """Return an effect of a model with those parameters free that a fit has estimated before.
+
+    A parameter without an uncertainty is believed as it stands.
+    """
+    scale = {
+        parameter.key: parameter.scale
+        for parameter in effect.parameters
+        if effect.estimates[parameter.key].sigma > 0.0
+    }
+    return FreeEffect(effect, scale)
+
+
+def commissioning(
+    model: ErrorModel, calibrated: Sequence[str] = ()
+) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
+    """Return what is always refitted, and what of the model stays as it is.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its effects are starts where they are among those that are refitted.
+    calibrated : sequence of str
+        Ids of effects that the recordings say were calibrated otherwise.
+
+    Returns
+    -------
+    tuple of FreeEffect
+        Registrations, zeros and tare of each session; tolerances of the wrist; and every further
+        effect of the model that was estimated.
+    tuple of Effect
+        The others.
+    """
+    own = {effect.name: effect for effect in model.effects}
+    free: dict[str, FreeEffect] = {}
+    for group, per_session in ((SET_UP, True), (BUILT, False)):
+        for law, places in group:
+            for place in places:
+                effect = Effect(find_law(law), place)
+                held = law in calibrated or (
+                    effect.stage == "parts" and model.evaluation == "spline"
+                )
+                if not held:
+                    free[effect.name] = free_all(own.get(effect.name, effect), per_session)
+    for name, effect in own.items():
+        if name not in free and (again := refitted(effect)).scale:
+            free[name] = again
+    return tuple(free.values()), tuple(own[name] for name in own if name not in free)
