@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError, UnreachablePoseError
 from wrist_stiffness.lookup.table import Table
@@ -19,6 +20,7 @@ from wrist_stiffness.simulation.experiment import experiment
 from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, instrument
 from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.pose_view import PoseView
 from wrist_stiffness.simulation.program import Program
 from wrist_stiffness.simulation.wrist import TrueState, TrueWrist
 
@@ -42,6 +44,10 @@ class CellSettings:
         Design of the program, one of `experiment.EXPERIMENTS`.
     instrument : str
         Pose sensor: `interferometer`, `tracker`, `cmm` or `ideal`.
+    sees : str
+        What of the pose it measures, one of `pose_view.VIEWS`.
+    lost_beams : float
+        Share of its samples that are missing or wild.
     load_sensor : LoadSensor
         Noise of the load estimate.
     hidden : tuple of HiddenEffect
@@ -54,7 +60,7 @@ class CellSettings:
     Raises
     ------
     InputError
-        If the rate or the duration is not positive, or the instrument is not known.
+        If the rate or the duration is not positive, or the instrument or its view not known.
     """
 
     rate_hz: float = 100.0
@@ -62,6 +68,8 @@ class CellSettings:
     program_seed: int = 0
     experiment: str = "rich"
     instrument: str = "interferometer"
+    sees: str = "pose"
+    lost_beams: float = 0.0
     load_sensor: LoadSensor = LoadSensor()
     hidden: tuple[HiddenEffect, ...] = ()
     base: str = "exact"
@@ -75,6 +83,7 @@ class CellSettings:
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"cell: {name} = {value} is not a positive number")
         instrument(self.instrument)
+        PoseView(self.sees, self.lost_beams, np.random.default_rng(0))
 
 
 @dataclass(frozen=True)
@@ -92,9 +101,9 @@ class CellSample:
     pose_shift : (..., 3) float
         True position of the platform's point O in F [m].
     measured_rotation : (..., 3, 3) float
-        Rotation as measured.
+        Rotation as measured; NaN where it is not.
     measured_shift : (..., 3) float
-        Position as measured [m].
+        Position as measured [m]; NaN where it is not.
     temperature : (..., 8) float
         Of `SENSED` [degC].
     """
@@ -139,8 +148,10 @@ class VirtualCell:
             *base_laws(settings.base, table, settings.base_seed, settings.session),
         ]
         self._wrist = TrueWrist(table, self._laws)
-        drive_rng, load_rng, pose_rng = rng.spawn(3)
+        drive_rng, load_rng, pose_rng, view_rng = rng.spawn(4)
         sensor, pose_sensor = settings.load_sensor, instrument(settings.instrument)
+        self._static = pose_sensor.static
+        self._view = PoseView(settings.sees, settings.lost_beams, view_rng)
         self._drive = Drive(table.geometry.limits.encoder_step, drive_rng)
         self._load_noise = NoiseSource(sensor.force, sensor.moment, load_rng)
         self._pose_noise = NoiseSource(pose_sensor.shift, pose_sensor.rotation, pose_rng)
@@ -200,16 +211,29 @@ class VirtualCell:
         noise = self._pose_noise(time_s)
         # A tracker's errors in position and orientation are separate, not one rigid motion.
         wobble, _ = exp_twist(noise)
+        rotation, shift = self._view(wobble @ rotation, shift + noise[:, :3])
+        if self._static:
+            unseen = ~self._rest_ends(time_s)
+            rotation[unseen], shift[unseen] = np.nan, np.nan
         return CellSample(
             encoder=encoder,
             wrench=wrench + self._load_noise(time_s),
             pose_rotation=true.rotation,
             pose_shift=true.shift,
-            measured_rotation=wobble @ rotation,
-            measured_shift=shift + noise[:, :3],
+            measured_rotation=rotation,
+            measured_shift=shift,
             temperature=self.table.geometry.reference_temperature
             + np.column_stack([true.block.temperature, room]),
         )
+
+    def _rest_ends(self, time_s: Array) -> NDArray[np.bool_]:
+        """Return which samples (n,) are the last of a rest under a steady load."""
+        step = 1.0 / self.settings.rate_hz
+        before, now, after = (
+            np.concatenate([self.program.angles(phase), self.program.load(phase)], axis=1)
+            for phase in (self.program.phase(time_s + k * step) for k in (-1, 0, 1))
+        )
+        return np.all(before == now, axis=1) & np.any(after != now, axis=1)
 
     def _readings(
         self, time_s: Array, shaft: Array, load: Array, true: TrueState

@@ -37,11 +37,14 @@ class PoseInstrument:
         What people call it.
     shift, rotation : Noise
         On each component [m], [rad].
+    static : bool
+        Measures once at the end of each rest, not all the time.
     """
 
     name: str
     shift: Noise
     rotation: Noise
+    static: bool = False
 
     @property
     def sigma(self) -> Array:
@@ -71,7 +74,12 @@ INSTRUMENTS = {
     for instrument in (
         PoseInstrument("interferometer", Noise(0.7e-6, 0.3e-6), Noise(1.0 * MDEG, 0.3 * MDEG)),
         PoseInstrument("tracker", Noise(5e-6, 3e-6), Noise(10.0 * MDEG, 3.0 * MDEG)),
-        PoseInstrument("cmm", Noise(1.5e-6, 0.8e-6, 600.0), Noise(3.0 * MDEG, 1.5 * MDEG, 600.0)),
+        PoseInstrument(
+            "cmm",
+            Noise(1.5e-6, 0.8e-6, 600.0),
+            Noise(3.0 * MDEG, 1.5 * MDEG, 600.0),
+            static=True,
+        ),
         PoseInstrument("ideal", Noise(0.0, 0.0), Noise(0.0, 0.0)),
     )
 }

@@ -19,7 +19,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
-from wrist_stiffness.simulation.residual import residual
+from wrist_stiffness.simulation.residual import base_pose, departure
 
 SIZE_TOLERANCE = 2e-3
 """Relative, of the size that `magnitude_for` reaches."""
@@ -68,10 +68,14 @@ class Scale:
     def __init__(self, table: Table, settings: CellSettings, seconds: float) -> None:
         self._table, self._settings = table, settings
         quiet = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
-        self._quiet = replace(settings, instrument="ideal", load_sensor=quiet)
+        # The size is that of the whole motion, whatever part of it the sensor sees.
+        self._quiet = replace(
+            settings, instrument="ideal", sees="pose", lost_beams=0.0, load_sensor=quiet
+        )
         self.time_s = np.arange(max(1, round(seconds * settings.rate_hz))) / settings.rate_hz
-        without = self._run(())
-        self._residual = residual(table, without)
+        self._without = without = self._run(())
+        self._base = base_pose(table, without.encoder, without.wrench)
+        self._residual = departure(without.measured_rotation, without.measured_shift, self._base)
         covariance = sample_covariance(table, without.encoder, settings.instrument)
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
         self.counted = self._loaded_or_moving(without)
@@ -87,7 +91,13 @@ class Scale:
 
     def signature(self, hidden: HiddenEffect) -> Array:
         """Return the change of the residual twist by an effect, (n, 6) [m, rad]."""
-        return residual(self._table, self._run((hidden,))) - self._residual
+        sample, without = self._run((hidden,)), self._without
+        base = self._base
+        for name in ("encoder", "wrench"):
+            if not np.array_equal(getattr(sample, name), getattr(without, name)):
+                base = base_pose(self._table, sample.encoder, sample.wrench)
+                break
+        return departure(sample.measured_rotation, sample.measured_shift, base) - self._residual
 
     def size(self, hidden: HiddenEffect) -> float:
         """Return the size of an effect in units of one sample's noise."""
