@@ -1,0 +1,241 @@
+"""The conditions of a campaign as columns over its units, with the words for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.mechanism.components import Array
+
+FEWEST = 4
+"""A condition varies if so many units differ from the commonest value."""
+
+UNLOADED = 0.02
+"""Share of the largest load up to which a unit counts as unloaded."""
+
+LAGS_S = (300.0, 900.0)
+"""Time constants with which a temperature may be felt late."""
+
+OWN = ("time_s", "held_s", "loaded_at_rest", "force", "moment")
+OWN += tuple(f"{name}_{motor}" for name in ("theta", "approach", "speed") for motor in (1, 2))
+FORCES, MOMENTS = ("fx", "fy", "fz"), ("mx", "my", "mz")
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """Something that the residual may depend on.
+
+    Parameters
+    ----------
+    topic : str
+        For a list of topics, as `approach direction`.
+    name : str
+        One word for this condition among those of the topic.
+    lead : str
+        First half of a sentence: what changes by one.
+    columns : (n, q) float
+        Over the units.
+    subject : str
+        What changes: the platform itself, or a gap or give that grows.
+    swings : bool
+        Whether the columns are a cosine and a sine.
+    """
+
+    topic: str
+    name: str
+    lead: str
+    columns: Array
+    subject: str = "the platform"
+    swings: bool = False
+
+
+def conditions(observations: Observations) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
+    """List the conditions that vary, and the topics of which none does.
+
+    Parameters
+    ----------
+    observations : Observations
+        With the covariates of `observing.observe`.
+
+    Returns
+    -------
+    tuple of Condition
+        Those that vary.
+    tuple of str
+        Topics of which nothing can be said.
+    """
+    every = list(_every(observations.covariates, observations.sessions))
+    varied = tuple(each for each in every if _varies(each.columns, observations.sessions))
+    topics = {each.topic for each in varied}
+    silent = dict.fromkeys(each.topic for each in every if each.topic not in topics)
+    return varied, tuple(silent)
+
+
+def _varies(columns: Array, sessions: Array) -> bool:
+    """Tell whether enough units differ from the rest of their session in every column."""
+    for column in columns.T:
+        size = np.abs(column).max()
+        different = 0
+        for session in np.unique(sessions):
+            own = np.round(column[sessions == session] / (size or 1.0), 6)
+            different += len(own) - np.unique(own, return_counts=True)[1].max()
+        if different < FEWEST:
+            return False
+    return True
+
+
+def _every(covariates: Mapping[str, Array], sessions: Array) -> Iterator[Condition]:
+    yield from _approaches(covariates)
+    yield from _loads(covariates)
+    at_rest = covariates["loaded_at_rest"] - 0.5
+    loaded = covariates["force"] > UNLOADED * covariates["force"].max()
+    yield Condition(
+        "load put on at rest or carried",
+        "loaded at rest",
+        "When the load is put on at rest rather than carried through the move",
+        (at_rest * loaded)[:, None],
+    )
+    yield Condition(
+        "hold time",
+        "hold time",
+        "For every tenfold of the time that pose and load have been held",
+        np.log10(np.maximum(covariates["held_s"], 0.1))[:, None],
+    )
+    yield from _motions(covariates)
+    yield from _temperatures(covariates, sessions)
+    yield Condition(
+        "time in the session",
+        "time",
+        "For every minute of a session",
+        covariates["time_s"][:, None] / 60.0,
+    )
+    for name, column in covariates.items():
+        if name not in (*OWN, *FORCES, *MOMENTS) and not name.startswith("T_"):
+            yield _other(name, column)
+
+
+def _approaches(covariates: Mapping[str, Array]) -> Iterator[Condition]:
+    force = covariates["force"]
+    for motor in (1, 2):
+        sense = 0.5 * covariates[f"approach_{motor}"]
+        yield Condition(
+            "approach direction",
+            f"approach of motor {motor}",
+            f"When motor {motor} is approached with rising rather than falling angle",
+            sense[:, None],
+        )
+        yield Condition(
+            "approach direction",
+            f"approach of motor {motor} with load",
+            "For every newton more of load",
+            (sense * (force - force.mean()))[:, None],
+            f"the gap between both approaches of motor {motor}",
+        )
+
+
+def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
+    force, moment = covariates["force"], covariates["moment"]
+    for name in FORCES:
+        yield Condition(
+            "load direction",
+            name,
+            f"For every newton of load along +{name[1]}",
+            covariates[name][:, None],
+        )
+    for name in MOMENTS:
+        yield Condition(
+            "load direction",
+            name,
+            f"For every 0.01 N m of load about +{name[1]}",
+            100.0 * covariates[name][:, None],
+        )
+    for name in FORCES:
+        yield Condition(
+            "load size",
+            f"give along {name[1]} with load",
+            "For every newton more of load",
+            (covariates[name] * (force - force.mean()))[:, None],
+            f"the give per newton along {name[1]}",
+        )
+    yield Condition(
+        "load size", "force", "For every newton of load, whatever its direction", force[:, None]
+    )
+    yield Condition(
+        "load size",
+        "moment",
+        "For every 0.01 N m of load, whatever its direction",
+        100.0 * moment[:, None],
+    )
+    loaded = (force > UNLOADED * force.max()) | (moment > UNLOADED * moment.max())
+    yield Condition("zero load", "zero load", "Without any load", (~loaded).astype(float)[:, None])
+
+
+def _motions(covariates: Mapping[str, Array]) -> Iterator[Condition]:
+    for motor in (1, 2):
+        speed = np.degrees(covariates[f"speed_{motor}"])
+        lead = f"For every degree per second of motor {motor}"
+        yield Condition("speed", f"speed of motor {motor}", lead, speed[:, None])
+        yield Condition(
+            "speed",
+            f"speed of motor {motor} either way",
+            f"{lead}, either way",
+            np.abs(speed)[:, None],
+        )
+    for motor in (1, 2):
+        theta = covariates[f"theta_{motor}"]
+        for order, times in ((1, "once"), (2, "twice"), (3, "three times"), (4, "four times")):
+            yield Condition(
+                "motor angle",
+                f"angle of motor {motor}, {times} a turn",
+                f"As motor {motor} turns, {times} a turn",
+                np.stack([np.cos(order * theta), np.sin(order * theta)], axis=1),
+                swings=True,
+            )
+
+
+def _temperatures(covariates: Mapping[str, Array], sessions: Array) -> Iterator[Condition]:
+    found = False
+    for name, column in covariates.items():
+        if not name.startswith("T_"):
+            continue
+        found = True
+        place = name[2:].replace("_", " ")
+        yield Condition(
+            "temperature", place, f"For every kelvin that {place} is warmer", column[:, None]
+        )
+        for lag in LAGS_S:
+            late = _lagged(column, covariates["time_s"], sessions, lag)
+            yield Condition(
+                "temperature lag",
+                f"{place}, {lag / 60.0:g} min late",
+                f"For every kelvin that {place} was warmer, felt about {lag / 60.0:g} min late",
+                # What the temperature itself tells is not asked twice.
+                (late - column)[:, None],
+            )
+    if not found:
+        yield Condition("temperature", "none", "", np.zeros((len(sessions), 1)))
+
+
+def _lagged(column: Array, time: Array, sessions: Array, lag: float) -> Array:
+    """First-order lag of a signal, (n,), beginning each session in balance."""
+    late = column.copy()
+    for i in range(1, len(column)):
+        if sessions[i] == sessions[i - 1]:
+            keep = np.exp(-(time[i] - time[i - 1]) / lag)
+            late[i] = keep * late[i - 1] + (1.0 - keep) * column[i]
+    return late
+
+
+def _other(name: str, column: Array) -> Condition:
+    values = np.unique(column)
+    if len(values) == 2:
+        return Condition(
+            name,
+            name,
+            f"With {name} at {values[1]:g} rather than {values[0]:g}",
+            (column == values[1]).astype(float)[:, None],
+        )
+    return Condition(name, name, f"For every unit more of {name}", column[:, None])
