@@ -17,6 +17,7 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovariance,
     PoseWithCovarianceStamped,
     Quaternion,
+    String,
     Temperature,
     Vector3,
     Wrench,
@@ -107,6 +108,8 @@ def test_every_kind_of_topic(tmp_path):
         ("/temperatures", 16, Temperature(Header(8, "link_1"), 22.0)),
         ("/covariates/humidity", 17, Float64(0.4)),
         ("/motor_commands", 18, joint_state(7, (0.1, 0.2))),
+        ("/recording_notes", 9, String('{"wrist": "a"}')),
+        ("/recording_notes", 19, String('{"operator": "é"}')),
     ]
     samples = samples_of(tmp_path, entries)
     np.testing.assert_array_equal(samples.loads.wrench, [[1, 2, 3, 4, 5, 6]])
@@ -123,6 +126,7 @@ def test_every_kind_of_topic(tmp_path):
     np.testing.assert_array_equal(samples.covariates["humidity"].value, [0.4])
     np.testing.assert_array_equal(samples.covariates["humidity"].time_ns, [17])
     np.testing.assert_array_equal(samples.commands.position, [[0.1, 0.2]])
+    assert samples.notes == ('{"wrist": "a"}', '{"operator": "é"}')
     # A lost marker and two components with one stamp are no faults.
     assert samples.faults == ()
 

@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.recording.batch import Batch, decode_batches
-from wrist_stiffness.recording.messages import JointState, Message, PoseArray, Temperature
+from wrist_stiffness.recording.messages import (
+    JointState,
+    Message,
+    PoseArray,
+    String,
+    Temperature,
+)
 
 FloatArray = NDArray[np.float64]
 TimeArray = NDArray[np.int64]
@@ -130,6 +136,12 @@ def temperature_rows(batch: Batch) -> Rows:
 def float_rows(batch: Batch) -> Rows:
     """Return plain numbers (m,)."""
     return {"value": batch.columns["data"]}
+
+
+def text_rows(batch: Batch) -> Rows:
+    """Return texts (m,)."""
+    assert isinstance(batch.first, String)  # the collector decodes this type only
+    return {"text": np.full(batch.indices.size, batch.first.data)}
 
 
 @dataclass

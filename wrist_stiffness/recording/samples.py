@@ -29,6 +29,7 @@ from wrist_stiffness.recording.collector import (
     marker_rows,
     pose_rows,
     temperature_rows,
+    text_rows,
     wrench_rows,
 )
 from wrist_stiffness.recording.messages import (
@@ -38,6 +39,7 @@ from wrist_stiffness.recording.messages import (
     PoseArray,
     PoseStamped,
     PoseWithCovarianceStamped,
+    String,
     Temperature,
     WrenchStamped,
 )
@@ -110,7 +112,8 @@ class ScalarSamples:
 class Samples:
     """All that the wrist's topics hold; a topic that is absent gives arrays of length 0.
 
-    `temperatures` are by component, `covariates` by the name below ``/covariates/``.
+    `temperatures` are by component, `covariates` by the name below ``/covariates/``, `notes` the
+    texts of ``/recording_notes``.
     """
 
     joints: JointSamples
@@ -121,6 +124,7 @@ class Samples:
     markers: MarkerSamples
     temperatures: Mapping[str, ScalarSamples]
     covariates: Mapping[str, ScalarSamples]
+    notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
 
@@ -203,6 +207,7 @@ def read_samples(
             name: _made(ScalarSamples, collectors[topic].rows(), value=())
             for name, topic in covariates.items()
         },
+        notes=tuple(of(names.RECORDING_NOTES).get("text", np.empty(0, np.str_)).tolist()),
         faults=tuple(fault for name in sorted(collectors) for fault in collectors[name].faults()),
     )
 
@@ -257,6 +262,7 @@ def _collectors_of(
         names.LOAD_ESTIMATE: [(WrenchStamped, wrench_rows, ("wrench",))],
         names.PLATFORM_MARKERS: [(PoseArray, marker_rows(), ())],
         names.TEMPERATURES: [(Temperature, temperature_rows, ("value",))],
+        names.RECORDING_NOTES: [(String, text_rows, ())],
     }
     for standard in (names.PLATFORM_POSE, names.FRAME_POSE):
         wanted[standard] = [

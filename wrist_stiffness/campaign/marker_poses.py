@@ -1,0 +1,50 @@
+"""Platform poses from measured markers, for a whole recording at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wrist_stiffness.lookup.readout import MIN_SPREAD_RATIO
+from wrist_stiffness.mechanism.components import Array
+
+LEAST_MARKERS = 3
+
+
+def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
+    """Return the rigid motions with the least squared misfit (Kabsch), as `fit_markers` does.
+
+    Parameters
+    ----------
+    nominal : (k, 3) float
+        Markers in U [m].
+    measured : (n, k, 3) float
+        In F [m]; a marker with any NaN is lost.
+
+    Returns
+    -------
+    shift : (n, 3) float
+        Position of the platform's point O in F [m].
+    rotation : (n, 3, 3) float
+        U -> F.  NaN where fewer than three markers were seen or these lie near a line.
+    """
+    seen = np.isfinite(measured).all(axis=2)
+    shift, rotation = np.full((len(measured), 3), np.nan), np.full((len(measured), 3, 3), np.nan)
+    # One fit for each set of markers that were seen together.
+    patterns, belongs = np.unique(seen, axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns):
+        if pattern.sum() < LEAST_MARKERS:
+            continue
+        reference = nominal[pattern] - nominal[pattern].mean(axis=0)
+        sigma = np.linalg.svd(reference, compute_uv=False)
+        if sigma[1] < MIN_SPREAD_RATIO * sigma[0]:
+            continue
+        rows = np.flatnonzero(belongs.reshape(-1) == number)
+        points = measured[rows][:, pattern]
+        centre = points.mean(axis=1)
+        correlation = np.swapaxes(points - centre[:, None], 1, 2) @ reference
+        left, _, right = np.linalg.svd(correlation)
+        # A reflection is no motion: turn the direction that the markers tell least about.
+        left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+        rotation[rows] = left @ right
+        shift[rows] = centre - rotation[rows] @ nominal[pattern].mean(axis=0)
+    return shift, rotation

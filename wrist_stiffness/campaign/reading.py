@@ -1,0 +1,285 @@
+"""From a recording of this wrist to a measured session.
+
+The rules are those of the nodes, seen from the stamp of a measured pose: the load is the newest one
+that is not younger, held up to an age limit; temperatures and covariates are held.  Motor angles
+are interpolated between the two joint states around the stamp, because motions are compared: at
+10 ms between joint states and 30 deg/s a held angle is wrong by up to 300 mdeg.  In a dwell the
+encoder's count is the same on both sides, so nothing is smoothed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.clocks import ClockOffset, clock_offset
+from wrist_stiffness.campaign.machine_signals import MachineSignals, machine_signals
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.pose_track import PoseTrack, pose_track
+from wrist_stiffness.campaign.registration import median_misfit
+from wrist_stiffness.campaign.signals import Signal, Stamps
+from wrist_stiffness.campaign.spikes import spikes
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import InputError, RecordingError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording.reader import Recording
+from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
+from wrist_stiffness.recording.topics import (
+    JOINT_STATES,
+    LOAD_ESTIMATE,
+    PLATFORM_MARKERS,
+    PLATFORM_POSE,
+)
+
+Mask = NDArray[np.bool_]
+
+CHUNK = 20_000
+"""Poses whose rigid wrist is in memory at a time."""
+
+ANGLES_USED = 20_000
+"""Joint states that are enough to tell the offset of the clocks."""
+
+LEAST_POSES = 5
+
+OWN_CLOCK_S = 0.2
+"""A larger offset is another clock and is taken out; a smaller one is the effect `time_delay`."""
+
+OWN_CLOCK_PERIODS = 5.0
+"""An offset of fewer sample periods is not told from the sampling."""
+
+OWN_CLOCK_GAIN = 4.0
+"""An offset that divides the mean square of the misfit by less is not believed."""
+
+DENSE_S = 0.2
+"""Median time between poses below which single ones are compared with their neighbours [s]."""
+
+LEAST_SPIKE_M = 30e-6
+
+LEAST_SPIKE_STEPS = 4.0
+"""In encoder steps: in motion the measured rotation leaves the encoders' by counts."""
+
+OTHER_GEOMETRY = float(np.radians(5.0))
+"""Median angle between measured and rigid rotation that no registration and no effect explains."""
+
+
+def read_session(
+    path: str | Path,
+    table: Table,
+    *,
+    remaps: Mapping[str, str] | None = None,
+    joints: Sequence[str] = DEFAULT_JOINTS,
+    frames: Frames | None = None,
+    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+) -> MeasuredSession:
+    """Read a recording with measured poses.
+
+    Parameters
+    ----------
+    path : path
+        rosbag2 folder with MCAP storage, or `.mcap` file.
+    table : Table
+        Of the wrist: its rigid kinematics, and its readout points as the nominal markers.
+    remaps : mapping, optional
+        Actual by standard topic name.
+    joints : sequence of str
+        Joint names of motor 1 and 2.
+    frames : Frames, optional
+        Sensor frames of loads, poses and markers, beside `wrist_base` and `wrist_platform`.
+    load_age_limit_s : float
+        Oldest load that still belongs to a measured pose [s].
+
+    Returns
+    -------
+    MeasuredSession
+        Named after the recording, with remarks on everything that could not be used.
+
+    Raises
+    ------
+    RecordingError
+        If the recording cannot be read, lacks a topic, or its clocks do not overlap.
+    FrameError
+        If loads or poses are in an unknown frame.
+    InputError
+        If too few poses are left, or they are those of another wrist.
+    """
+    recording = open_recording(path)
+    samples = read_samples(recording, remaps=remaps, joints=joints)
+    _require_topics(recording, samples, remaps or {})
+    notes, unread = _notes(samples)
+    try:
+        machine = machine_signals(samples, frames or Frames())
+        markers = table.geometry.platform.readout_points
+        track = pose_track(samples, markers, frames or Frames())
+        session = _session(recording.path.name, machine, track, table, load_age_limit_s)
+    except (InputError, RecordingError) as error:
+        raise type(error)(f"{recording.path}: {error}") from error
+    damage = [f"the recording is damaged: {recording.damage}"] if recording.damage else []
+    faults = [str(fault) for fault in samples.faults]
+    return replace(session, notes=notes, remarks=(*damage, *unread, *faults, *session.remarks))
+
+
+def _session(
+    name: str, machine: MachineSignals, track: PoseTrack, table: Table, load_age_limit_s: float
+) -> MeasuredSession:
+    remarks = list(track.remarks)
+    _require_overlap(machine.angles.time_ns, track.time_ns)
+    offset = _offset(machine, track, table)
+    if offset is not None and _another_clock(offset, machine, track):
+        remarks.append(
+            f"the clock of the pose sensor is {offset.seconds:+.3f} s (uncertain by "
+            f"{offset.sigma:.3f} s) from that of the joint states: taken out"
+        )
+        track = replace(track, time_ns=track.time_ns - round(offset.seconds * NANOSECONDS))
+    usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
+    remarks += reasons
+    if not usable.any():
+        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
+    block = machine.at(track.time_ns[usable])
+    shift, rotation = track.shift[usable], track.rotation[usable]
+    reachable = table.mechanism.reachable(block.theta)
+    if not reachable.all():
+        remarks.append(
+            f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
+        )
+        block, shift, rotation = block.take(reachable), shift[reachable], rotation[reachable]
+    rigid = table.mechanism.forward(block.theta).platform
+    _require_same_wrist(rotation, rigid)
+    lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
+    if lost.any():
+        remarks.append(f"{lost.sum()} of {len(lost)} measured poses are spikes: left out")
+        shift, rotation = shift.copy(), rotation.copy()
+        shift[lost], rotation[lost] = np.nan, np.nan
+    if np.all(block.load == block.load[0]):
+        remarks.append(
+            "the load never changes: what the load does and what is always there look the same"
+        )
+    session = MeasuredSession(
+        name,
+        block,
+        shift,
+        rotation,
+        track.covariance,
+        remarks=tuple(remarks),
+        clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
+    )
+    known = int(session.measured.any(axis=1).sum())
+    if known < LEAST_POSES:
+        why = "; ".join(remarks) or "no more were recorded"
+        raise InputError(
+            f"{known} of {len(track)} measured poses can be used, at least {LEAST_POSES} are "
+            f"needed ({why})"
+        )
+    return session
+
+
+def rigid_rotation(table: Table, theta: Array) -> Array:
+    """Return the rotation U -> F of the rigid platform, (n, 3, 3), at reachable angles (n, 2)."""
+    rotation = np.empty((len(theta), 3, 3))
+    for start in range(0, len(theta), CHUNK):
+        rows = slice(start, start + CHUNK)
+        rotation[rows] = table.mechanism.forward(theta[rows]).platform
+    return rotation
+
+
+def _require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, str]) -> None:
+    present = ", ".join(topic.name for topic in recording.topics) or "none"
+    needed = {
+        JOINT_STATES: len(samples.joints.time_ns),
+        LOAD_ESTIMATE: len(samples.loads.time_ns),
+        f"{PLATFORM_POSE} or {PLATFORM_MARKERS}": len(samples.poses.time_ns)
+        + len(samples.markers.time_ns),
+    }
+    for topic, count in needed.items():
+        if count == 0:
+            damage = f"; {recording.damage}" if recording.damage else ""
+            raise RecordingError(
+                f"{recording.path}: nothing on {remaps.get(topic, topic)} (topics that are there: "
+                f"{present}){damage}; name another with --topic STANDARD:=ACTUAL"
+            )
+
+
+def _require_overlap(angles_ns: Stamps, poses_ns: Stamps) -> None:
+    if len(angles_ns) == 0:
+        raise InputError("no joint state has finite angles")
+    if poses_ns[-1] < angles_ns[0] or poses_ns[0] > angles_ns[-1]:
+        ranges = [
+            f"{stamps[0] / NANOSECONDS:.3f} to {stamps[-1] / NANOSECONDS:.3f} s"
+            for stamps in (angles_ns, poses_ns)
+        ]
+        raise RecordingError(
+            f"the clocks do not overlap: joint states are stamped {ranges[0]}, measured poses "
+            f"{ranges[1]}; synchronise the clocks or stamp the poses at reception"
+        )
+
+
+def _require_same_wrist(rotation: Array, rigid: Array) -> None:
+    known = np.isfinite(rotation).all(axis=(1, 2))
+    if known.sum() < LEAST_POSES:
+        return
+    angle = median_misfit(rotation[known], rigid[known])
+    if angle > OTHER_GEOMETRY:
+        raise InputError(
+            f"the measured rotations are not those of this wrist: half of them are more than "
+            f"{np.degrees(angle):.1f} deg (limit {np.degrees(OTHER_GEOMETRY):g} deg) from what the "
+            "motor angles say, however the instrument stands; check the table, the joints' names, "
+            "order and signs"
+        )
+
+
+def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOffset | None:
+    known = np.isfinite(track.rotation).all(axis=(1, 2))
+    every = max(1, len(machine.angles) // ANGLES_USED)
+    theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
+    reachable = table.mechanism.reachable(theta)
+    if not known.any() or not reachable.any():
+        return None
+    rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_rotvec()
+    measured = Rotation.from_matrix(track.rotation[known]).as_rotvec()
+    return clock_offset(track.time_ns[known], measured, Signal(time_ns[reachable], rigid))
+
+
+def _another_clock(offset: ClockOffset, machine: MachineSignals, track: PoseTrack) -> bool:
+    """Tell whether an offset is one of clocks, not a delay that the wrist's model can have."""
+    period = max(_period_s(machine.angles.time_ns), _period_s(track.time_ns))
+    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * period, 3.0 * offset.sigma)
+    return abs(offset.seconds) > least and offset.gain > OWN_CLOCK_GAIN
+
+
+def _spikes(time: Array, shift: Array, rotation: Array, rigid: Array, step: float) -> Mask:
+    if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
+        return np.zeros(len(time), dtype=bool)
+    turn = rotation @ np.swapaxes(rigid, 1, 2)
+    axis = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    least = np.repeat([LEAST_SPIKE_M, LEAST_SPIKE_STEPS * step], 3)
+    return spikes(np.hstack([shift, axis]), least)
+
+
+def _period_s(time_ns: Stamps) -> float:
+    return float(np.median(np.diff(time_ns))) / NANOSECONDS if len(time_ns) > 1 else 0.0
+
+
+def _notes(samples: Samples) -> tuple[dict[str, Any], list[str]]:
+    """Return the facts of all notes, later ones first choice, and what was no JSON."""
+    notes: dict[str, Any] = {}
+    unread = []
+    for text in samples.notes:
+        try:
+            facts = json.loads(text)
+        except ValueError:
+            facts = None
+        if isinstance(facts, dict):
+            notes |= facts
+        else:
+            unread.append(f"note {text[:80]!r} is no JSON object: not used")
+    return notes, unread

@@ -1,0 +1,92 @@
+"""Signals at other stamps than their own: interpolated or held, never extrapolated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+
+Stamps = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """Values by stamp.
+
+    Parameters
+    ----------
+    time_ns : (n,) int64
+        Stamps, rising [ns].
+    values : (n, ...) float
+        Finite.
+    """
+
+    time_ns: Stamps
+    values: Array
+
+    def __len__(self) -> int:
+        """Return the number of values."""
+        return len(self.time_ns)
+
+    def interpolated(self, time_ns: Stamps) -> Array:
+        """Return the values between their two neighbours, exactly those of equal stamps.
+
+        Parameters
+        ----------
+        time_ns : (m,) int64
+            Inside the signal's range [ns].
+
+        Returns
+        -------
+        (m, ...) float
+            Linear in time.
+        """
+        # Differences of stamps are exact in double precision, stamps since 1970 are not.
+        start = self.time_ns[0]
+        at, own = (time_ns - start).astype(float), (self.time_ns - start).astype(float)
+        columns = self.values.reshape(len(self), -1).T
+        found = np.stack([np.interp(at, own, column) for column in columns], axis=-1)
+        return found.reshape(len(time_ns), *self.values.shape[1:])
+
+    def near(self, time_ns: Stamps, limit_ns: int) -> NDArray[np.bool_]:
+        """Tell which stamps (m,) lie inside the range with a value no farther than a limit [ns]."""
+        after = np.searchsorted(self.time_ns, time_ns)
+        before = np.searchsorted(self.time_ns, time_ns, side="right") - 1
+        last = len(self) - 1
+        gap = np.minimum(
+            self.time_ns[np.minimum(after, last)] - time_ns, time_ns - self.time_ns[before]
+        )
+        return (before >= 0) & (after <= last) & (gap <= limit_ns)
+
+    def newest(self, time_ns: Stamps) -> NDArray[np.intp]:
+        """Return the row of the newest value that is not younger, -1 where there is none, (m,)."""
+        return np.searchsorted(self.time_ns, time_ns, side="right") - 1
+
+
+def in_order(time_ns: Stamps, values: Array) -> Signal:
+    """Return a signal of samples in any order.
+
+    Parameters
+    ----------
+    time_ns : (n,) int64
+        Stamps [ns].
+    values : (n, ...) float
+        Rows that are not finite are left out; of equal stamps the last one received counts, as in
+        the nodes.
+
+    Returns
+    -------
+    Signal
+        Its stamps rise.
+    """
+    finite = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    time_ns, values = time_ns[finite], values[finite]
+    if len(time_ns) and np.all(np.diff(time_ns) > 0):
+        return Signal(time_ns, values)
+    order = np.argsort(time_ns, kind="stable")
+    time_ns, values = time_ns[order], values[order]
+    last = np.append(np.diff(time_ns) > 0, True)[: len(time_ns)]
+    return Signal(time_ns[last], values[last])
