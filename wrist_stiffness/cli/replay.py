@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.parser import OneLineParser
 
+if TYPE_CHECKING:
+    from wrist_stiffness.workflows.output_changes import TopicChanges
+
 DESCRIPTION = """\
 Run the very code of the nodes over a recording and write it again with predicted pose errors and
-corrected commands added. No ROS graph is needed; the result is the same to the bit every time."""
+corrected commands added. No ROS graph is needed; the result is the same to the bit every time.
+With --against it also says what changed since an earlier replay of the same recording, after a
+change of the model, the parameters or this program: exit code 1 if anything did."""
 
 EPILOG = """\
 example, a recording with other names:
   wrist-stiffness replay bag -o bag_predicted \\
-      --topic /load_estimate:=/ft_sensor/wrench --joint wrist_a --joint wrist_b"""
+      --topic /load_estimate:=/ft_sensor/wrench --joint wrist_a --joint wrist_b
+
+example, what another model changes:
+  wrist-stiffness replay bag --model old.yaml -o with_old
+  wrist-stiffness replay bag --model new.yaml -o with_new --against with_old"""
 
 
 def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
@@ -48,6 +60,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         help="the nodes' ROS 2 parameter file: sensor frames, objective, contact policy ...",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing OUT")
+    parser.add_argument(
+        "--against", metavar="OLD_OUT", help="earlier replay to compare with: what changed?"
+    )
     parser.add_argument("--json", metavar="FILE", help="write the summary here as well")
     parser.set_defaults(run=_run)
 
@@ -57,15 +72,22 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.errors import InputError
+    from wrist_stiffness.recording.reader import open_recording
     from wrist_stiffness.recording.topics import parse_topic_remaps
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.output_changes import output_changes
     from wrist_stiffness.workflows.parameter_file import node_settings
     from wrist_stiffness.workflows.replay import replay
 
     if len(arguments.joint) not in (0, 2):
         raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")
     settings = node_settings(arguments.parameters, arguments.joint)
+    if arguments.against is not None:
+        # Before the replay, which takes its time, and perhaps its place.
+        open_recording(arguments.against)
+        if Path(arguments.against).resolve() == Path(arguments.output).resolve():
+            raise InputError(f"--against {arguments.against}: is the output itself")
     summary = replay(
         arguments.recording,
         arguments.model or shipped_file("config/palmieri2015_model.yaml"),
@@ -91,6 +113,12 @@ def _run(arguments: argparse.Namespace) -> int:
     for reason, count in summary.refused.most_common():
         print(f"{count} refused, the first: {reason}")
     print(f"written: {arguments.output}")
+    changes: tuple[TopicChanges, ...] = ()
+    if arguments.against is not None:
+        changes = output_changes(arguments.against, arguments.output)
+        print(f"against {arguments.against}:")
+        for topic in changes:
+            print(f"  {_told(topic)}")
     if arguments.json:
         write_json(
             arguments.json,
@@ -102,6 +130,19 @@ def _run(arguments: argparse.Namespace) -> int:
                 "warnings": dict(summary.warnings),
                 "refused": dict(summary.refused),
                 "damage": summary.damage,
+                "changes": [asdict(topic) for topic in changes],
             },
         )
-    return 0
+    return 0 if all(topic.same for topic in changes) else 1
+
+
+def _told(topic: TopicChanges) -> str:
+    """Return what changed on a topic, as one line."""
+    text = f"{topic.topic:26} {topic.common} in both, {topic.changed or 'none'} changed"
+    if topic.first_ns is not None:
+        text += f", first at {1e-9 * topic.first_ns:.6f} s"
+    for largest in topic.largest:
+        text += f"; {largest.quantity} by {largest.size:.3g} at {1e-9 * largest.stamp_ns:.6f} s"
+    for count, where in ((topic.only_old, "old"), (topic.only_new, "new")):
+        text += f"; {count} only in the {where} one" if count else ""
+    return text
