@@ -24,11 +24,8 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Estimate
 
-MOST_STEPS = 10
+MOST_STEPS = 25
 """Gauss-Newton steps."""
-
-NOISE_STEPS = 3
-"""Steps at which the noise is estimated anew; then it is kept, so that the steps converge."""
 
 CLOSE = 0.05
 """The fit has arrived when no parameter moves by more than this share of its uncertainty."""
@@ -209,72 +206,97 @@ def fit(
         raise InputError(f"fit: only {table.measured[~unseen].sum()} numbers were measured")
     lower, upper = problem.bounds
     z = np.zeros(len(weight)) if start is None else start
-    residual, noise, arrived, step = problem.residual(z), None, False, 0
+    residual, arrived, step = problem.residual(z), False, 0
     while True:
         columns = problem.columns(z)
         lost = lost_units(table.with_values(residual), columns, Settings().outlier_limit)
         seen = table.with_values(np.where((lost | unseen)[:, None], np.nan, residual))
-        if noise is None or step < NOISE_STEPS:
-            noise = estimate_noise(seen, columns, np.empty((*residual.shape, 0)))
-        white = noise.whiten(seen, np.concatenate([columns, residual[:, :, None]], axis=2))
-        design, target = white[:, :-1], white[:, -1]
-        misfit, covariance = _uncertainty(design, target, weight, seen)
+        noise = estimate_noise(seen, columns, np.empty((*residual.shape, 0)))
+        linear = _Linear.of(seen, noise, columns, residual, weight, z)
         progress(step, MOST_STEPS)
         if arrived or step == MOST_STEPS:
             break
-        triangle = np.linalg.qr(
-            np.vstack([np.hstack([design, -target[:, None]]), _prior_rows(weight, z)]), mode="r"
-        )
-        move = lsq_linear(
-            triangle[:, :-1], triangle[:, -1], (lower - z, upper - z), method="bvls"
-        ).x
-        z, residual, taken = _descended(problem, seen, noise, z, move, residual)
-        arrived = bool((np.abs(taken) < CLOSE * np.sqrt(np.diag(covariance))).all())
+        sigma = np.sqrt(np.diag(linear.covariance))
+        z, residual, taken = _descended(problem, seen, linear, z, residual)
+        arrived = bool((np.abs(taken) < CLOSE * sigma).all())
         step += 1
     progress(MOST_STEPS, MOST_STEPS)
-    residual = np.where(lost[:, None], np.nan, residual)
-    return Fit(problem, z, covariance, residual, ~unseen, noise, misfit, int(lost.sum()), arrived)
+    return Fit(
+        problem,
+        z,
+        linear.covariance,
+        np.where(lost[:, None], np.nan, residual),
+        ~unseen,
+        noise,
+        linear.misfit,
+        int(lost.sum()),
+        arrived,
+    )
 
 
-def _prior_rows(weight: Array, z: Array) -> Array:
-    return np.hstack([np.diag(weight), (-weight * z)[:, None]])
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """The least squares problem of one step: white rows, then the priors.
 
-
-def _uncertainty(
-    design: Array, target: Array, weight: Array, seen: Observations
-) -> tuple[float, Array]:
-    """Return the misfit, and the covariance with a misfit above 1 counted as more noise.
-
-    `target` belongs to the point at which `design` was taken, so the misfit is that of the linear
-    problem's end.
+    Parameters
+    ----------
+    noise : NoiseModel
+        With a misfit above 1 counted as more noise.
+    rows, target : (k, p), (k,) float
+        What the step should explain, priors included.
+    covariance : (p, p) float
+        Of the parameters.
+    misfit : float
+        Sum of squares at the best step over its degrees of freedom.
     """
-    information = design.T @ design
-    prior = np.diag(weight**2)
-    spent = float(np.trace(np.linalg.solve(information + prior, information)))
-    best = np.linalg.lstsq(
-        np.vstack([design, np.diag(weight)]),
-        np.concatenate([target, np.zeros(len(weight))]),
-        rcond=None,
-    )[0]
-    left = target - design @ best
-    misfit = float(left @ left) / max(float(seen.measured.sum()) - spent, 1.0)
-    return misfit, np.linalg.inv(information / max(misfit, 1.0) + prior)
+
+    noise: NoiseModel
+    rows: Array
+    target: Array
+    covariance: Array
+    misfit: float
+
+    @classmethod
+    def of(
+        cls,
+        seen: Observations,
+        noise: NoiseModel,
+        columns: Array,
+        residual: Array,
+        weight: Array,
+        z: Array,
+    ) -> _Linear:
+        white = noise.whiten(seen, np.concatenate([columns, residual[:, :, None]], axis=2))
+        design, target = white[:, : len(z)], -white[:, len(z)]
+        rows = np.vstack([design, np.diag(weight)])
+        left = np.concatenate([target, -weight * z])
+        information, prior = design.T @ design, np.diag(weight**2)
+        spent = float(np.trace(np.linalg.solve(information + prior, information)))
+        best = np.linalg.lstsq(rows, left, rcond=None)[0]
+        freedom = max(float(seen.measured.sum()) - spent, 1.0)
+        misfit = float(((target - design @ best) ** 2).sum()) / freedom
+        more = max(misfit, 1.0)
+        share = np.concatenate([np.full(len(design), 1.0 / np.sqrt(more)), np.ones(len(z))])
+        return cls(
+            replace(noise, scatter=noise.scatter * more),
+            rows * share[:, None],
+            left * share,
+            np.linalg.inv(information / more + prior),
+            misfit,
+        )
 
 
 def _descended(
-    problem: FitProblem,
-    seen: Observations,
-    noise: NoiseModel,
-    z: Array,
-    move: Array,
-    residual: Array,
+    problem: FitProblem, seen: Observations, linear: _Linear, z: Array, residual: Array
 ) -> tuple[Array, Array, Array]:
     """Take a step, halved until the sum of squares falls; return z, residual and the step."""
 
     def squares(z: Array, residual: Array) -> float:
-        white = noise.whiten(seen, residual[:, :, None])
+        white = linear.noise.whiten(seen, residual[:, :, None])
         return float((white**2).sum() + ((problem.weights * z) ** 2).sum())
 
+    lower, upper = problem.bounds
+    move = lsq_linear(linear.rows, linear.target, (lower - z, upper - z), method="bvls").x
     now = squares(z, residual)
     for _ in range(MOST_HALVINGS):
         tried = problem.residual(z + move)
