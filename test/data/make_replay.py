@@ -52,6 +52,7 @@ COMMANDED = ("motor_1_joint", "motor_2_joint")
 # load silent                       --------
 # link_1        -----------                             --------
 # NaN, domain               x       x
+# border fade     x           x           x         (motor_1)
 
 
 def joints(stamp_ns: int, names: tuple[str, ...], theta: dict[str, float], speed: bool) -> Message:
@@ -68,7 +69,7 @@ def messages(rng: np.random.Generator) -> list[tuple[float, str, Message]]:
         time = i / RATE_HZ
         stamp = round((START_S + time) * 1e9)
         theta = {
-            "motor_1_joint": 0.5 * np.sin(0.9 * time),
+            "motor_1_joint": 1.3 * np.sin(0.9 * time),
             "motor_2_joint": 0.4 * np.sin(1.3 * time + 1.0),
             "gripper": 0.01 * time,
         }
