@@ -27,6 +27,9 @@ from wrist_stiffness.model.parameters import Estimate
 MOST_STEPS = 25
 """Gauss-Newton steps."""
 
+NOISE_STEPS = 8
+"""Steps at which the noise is estimated anew; then it is kept, so that the steps converge."""
+
 CLOSE = 0.05
 """The fit has arrived when no parameter moves by more than this share of its uncertainty."""
 
@@ -198,10 +201,12 @@ def fit(
     Raises
     ------
     InputError
-        If fewer numbers were measured than parameters without a prior are free.
+        If no parameter is free, or fewer numbers were measured than parameters without a prior.
     """
     table, weight = problem.table, problem.weights
     unseen = np.zeros(table.n_units, dtype=bool) if held_out is None else held_out
+    if not len(weight):
+        raise InputError("fit: no parameter is free")
     if table.measured[~unseen].sum() < max(1, np.count_nonzero(weight < 1.0)):
         raise InputError(f"fit: only {table.measured[~unseen].sum()} numbers were measured")
     lower, upper = problem.bounds
@@ -211,7 +216,8 @@ def fit(
         columns = problem.columns(z)
         lost = lost_units(table.with_values(residual), columns, Settings().outlier_limit)
         seen = table.with_values(np.where((lost | unseen)[:, None], np.nan, residual))
-        noise = estimate_noise(seen, columns, np.empty((*residual.shape, 0)))
+        if step <= NOISE_STEPS:
+            noise = estimate_noise(seen, columns, np.empty((*residual.shape, 0)))
         linear = _Linear.of(seen, noise, columns, residual, weight, z)
         progress(step, MOST_STEPS)
         if arrived or step == MOST_STEPS:
@@ -281,7 +287,7 @@ class _Linear:
             replace(noise, scatter=noise.scatter * more),
             rows * share[:, None],
             left * share,
-            np.linalg.inv(information / more + prior),
+            np.asarray(np.linalg.inv(information / more + prior), dtype=float),
             misfit,
         )
 

@@ -1,0 +1,95 @@
+"""Judge a fit by units that it has not seen.
+
+Held out is the last session where there are several, else the end of the only one.  What is set up
+anew in a session is fitted to the last one by itself; the wrist's own parameters are not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting import Fit, fit
+from wrist_stiffness.diagnosis.observations import Observations
+from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
+from wrist_stiffness.diagnosis.settings import Settings
+from wrist_stiffness.diagnosis.whitening import NoiseModel
+
+ANOTHER_SESSION = "another session"
+THIS_SESSION = "this session only"
+SEEN = "the fit's own data"
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A fit and what it leaves of the units by which it is judged.
+
+    Parameters
+    ----------
+    fit : Fit
+        It has not seen those units, unless `by` says so.
+    observations : Observations
+        Residuals of those units, NaN where not measured or lost.
+    by : str
+        `another session`, `this session only` or `the fit's own data`.
+    """
+
+    fit: Fit
+    observations: Observations
+    by: str
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square of each quantity, by its key."""
+        left = HeldOut(self.observations.values, np.empty(0))
+        return {q.key: left.rmse(q) for q in self.observations.reported}
+
+    def held_out(self, noise: NoiseModel) -> HeldOut:
+        """Return what is left, made white with a noise."""
+        values = self.observations.values
+        return HeldOut(values, noise.whiten(self.observations, values[:, :, None])[:, 0])
+
+
+def judged(problem: FitProblem, progress: Progress = silent) -> Judged:
+    """Fit to all but the held-out units and say what is left of those.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        All sessions.
+    progress : callable
+        Told steps done and steps at most.
+    """
+    table = problem.table
+    aside = sealed_units(table, Settings().sealed_share)
+    if len(problem.sessions) == 1:
+        found = fit(problem, held_out=aside, progress=progress)
+        return Judged(found, found.observations.take(aside), THIS_SESSION)
+    found = fit(replace(problem, sessions=problem.sessions[:-1]), progress=progress)
+    again = tuple(each for each in problem.free if each.per_session)
+    own = {each.effect.name for each in again}
+    wrist = tuple(each for each in found.effects() if each.name not in own)
+    last = FitProblem(
+        problem.model.with_effects(*problem.model.effects, *wrist), problem.sessions[-1:], again
+    )
+    left = fit(last).observations if again else last.table.with_values(last.residual(np.empty(0)))
+    return Judged(found, left, ANOTHER_SESSION)
+
+
+def judged_by_itself(found: Fit) -> Judged:
+    """Return a fit with what it leaves of its own data."""
+    return Judged(found, found.observations, SEEN)
+
+
+def noise_floor(noise: NoiseModel, observations: Observations) -> dict[str, float]:
+    """Return the root mean square that noise alone gives each quantity, by its key."""
+    inverse = np.linalg.inv(noise.factors(observations))
+    variance = np.einsum("nij,nij->ni", inverse, inverse)
+    mean = np.sum(np.where(observations.measured, variance, 0.0), axis=0)
+    mean = mean / np.maximum(observations.measured.sum(axis=0), 1)
+    return {
+        q.key: float(np.sqrt(mean[list(q.components)].sum())) * q.per_si
+        for q in observations.reported
+    }
