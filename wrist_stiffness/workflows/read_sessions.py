@@ -1,0 +1,96 @@
+"""The recordings that a command names, as measured sessions in the order of time."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from wrist_stiffness.campaign.folder import recordings_in
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.model.model_file import file_sha256
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """Which recordings to read, and how they name things.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Recordings, or folders of recordings.
+    topics : dict of str to str
+        Actual by standard topic name.
+    settings : StreamSettings
+        Names of the motors, sensor frames and the age limit of loads, as the nodes have them.
+    """
+
+    paths: Sequence[str | Path]
+    topics: Mapping[str, str]
+    settings: StreamSettings = field(default_factory=StreamSettings)
+
+
+def read_sessions(
+    recordings: Recordings, table: Table, progress: Callable[[int, int], None]
+) -> dict[Path, MeasuredSession]:
+    """Read recordings with measured poses, each a session with a name of its own.
+
+    Parameters
+    ----------
+    recordings : Recordings
+        What to read.
+    table : Table
+        Of the wrist.
+    progress : callable
+        Told recordings done and in all.
+
+    Returns
+    -------
+    dict of Path to MeasuredSession
+        In the order of time.
+
+    Raises
+    ------
+    WristError
+        If a recording cannot be used.
+    """
+    paths, motors = recordings_in(recordings.paths), recordings.settings.motors
+    found = {}
+    for done, path in enumerate(paths):
+        progress(done, len(paths))
+        found[path] = read_session(
+            path,
+            table,
+            remaps=recordings.topics,
+            joints=(motors.motor_1, motors.motor_2),
+            frames=recordings.settings.frames,
+            load_age_limit_s=recordings.settings.load_age_limit_s,
+        )
+    progress(len(paths), len(paths))
+    names = Counter(session.name for session in found.values())
+    named = {
+        path: session if names[session.name] == 1 else replace(session, name=str(path))
+        for path, session in found.items()
+    }
+    return dict(sorted(named.items(), key=lambda item: float(item[1].block.time[0])))
+
+
+def recording_sha256(path: Path) -> str:
+    """Return the SHA-256 of a recording's storage file, or of the checksums of several.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
+    """
+    if not path.is_dir():
+        return file_sha256(path)
+    files = sorted(path.glob("*.mcap"))
+    if len(files) == 1:
+        return file_sha256(files[0])
+    return hashlib.sha256("".join(file_sha256(file) for file in files).encode()).hexdigest()
