@@ -42,7 +42,7 @@ def test_only_our_own_errors_come_out(model, messages):
     plain = StreamSettings()
     predicting = PredictionStream(model, plain)
     correcting = CorrectionStream(model, plain, enabled=True)
-    monitoring = MonitorStream(model, plain, MonitorSettings(np.full(6, 1e-6)), 0.02)
+    monitoring = MonitorStream(model, plain, MonitorSettings(np.full(6, 1e-6)), 0.02, 1.0)
     for kind, stamp, frame, first, second in messages:
         for stream in (predicting, correcting, monitoring):
             with contextlib.suppress(WristError):
@@ -66,3 +66,8 @@ def test_only_our_own_errors_come_out(model, messages):
         elif kind == "pose":
             with contextlib.suppress(WristError):
                 monitoring.on_pose(stamp, frame, first, second)
+            with contextlib.suppress(WristError):
+                monitoring.on_frame_pose(stamp, frame, first, second)
+            if len(first) == 3 and len(second) == 3:
+                with contextlib.suppress(WristError):
+                    monitoring.on_markers(stamp, frame, [first, second])

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Bool
 
 from wrist_stiffness.model.error_model import Load
-from wrist_stiffness.ros.conversions import nanoseconds, pose_message_stamped
+from wrist_stiffness.ros.conversions import nanoseconds, pose_message_stamped, time_message
 from wrist_stiffness.ros.model_monitor import ModelMonitor
 
 SECOND = 1_000_000_000
@@ -88,6 +88,44 @@ def test_a_pose_with_covariance_says_what_is_not_measured(graph, model_path, mod
     assert found.pose.orientation.w == 1.0
     assert found.covariance[35] > 1e8
     assert found.covariance[0] < 1e-9
+
+
+def markers(model, pose, stamp_ns=SECOND, lost=()):
+    rotation, position = pose
+    points = model.table.geometry.platform.readout_points @ rotation.T + position
+    points[list(lost)] = np.nan
+    message = PoseArray(poses=[Pose(position=Point(x=x, y=y, z=z)) for x, y, z in points.tolist()])
+    message.header.stamp = time_message(stamp_ns)
+    message.header.frame_id = "wrist_base"
+    return message
+
+
+def test_markers_give_a_residual_and_too_few_a_reason(graph, monitor, model):
+    pose = true_pose(model, np.array([0.0, 0.0, 7e-6]))
+    topic = "/platform_markers_measured"
+    graph.publish(topic, markers(model, pose, lost=(0,)))
+    graph.until(lambda: residuals(graph), "residual")
+    place = residuals(graph)[0].pose.pose.position
+    assert [place.x, place.y, place.z] == pytest.approx([0.0, 0.0, 7e-6], abs=1e-12)
+    graph.publish(topic, markers(model, pose, lost=range(5)))
+    _, values = graph.status(NAME, lambda status, values: "refused InputError" in values)
+    assert "2 given; at least 3 needed" in values["last fault"]
+
+
+def test_the_motion_of_the_frame_is_no_residual(graph, monitor, model):
+    rotation, position = true_pose(model)
+    far = np.array([0.2, 0.1, 0.0])
+    turn, shift = Rotation.from_rotvec([0.0, 1e-3, 0.0]).as_matrix(), np.array([0.0, 3e-5, 0.0])
+    for moved_turn, moved_shift in ((np.eye(3), np.zeros(3)), (turn, shift)):
+        frame = pose_message_stamped(SECOND, moved_turn, moved_turn @ far + moved_shift)
+        count = monitor.stream.frame.count
+        graph.publish("/frame_pose_measured", frame)
+        graph.until(lambda count=count: monitor.stream.frame.count > count, "frame pose")
+        send(graph, (moved_turn @ rotation, moved_turn @ position + moved_shift), 1)
+    for message in residuals(graph):
+        place, turned = message.pose.pose.position, message.pose.pose.orientation
+        assert [place.x, place.y, place.z] == pytest.approx([0.0] * 3, abs=1e-12)
+        assert [turned.x, turned.y, turned.z] == pytest.approx([0.0] * 3, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.marker_poses import LEAST_MARKERS, poses_from_markers
 from wrist_stiffness.campaign.signals import Signal, Stamps
 from wrist_stiffness.compensation.intake import BASE_FRAME, Frames
-from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED, UNIT_TOLERANCE
+from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
+from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal

@@ -133,9 +133,12 @@ class SensorFrame:
     acts_on: Literal["platform", "environment"] = "platform"
 
 
+IN_BASE = SensorFrame(BASE_FRAME)
+
+
 @dataclass(frozen=True)
 class Frames:
-    """The frames in which a wrench may arrive.
+    """The frames in which a wrench, a pose or markers may arrive.
 
     Parameters
     ----------
@@ -167,7 +170,7 @@ class Frames:
         InputError
             If a component is not finite.
         """
-        known = {BASE_FRAME: SensorFrame(BASE_FRAME), PLATFORM_FRAME: SensorFrame(PLATFORM_FRAME)}
+        known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: SensorFrame(PLATFORM_FRAME)}
         frame = self.sensors.get(frame_id) or known.get(frame_id)
         if frame is None:
             names = ", ".join([*known, *self.sensors])
@@ -179,3 +182,35 @@ class Frames:
         turned_force = sign * (frame.rotation @ wrench[:3])
         turned_moment = sign * (frame.rotation @ wrench[3:]) + cross(frame.position, turned_force)
         return Load(np.concatenate([turned_force, turned_moment]), frame.parent == PLATFORM_FRAME)
+
+    def in_base(self, frame_id: str, what: str) -> tuple[Array, Array]:
+        """Return how to turn and move what was measured in a frame to F.
+
+        Parameters
+        ----------
+        frame_id : str
+            Frame of the message.
+        what : str
+            What was measured, for the message.
+
+        Returns
+        -------
+        rotation : (3, 3) float
+            From the frame to F.
+        position : (3,) float
+            The frame's origin in F [m].
+
+        Raises
+        ------
+        FrameError
+            If the frame is neither `wrist_base` nor mapped to it.
+        """
+        known = {BASE_FRAME: IN_BASE} | {
+            name: frame for name, frame in self.sensors.items() if frame.parent == BASE_FRAME
+        }
+        if frame_id not in known:
+            raise FrameError(
+                f"{what}: frame '{frame_id}' is neither {BASE_FRAME} nor mapped to it "
+                f"(known: {', '.join(known)})"
+            )
+        return known[frame_id].rotation, known[frame_id].position

@@ -1,4 +1,8 @@
-"""A measured pose finds its joint state and its load, by stamps, and becomes a residual."""
+"""A measured pose finds its joint state and its load, by stamps, and becomes a residual.
+
+It comes as a pose or as the places of markers; where a target on the wrist's frame is measured too,
+the frame's motion is taken out first.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from numpy.typing import ArrayLike
 
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.measured_pose import (
+    FrameMotion,
+    measured_pose,
+    pose_of_markers,
+)
 from wrist_stiffness.compensation.monitor import (
     MonitorSettings,
     ResidualMonitor,
@@ -18,7 +26,7 @@ from wrist_stiffness.compensation.monitor import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
-from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -29,9 +37,6 @@ JointStateKept = tuple[int, Array, Array | None]
 
 NOT_MEASURED = 1.0
 """A variance of this or more says that a component is not measured [m^2, rad^2]."""
-
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of a quaternion's norm from one."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +66,15 @@ class MonitorStream(Stream):
         Names, frames, limits.
     monitoring : MonitorSettings
         What counts as a change.
-    joint_age_limit_s : float
-        Oldest joint state that is still matched with a pose [s].
+    joint_age_limit_s, frame_age_limit_s : float
+        Oldest joint state and oldest pose of the frame that are still matched with a pose [s].
+
+    Attributes
+    ----------
+    monitor : ResidualMonitor
+        Statistics and alarm since the model was loaded.
+    frame : FrameMotion
+        Motion of the wrist's frame, where a target on it is measured.
     """
 
     def __init__(
@@ -71,11 +83,13 @@ class MonitorStream(Stream):
         settings: StreamSettings,
         monitoring: MonitorSettings,
         joint_age_limit_s: float,
+        frame_age_limit_s: float,
     ) -> None:
         super().__init__(model, settings)
         self._monitoring = monitoring
         self._age_limit_ns = round(joint_age_limit_s * NANOSECONDS)
         self._joints: deque[JointStateKept] = deque(maxlen=JOINT_STATES_KEPT)
+        self.frame = FrameMotion(frame_age_limit_s)
         self._judged: ErrorModel | None = None
         self.monitor = ResidualMonitor(monitoring)
 
@@ -106,7 +120,7 @@ class MonitorStream(Stream):
         stamp_ns : int
             Its stamp [ns].
         frame_id : str
-            Must be `wrist_base`.
+            `wrist_base`, or mapped to it.
         position, quaternion : sequence of 3 and 4 float
             Of the platform, U -> F; [m], x y z w.
         variance : (6,) float, optional
@@ -120,21 +134,60 @@ class MonitorStream(Stream):
         Raises
         ------
         WristError
-            If the pose is not usable or no joint state or load belongs to it.
+            If the pose is not usable or no joint state, load or pose of the frame belongs to it.
         """
-        if frame_id != BASE_FRAME:
-            raise FrameError(f"measured pose: frame '{frame_id}' is not {BASE_FRAME}")
-        numbers = np.array([*position, *quaternion], dtype=float)
-        if not np.all(np.isfinite(numbers)):
-            raise InputError(f"measured pose: {numbers.tolist()} is not finite")
-        norm = float(np.linalg.norm(numbers[3:]))
-        if abs(norm - 1.0) > UNIT_TOLERANCE:
-            raise InputError(f"measured pose: quaternion has the norm {norm:.4g}, not 1")
+        rotation, place = measured_pose(self.settings.frames, frame_id, position, quaternion)
+        if variance is not None:
+            turn, _ = self.settings.frames.in_base(frame_id, "measured pose")
+            variance = np.ravel(np.reshape(variance, (2, 3)) @ (turn.T**2))
+        return self._judge(stamp_ns, rotation, place, variance)
+
+    def on_markers(self, stamp_ns: int, frame_id: str, points: ArrayLike) -> MonitoredPose:
+        """Compare the platform's pose that its markers tell with the prediction.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Their stamp [ns].
+        frame_id : str
+            `wrist_base`, or mapped to it.
+        points : (n, 3) array_like
+            The geometry's readout points in their order [m]; NaN where lost.
+
+        Returns
+        -------
+        MonitoredPose
+            To be published with the markers' stamp.
+
+        Raises
+        ------
+        WristError
+            If too few are seen, or as `on_pose`.
+        """
+        nominal = self.running_model().model.table.geometry.platform.readout_points
+        pose = pose_of_markers(self.settings.frames, frame_id, points, nominal)
+        return self._judge(stamp_ns, *pose, None)
+
+    def on_frame_pose(
+        self,
+        stamp_ns: int,
+        frame_id: str,
+        position: Sequence[float],
+        quaternion: Sequence[float],
+    ) -> None:
+        """Keep a pose of the target on the frame (parameters and errors as those of `on_pose`)."""
+        what = "measured frame pose"
+        pose = measured_pose(self.settings.frames, frame_id, position, quaternion, what)
+        self.frame.add(stamp_ns, *pose)
+
+    def _judge(
+        self, stamp_ns: int, rotation: Array, position: Array, variance: Array | None
+    ) -> MonitoredPose:
+        rotation, position = self.frame.taken_out(stamp_ns, rotation, position)
         theta, theta_dot = self._joints_at(stamp_ns)
         running = self.running_model()
         prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1], theta_dot)
-        rotation = Rotation.from_quat(numbers[3:]).as_matrix()
-        residual = residual_of_pose(rotation, numbers[:3], prediction)
+        residual = residual_of_pose(rotation, position, prediction)
         noise = self._monitoring.noise**2
         if variance is not None:
             residual = np.where(variance < NOT_MEASURED, residual, np.nan)

@@ -73,7 +73,7 @@ COMMON = (
     ParameterEntry(
         "frames",
         "",
-        "frames of load sensors (YAML): {FRAME_ID: {parent: wrist_base | wrist_platform, "
+        "frames of sensors (YAML): {FRAME_ID: {parent: wrist_base | wrist_platform, "
         "position_mm: [x, y, z], rpy_deg: [r, p, y], acts_on: platform | environment}}",
     ),
     ParameterEntry(
@@ -211,6 +211,14 @@ MONITOR = (
         "oldest joint state that is matched with a pose [s]",
         lower=0.0,
         upper=10.0,
+        fixed=True,
+    ),
+    ParameterEntry(
+        "frame_age_limit_s",
+        1.0,
+        "oldest pose of the frame that is taken out of a pose, once one was measured [s]",
+        lower=0.0,
+        upper=3600.0,
         fixed=True,
     ),
     ParameterEntry("baseline_samples", 500, "poses from which the baseline is learned", fixed=True),

@@ -34,9 +34,15 @@ def time_message(stamp_ns: int) -> Time:
     return Time(sec=seconds, nanosec=rest)
 
 
-def three(vector: Vector3) -> tuple[float, float, float]:
-    """Return the components of a vector message."""
+def three(vector: Vector3 | Point) -> tuple[float, float, float]:
+    """Return the components of a vector or point message."""
     return vector.x, vector.y, vector.z
+
+
+def pose_numbers(pose: Pose) -> tuple[tuple[float, float, float], tuple[float, ...]]:
+    """Return position and quaternion x y z w of a pose message."""
+    turn = pose.orientation
+    return three(pose.position), (turn.x, turn.y, turn.z, turn.w)
 
 
 def pose_message(position: Array, quaternion: Array) -> Pose:

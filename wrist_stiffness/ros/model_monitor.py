@@ -6,18 +6,21 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 
-from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED, MonitorStream
+from wrist_stiffness.compensation.monitor_stream import (
+    NOT_MEASURED,
+    MonitoredPose,
+    MonitorStream,
+)
 from wrist_stiffness.compensation.parameters import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.ros.conversions import error_message, nanoseconds
+from wrist_stiffness.ros.conversions import error_message, nanoseconds, pose_numbers, three
 from wrist_stiffness.ros.parameters import values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
@@ -36,7 +39,13 @@ class ModelMonitor(WristNode):
     def make_stream(self, settings: StreamSettings) -> MonitorStream:
         """Return the monitor's stream."""
         values = values_of(self, MONITOR)
-        return MonitorStream(None, settings, monitor_settings(values), values["joint_age_limit_s"])
+        return MonitorStream(
+            None,
+            settings,
+            monitor_settings(values),
+            values["joint_age_limit_s"],
+            values["frame_age_limit_s"],
+        )
 
     def facts(self) -> dict[str, str]:
         """Return the residuals' statistics."""
@@ -49,6 +58,7 @@ class ModelMonitor(WristNode):
             "rms phi [mdeg]": f"{np.linalg.norm(phi_mdeg):.3f}",
             "rms over expected noise": "" if monitor.learning else f"{monitor.ratio:.3f}",
             "alarm": str(monitor.alarm).lower(),
+            "poses of the frame": str(self.stream.frame.count),
         }
 
     def restriction(self) -> str:
@@ -76,7 +86,14 @@ class ModelMonitor(WristNode):
             pose = (PoseWithCovarianceStamped, self._on_pose_with_covariance)
         return [
             self.create_subscription(JointState, "/joint_states", self._on_joints, SENSOR_QOS),
+            # The frame before the platform: it is taken out of the pose of the same stamp.
+            self.create_subscription(
+                PoseStamped, "/frame_pose_measured", self._on_frame_pose, SENSOR_QOS
+            ),
             self.create_subscription(pose[0], "/platform_pose_measured", pose[1], SENSOR_QOS),
+            self.create_subscription(
+                PoseArray, "/platform_markers_measured", self._on_markers, SENSOR_QOS
+            ),
         ]
 
     def _on_joints(self, message: JointState) -> None:
@@ -87,24 +104,31 @@ class ModelMonitor(WristNode):
         except WristError as error:
             self.warn(error)
 
+    def _on_frame_pose(self, message: PoseStamped) -> None:
+        header = message.header
+        try:
+            self.stream.on_frame_pose(
+                nanoseconds(header.stamp), header.frame_id, *pose_numbers(message.pose)
+            )
+        except WristError as error:
+            self.warn(error)
+
     def _on_pose(self, message: PoseStamped) -> None:
-        self._judge(message.header, message.pose, None)
+        self._judge(message.header, self.stream.on_pose, *pose_numbers(message.pose))
 
     def _on_pose_with_covariance(self, message: PoseWithCovarianceStamped) -> None:
         variance = np.reshape(message.pose.covariance, (6, 6)).diagonal()
-        self._judge(message.header, message.pose.pose, variance)
+        numbers = pose_numbers(message.pose.pose)
+        self._judge(message.header, self.stream.on_pose, *numbers, variance)
 
-    def _judge(self, header: Header, pose: Pose, variance: Array | None) -> None:
+    def _on_markers(self, message: PoseArray) -> None:
+        points = [three(pose.position) for pose in message.poses]
+        self._judge(message.header, self.stream.on_markers, points)
+
+    def _judge(self, header: Header, judge: Callable[..., MonitoredPose], *measured: Any) -> None:
         stamp_ns = nanoseconds(header.stamp)
-        place, turn = pose.position, pose.orientation
         try:
-            judged = self.stream.on_pose(
-                stamp_ns,
-                header.frame_id,
-                (place.x, place.y, place.z),
-                (turn.x, turn.y, turn.z, turn.w),
-                variance,
-            )
+            judged = judge(stamp_ns, header.frame_id, *measured)
         except WristError as error:
             self.warn(error)
             return

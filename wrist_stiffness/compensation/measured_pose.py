@@ -1,0 +1,173 @@
+"""Convert in: measured poses and markers from any frame, and the motion of the wrist's frame."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.readout import fit_markers
+from wrist_stiffness.mechanism.components import Array
+
+UNIT_TOLERANCE = 1e-3
+"""Largest deviation of a quaternion's norm from one."""
+
+FRAME_POSES_KEPT = 256
+
+
+def measured_pose(
+    frames: Frames,
+    frame_id: str,
+    position: Sequence[float],
+    quaternion: Sequence[float],
+    what: str = "measured pose",
+) -> tuple[Array, Array]:
+    """Return a measured pose in F.
+
+    Parameters
+    ----------
+    frames : Frames
+        Frames in which it may come.
+    frame_id : str
+        Its frame.
+    position, quaternion : sequence of 3 and 4 float
+        [m], x y z w.
+    what : str
+        What was measured, for the message.
+
+    Returns
+    -------
+    rotation : (3, 3) float
+        To F.
+    position : (3,) float
+        In F [m].
+
+    Raises
+    ------
+    FrameError
+        If the frame is neither `wrist_base` nor mapped to it.
+    InputError
+        If a number is not finite or the quaternion is no unit quaternion.
+    """
+    turn, origin = frames.in_base(frame_id, what)
+    numbers = np.array([*position, *quaternion], dtype=float)
+    if not np.all(np.isfinite(numbers)):
+        raise InputError(f"{what}: {numbers.tolist()} is not finite")
+    norm = float(np.linalg.norm(numbers[3:]))
+    if abs(norm - 1.0) > UNIT_TOLERANCE:
+        raise InputError(f"{what}: quaternion has the norm {norm:.4g}, not 1")
+    return turn @ Rotation.from_quat(numbers[3:]).as_matrix(), turn @ numbers[:3] + origin
+
+
+def pose_of_markers(
+    frames: Frames, frame_id: str, points: ArrayLike, nominal: Array
+) -> tuple[Array, Array]:
+    """Return the platform's pose in F from the places of its markers.
+
+    Parameters
+    ----------
+    frames : Frames
+        Frames in which they may come.
+    frame_id : str
+        Their frame.
+    points : (n, 3) array_like
+        Measured [m]; a marker with a NaN is lost.
+    nominal : (n, 3) float
+        The same points of the platform in U [m].
+
+    Returns
+    -------
+    rotation : (3, 3) float
+        U -> F.
+    position : (3,) float
+        Of the platform's point at O in F [m].
+
+    Raises
+    ------
+    FrameError
+        If the frame is neither `wrist_base` nor mapped to it.
+    InputError
+        If another number of points comes, or fewer than three that are not on a line are seen.
+    """
+    turn, origin = frames.in_base(frame_id, "measured markers")
+    places = np.reshape(np.asarray(points, dtype=float), (-1, 3))
+    if len(places) != len(nominal):
+        raise InputError(
+            f"measured markers: {len(places)} came, the geometry names {len(nominal)} readout "
+            "points; both must be in the same order"
+        )
+    fit = fit_markers(nominal, places @ turn.T + origin)
+    return fit.rotation, fit.shift
+
+
+class FrameMotion:
+    """How the wrist's frame has moved since a target on it was first measured.
+
+    Parameters
+    ----------
+    age_limit_s : float
+        Oldest pose of the frame that is still used [s].
+
+    Attributes
+    ----------
+    count : int
+        Poses of the frame taken in.
+    """
+
+    def __init__(self, age_limit_s: float) -> None:
+        self._age_limit_s = age_limit_s
+        self.count = 0
+        self._first: tuple[Array, Array] | None = None
+        self._poses: deque[tuple[int, Array, Array]] = deque(maxlen=FRAME_POSES_KEPT)
+
+    def add(self, stamp_ns: int, rotation: Array, position: Array) -> None:
+        """Keep a pose of the frame's target: its stamp [ns], rotation (3, 3), place (3,) [m]."""
+        if self._first is None:
+            self._first = rotation, position
+        self._poses.append((stamp_ns, rotation, position))
+        self.count += 1
+
+    def taken_out(self, stamp_ns: int, rotation: Array, position: Array) -> tuple[Array, Array]:
+        """Return a pose of the platform as seen from the frame where it was first.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Of the platform's pose [ns].
+        rotation : (3, 3) float
+            U -> F.
+        position : (3,) float
+            In F [m].
+
+        Returns
+        -------
+        (3, 3) float, (3,) float
+            The same; unchanged where the frame was never measured.
+
+        Raises
+        ------
+        InputError
+            If the frame was measured once, but not lately: a pose with its motion left in would
+            look like a change of the wrist.
+        """
+        if self._first is None:
+            return rotation, position
+        newest = next((kept for kept in reversed(self._poses) if kept[0] <= stamp_ns), None)
+        if newest is None:
+            raise InputError("measured pose: no pose of the frame with a stamp before it")
+        age_s = (stamp_ns - newest[0]) / NANOSECONDS
+        if age_s > self._age_limit_s:
+            raise InputError(
+                f"measured pose: newest pose of the frame is {age_s:.3f} s older "
+                f"(limit {self._age_limit_s:g} s)"
+            )
+        # F now, as seen from F at first: T_now T_first^-1.
+        turn = newest[1] @ self._first[0].T
+        moved = newest[2] - turn @ self._first[1]
+        return turn.T @ rotation, turn.T @ (position - moved)
