@@ -22,7 +22,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import error_message, nanoseconds, pose_numbers, three
 from wrist_stiffness.ros.parameters import values_of
-from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.qos import ALARM_QOS, RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.wrist_node import WristNode
 
@@ -70,7 +70,7 @@ class ModelMonitor(WristNode):
         self._residual = self.create_lifecycle_publisher(
             PoseWithCovarianceStamped, "/model_residual", RELIABLE_QOS
         )
-        self._alarm = self.create_lifecycle_publisher(Bool, "/model_alarm", RELIABLE_QOS)
+        self._alarm = self.create_lifecycle_publisher(Bool, "/model_alarm", ALARM_QOS)
         return super().on_configure(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -11,6 +11,9 @@ COMMAND_QOS = QoSProfile(depth=10)
 RELIABLE_QOS = QoSProfile(depth=200)
 """Everything out."""
 
+ALARM_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""A state: who comes later hears the newest, also where poses have stopped."""
+
 RECORDING_QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """The recorder hears everybody."""
 
