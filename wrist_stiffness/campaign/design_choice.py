@@ -1,0 +1,96 @@
+"""Choose settings for an experiment: greedily by gain per second, then by exchange.
+
+Each step looks at a random part of the pool: nearly as good as all of it (Mirzasoleiman et al.
+2015) at a fraction of the time.  A setting may be chosen again: optimal designs repeat settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+
+LOOKED_AT = 40
+"""Settings that are compared in each step."""
+
+EXCHANGES = 12
+"""Settings that each chosen one is compared with at the end."""
+
+Utility = Callable[[Array], Array]
+"""From Gram matrices (..., q, q) of experiments to what they are worth, (...)."""
+
+
+def choose(
+    grams: Array,
+    cost_s: Array,
+    start: Array,
+    budget_s: float,
+    utility: Utility,
+    enough: Callable[[Array], bool],
+    rng: np.random.Generator,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[int]:
+    """Choose settings.
+
+    Parameters
+    ----------
+    grams : (m, q, q) float
+        Of each setting.
+    cost_s : (m,) float
+        Duration of each setting [s].
+    start : (q, q) float
+        Of what is measured anyway.
+    budget_s : float
+        Duration that the chosen ones may have together [s].
+    utility : callable
+        Worth of experiments; increasing.
+    enough : callable
+        Tells of a Gram matrix (q, q) whether nothing more is needed.
+    rng : numpy.random.Generator
+        Which settings are compared.
+    progress : callable, optional
+        Called with (seconds planned, budget).
+
+    Returns
+    -------
+    list of int
+        In the order of their worth; a number may be there more than once.
+    """
+    chosen: list[int] = []
+    total, spent = start.copy(), 0.0
+    while not enough(total):
+        left = np.flatnonzero(cost_s <= budget_s - spent)
+        if len(left) == 0:
+            break
+        looked = rng.choice(left, min(LOOKED_AT, len(left)), replace=False)
+        gain = (utility(total + grams[looked]) - utility(total)) / cost_s[looked]
+        best = int(looked[np.argmax(gain)])
+        chosen.append(best)
+        total += grams[best]
+        spent += float(cost_s[best])
+        if progress is not None:
+            progress(int(spent), int(budget_s))
+    return _exchanged(chosen, grams, cost_s, total, budget_s - spent, utility, rng)
+
+
+def _exchanged(
+    chosen: list[int],
+    grams: Array,
+    cost_s: Array,
+    total: Array,
+    spare_s: float,
+    utility: Utility,
+    rng: np.random.Generator,
+) -> list[int]:
+    """Swap each chosen setting for a better one that takes no more time than there is."""
+    chosen = list(chosen)
+    for place, old in enumerate(chosen):
+        fitting = np.flatnonzero(cost_s <= cost_s[old] + max(spare_s, 0.0))
+        looked = np.append(old, rng.choice(fitting, min(EXCHANGES, len(fitting)), replace=False))
+        rest = total - grams[old]
+        best = int(looked[np.argmax(utility(rest + grams[looked]))])
+        spare_s += float(cost_s[old] - cost_s[best])
+        chosen[place], total = best, rest + grams[best]
+    return chosen

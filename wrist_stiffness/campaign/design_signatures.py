@@ -1,0 +1,163 @@
+"""What effects would leave in a planned experiment, by differences of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import Estimate, Parameter
+
+STEP = 0.1
+"""Step of a difference, in plausible sizes; a law linear in its parameters is taken at full size
+instead."""
+
+SENSOR_STEP = 0.01
+"""Registrations are plausible by the millimetre, where they compose on no straight line."""
+
+MISSING = " is missing, left out"
+"""How the model's warning about an absent signal ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """Of one effect in an experiment of n samples.
+
+    Parameters
+    ----------
+    effect : Effect
+        At the plausible values about which the differences were taken.
+    columns : (n, 6, k) float
+        Change of the measured twist by one plausible size of each parameter [m, rad].
+    truths : (n, 6, t) float
+        Change by the whole effect at t plausible sets of values [m, rad].
+    lacks : str
+        Why the experiment cannot show it: the signal that is missing; else empty.
+    """
+
+    effect: Effect
+    columns: Array
+    truths: Array
+    lacks: str = ""
+
+    @property
+    def name(self) -> str:
+        """`law@component`."""
+        return self.effect.name
+
+
+def plausible(effect: Effect, rng: np.random.Generator) -> Effect:
+    """Return an effect with values drawn where its parameters would not surprise."""
+    return effect.with_values({p.key: _plausible(p, rng) for p in effect.parameters})
+
+
+def _plausible(parameter: Parameter, rng: np.random.Generator) -> float:
+    size = parameter.scale * rng.uniform(0.5, 1.5)
+    down = parameter.mean - size >= parameter.lower and rng.uniform() < 0.5
+    return float(np.clip(parameter.mean + (-size if down else size), None, parameter.upper))
+
+
+def signatures(
+    model: ErrorModel,
+    block: Block,
+    candidates: Sequence[Sequence[Effect]],
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Signature]:
+    """Evaluate what effects would leave.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Without them, or with them at other values.
+    block : Block
+        The experiment's path.
+    candidates : sequence of sequences of Effect
+        Each effect at one or more sets of values; the differences are taken at the first.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    list of Signature
+        One for each.
+
+    Raises
+    ------
+    InputError
+        If a sample lies outside the table's domain or load range.
+    """
+    if model.evaluation == "spline":
+        model = model.with_evaluation("closed_form")
+    found = []
+    for number, sets in enumerate(candidates):
+        found.append(_signature(model, block, sets))
+        if progress is not None:
+            progress(number + 1, len(candidates))
+    return found
+
+
+def _signature(model: ErrorModel, block: Block, sets: Sequence[Effect]) -> Signature:
+    first = sets[0]
+    own = [effect for effect in model.effects if effect.name == first.name]
+    others = model.with_effects(*(e for e in model.effects if e.name != first.name))
+    linear = first.stage != "sensor" and all(p.linear for p in first.parameters)
+    base = first.with_values({p.key: 0.0 for p in first.parameters}) if linear else first
+    steps = [_step(p, base, linear) for p in first.parameters]
+    moved = [
+        base.with_values({p.key: base.estimates[p.key].value + step})
+        for p, step in zip(first.parameters, steps, strict=True)
+    ]
+    whole = [] if linear else sets
+    without, at_base, *further = others.batch_with(
+        block, [own, *([effect] for effect in (base, *moved, *whole))]
+    )
+    if not without.accepted.all():
+        raise InputError(
+            f"plan: {np.count_nonzero(~without.accepted)} moments lie outside the table's domain "
+            "or load range"
+        )
+    scale = np.array([p.scale for p in first.parameters])
+    changes = [each.measured - at_base.measured for each in further[: len(moved)]]
+    columns = np.stack(changes, axis=-1) * (scale / np.array(steps))
+    if linear:
+        sizes = np.array([_values(effect) for effect in sets]) - (_values(own[0]) if own else 0.0)
+        truths = columns @ (sizes / scale).T
+    else:
+        changes = [each.measured - without.measured for each in further[len(moved) :]]
+        truths = np.stack(changes, axis=-1)
+    announced = f"{first.name}: "
+    lacks = [
+        warning.removeprefix(announced).removesuffix(MISSING)
+        for warning in at_base.warnings
+        if warning.startswith(announced) and warning.endswith(MISSING)
+    ]
+    return Signature(first, columns, truths, "".join(lacks[:1]))
+
+
+def _step(parameter: Parameter, base: Effect, linear: bool) -> float:
+    """Return a step of the difference in the parameter's unit, away from its upper bound."""
+    share = 1.0 if linear else SENSOR_STEP if base.stage == "sensor" else STEP
+    step = share * parameter.scale
+    return step if base.estimates[parameter.key].value + step <= parameter.upper else -step
+
+
+def _values(effect: Effect) -> Array:
+    return np.array([effect.estimates[p.key].value for p in effect.parameters])
+
+
+def at_estimate(effect: Effect, values: dict[str, Estimate]) -> Effect:
+    """Return the effect with the values that a diagnosis found for those parameters it has."""
+    known = {p.key: p for p in effect.parameters}
+    return effect.with_values(
+        {
+            key: float(np.clip(estimate.value, known[key].lower, known[key].upper))
+            for key, estimate in values.items()
+            if key in known
+        }
+    )

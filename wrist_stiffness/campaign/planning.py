@@ -1,0 +1,345 @@
+"""Plan an experiment: for commissioning, or between the rivals that a diagnosis left.
+
+What effects would leave is computed with the model on a pool of settings performed as one
+experiment; settings are chosen by their Gram matrices; what the chosen experiment will settle is
+computed again on its own path, in its own order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.campaign.design_choice import choose
+from wrist_stiffness.campaign.design_information import (
+    RESOLVED,
+    Goal,
+    Information,
+    MeasurementNoise,
+    calibrated,
+    discrimination,
+    information,
+    improvement,
+    wrong_bound,
+)
+from wrist_stiffness.campaign.design_pool import (
+    Setting,
+    arrange,
+    draw_settings,
+    fixed_visits,
+    reference_pose,
+)
+from wrist_stiffness.campaign.design_question import Question
+from wrist_stiffness.campaign.design_signatures import signatures
+from wrist_stiffness.campaign.design_timeline import Pace, Timeline, Visit, run_through
+from wrist_stiffness.campaign.loads_file import Source
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.error_model import ErrorModel
+
+NEAREST = 2
+"""Rivals that a commissioning keeps apart from each effect: those that come nearest."""
+
+LONGER = 10.0
+"""What so many times the whole pool cannot separate counts as out of reach."""
+
+LONGEST_S = 3600.0
+"""Of a plan between rivals for which no duration is asked [s]."""
+
+SEEN = 3.0
+"""Discrimination from nothing at which an effect counts as excited."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Under which an experiment is planned.
+
+    Parameters
+    ----------
+    sources : tuple of Weight or Actuator
+        What the user can apply; nothing else is proposed.
+    pace : Pace
+        Speeds and durations.
+    noise : MeasurementNoise
+        Of one dwell.
+    seconds : float or None
+        Duration; None for as long as it takes, but not beyond `LONGEST_S`.
+    seed : int
+        The same seed gives the same plan.
+    """
+
+    sources: tuple[Source, ...]
+    pace: Pace
+    noise: MeasurementNoise
+    seconds: float | None
+    seed: int
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How well the plan answers one question.
+
+    Parameters
+    ----------
+    goal : Goal
+        The question.
+    discrimination : float
+        In standard deviations.
+    reachable : bool
+        Whether `LONGER` times the pool with these loads could settle it.
+    """
+
+    goal: Goal
+    discrimination: float
+    reachable: bool
+
+    @property
+    def settled(self) -> bool:
+        """Whether the plan settles it."""
+        return self.discrimination >= needed(self.goal)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An experiment and what it is good for.
+
+    Parameters
+    ----------
+    timeline : Timeline or None
+        What to do when; None where no such experiment could answer any of the questions.
+    settings : tuple of Setting
+        Chosen ones, in the order of their worth.
+    answers : tuple of Answer
+        To every question.
+    cannot : dict of str to str
+        Effects that no such experiment shows, with the signal that they need.
+    calibration : dict of str to float
+        By how much the uncertainty of each effect that is always refitted falls.
+    """
+
+    timeline: Timeline | None
+    settings: tuple[Setting, ...]
+    answers: tuple[Answer, ...]
+    cannot: Mapping[str, str]
+    calibration: Mapping[str, float]
+
+
+def needed(goal: Goal) -> float:
+    """Return the discrimination that settles a question."""
+    return RESOLVED if goal.rival else SEEN
+
+
+def plan(
+    model: ErrorModel,
+    question: Question,
+    conditions: Conditions,
+    progress: Progress | None = None,
+) -> Plan:
+    """Plan an experiment.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    question : Question
+        What is asked.
+    conditions : Conditions
+        Loads, durations, noise.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    Plan
+        Not longer than asked for.
+
+    Raises
+    ------
+    InputError
+        If not even the fixed part fits into the duration.
+    LoadRangeError
+        If a load cannot be applied within the table's range.
+    """
+    workspace, pace = model.table.workspace, conditions.pace
+    rng = np.random.default_rng(conditions.seed)
+    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
+    fixed = fixed_visits(settings, pace, workspace)
+    pool = _Pool(settings, fixed, rng.permutation(2 * len(settings)), pace, model)
+    half = None if progress is None else lambda done, total: progress(done, 2 * total)
+    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, half)
+    goals = question.goals
+    if goals is None:
+        goals = _all_goals(known)
+    goals = tuple(g for g in goals if g.truth not in lacking and g.rival not in lacking)
+    sizes = equal_sizes(known, question.alike)
+    known = known.scaled(sizes)
+    best = np.sqrt(LONGER) * discrimination(known.total, known.layout, goals)
+    reachable = {goal: bool(d >= needed(goal)) for goal, d in zip(goals, best, strict=True)}
+    aimed = [goal for goal in goals if reachable[goal]]
+    whole = question.goals is None
+    if not aimed and not whole:
+        least = [Answer(goal, float(d), False) for goal, d in zip(goals, best, strict=True)]
+        return Plan(None, (), tuple(least), lacking, {})
+    if whole:
+        aimed = _nearest(aimed, discrimination(known.total, known.layout, aimed))
+    layout = known.layout
+
+    def utility(gram: Array) -> Array:
+        right = 1.0 - wrong_bound(discrimination(gram, layout, aimed)).mean(axis=-1)
+        return right + calibrated(gram, layout) if whole else right
+
+    def enough(gram: Array) -> bool:
+        if conditions.seconds is not None:
+            return False
+        reached = discrimination(gram, layout, aimed)
+        return bool(np.all(reached >= [needed(goal) for goal in aimed]))
+
+    seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
+    grams = pool.by_setting(known.grams)
+    least_s = pool.arranged([], rng).duration_s
+    if least_s > seconds:
+        raise InputError(
+            f"plan: {seconds / 60.0:g} minutes are less than the {least_s / 60.0:.1f} that "
+            "warm-up, reference poses and two long holds take"
+        )
+    chosen = choose(
+        grams, pool.cost_s, pool.fixed_gram(known.grams), seconds - least_s, utility, enough, rng
+    )
+    timeline = pool.arranged(chosen, rng)
+    while timeline.duration_s > seconds:
+        chosen = chosen[:-1]
+        timeline = pool.arranged(chosen, rng)
+    rest = None if progress is None else lambda done, total: progress(total + done, 2 * total)
+    final = evaluated(model, question, timeline, conditions.noise, rest)[0].scaled(sizes)
+    reached = discrimination(final.total, final.layout, goals)
+    answers = [
+        Answer(goal, float(d), reachable[goal]) for goal, d in zip(goals, reached, strict=True)
+    ]
+    return Plan(
+        timeline,
+        tuple(settings[i] for i in chosen),
+        tuple(answers),
+        lacking,
+        improvement(final.total, final.layout),
+    )
+
+
+class _Pool:
+    """All settings, performed as one experiment."""
+
+    def __init__(
+        self,
+        settings: Sequence[Setting],
+        fixed: Sequence[Visit],
+        order: Array,
+        pace: Pace,
+        model: ErrorModel,
+    ) -> None:
+        self._settings, self._fixed, self._pace = settings, fixed, pace
+        self._workspace = model.table.workspace
+        visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
+        ordered = [*(visits[i] for i in order), *fixed]
+        reference = reference_pose(self._workspace)
+        self.timeline = run_through(ordered, self._workspace, pace, reference)
+        self._place = np.argsort(order)
+        visit_s = np.diff(self.timeline.ends, prepend=0.0)
+        self._mean_s = float(visit_s[: len(visits)].mean())
+        self.cost_s = self.by_setting(visit_s)
+
+    def by_setting(self, of_visits: Array) -> Array:
+        """Return the sums (m, ...) over both visits of each setting of values (v, ...)."""
+        both = of_visits[self._place].reshape(len(self._settings), 2, *of_visits.shape[1:])
+        total: Array = both.sum(axis=1)
+        return total
+
+    def fixed_gram(self, grams: Array) -> Array:
+        """Return the sum over the visits that every plan has."""
+        total: Array = grams[len(self._place) :].sum(axis=0)
+        return total
+
+    def arranged(self, chosen: Sequence[int], rng: np.random.Generator) -> Timeline:
+        """Return the experiment of some settings."""
+        return arrange(
+            [self._settings[i] for i in chosen],
+            self._fixed,
+            self._mean_s,
+            self._workspace,
+            self._pace,
+            rng,
+        )
+
+
+def evaluated(
+    model: ErrorModel,
+    question: Question,
+    timeline: Timeline,
+    noise: MeasurementNoise,
+    progress: Progress | None = None,
+) -> tuple[Information, dict[str, str]]:
+    """Return what an experiment tells of the effects in question.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    question : Question
+        What is asked.
+    timeline : Timeline
+        The experiment.
+    noise : MeasurementNoise
+        Of one dwell.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    Information
+        Without the effects that lack a signal.
+    dict of str to str
+        Those, and the signal.
+    """
+    sets = [*((effect,) for effect in question.nuisances), *question.effects]
+    found = signatures(model, timeline.block, sets, progress)
+    count = len(question.nuisances)
+    lacking = {each.name: each.lacks for each in found[count:] if each.lacks}
+    shown = [each for each in found[count:] if not each.lacks]
+    known = information(timeline, found[:count], question.free, shown, model.table, noise)
+    return known, lacking
+
+
+def equal_sizes(known: Information, alike: Sequence[Sequence[str]]) -> dict[str, float]:
+    """Return factors that make the members of each class as large as its first one."""
+    factors = {}
+    for members in alike:
+        shown = [name for name in members if name in known.layout.truths]
+        sizes = discrimination(known.total, known.layout, [Goal(name, "") for name in shown])
+        for name, size in zip(shown, sizes, strict=True):
+            if size > 0.0 and sizes[0] > 0.0:
+                factors[name] = float(sizes[0] / size)
+    return factors
+
+
+def _all_goals(known: Information) -> tuple[Goal, ...]:
+    names = list(known.layout.truths)
+    return (
+        *(Goal(name, "") for name in names),
+        *(Goal(one, other) for one in names for other in names if one != other),
+    )
+
+
+def _nearest(goals: Sequence[Goal], discriminations: Array) -> list[Goal]:
+    """Return of each truth its own visibility and its nearest rivals."""
+    kept: list[Goal] = []
+    order = np.argsort(discriminations, kind="stable")
+    counts: dict[str, int] = {}
+    for i in order:
+        goal = goals[i]
+        if goal.rival:
+            counts[goal.truth] = counts.get(goal.truth, 0) + 1
+        if not goal.rival or counts[goal.truth] <= NEAREST:
+            kept.append(goal)
+    return kept
