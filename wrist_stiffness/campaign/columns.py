@@ -1,0 +1,109 @@
+"""What a change of a model's effects does to the units of a session: columns by differences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wrist_stiffness.campaign.observing import UnitSession
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.evaluation import evaluate
+
+Effects = tuple[Effect, ...]
+
+AT_A_TIME = 40
+"""Trials evaluated together: they share the work of the base, and their results are in memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionModel:
+    """A model with the effects that hold in one session, on the units of that session.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Table and evaluation; its own effects do not count.
+    session : UnitSession
+        Units and the moments that tell their path.
+    effects : tuple of Effect
+        All effects at the point about which columns are wanted.
+    """
+
+    model: ErrorModel
+    session: UnitSession
+    effects: Effects
+
+    @cached_property
+    def still(self) -> Block:
+        """Mean signals of the units, for effects without a memory."""
+        mean, block = self.session.mean, self.session.block
+        speed = np.zeros_like(block.theta) if block.theta_dot is None else block.theta_dot
+        return Block(
+            mean(block.time),
+            mean(block.theta),
+            mean(block.load),
+            mean(speed),
+            block.load_on_platform,
+            {name: mean(value) for name, value in block.temperatures.items()},
+            {name: mean(value) for name, value in block.covariates.items()},
+        )
+
+    def remembers(self, effects: Effects) -> bool:
+        """Tell whether any of the effects needs the path and not the moment alone."""
+        return any(self._has_memory(effect) for effect in effects)
+
+    @cached_property
+    def _memories(self) -> dict[str, bool]:
+        return {}
+
+    def _has_memory(self, effect: Effect) -> bool:
+        if effect.name not in self._memories:
+            first = self.session.block.take(slice(0, 1))
+            usual = Effect(effect.law, effect.component)
+            _, memory = evaluate(self.model.with_effects(usual), first, None)
+            self._memories[effect.name] = memory.states[0] is not None
+        return self._memories[effect.name]
+
+    def predicted(self, trials: Sequence[Effects]) -> list[Array]:
+        """Return what the sensor would say of each unit under each set of effects, (u, 6)."""
+        bare = self.model.with_effects()
+        path = [self.remembers(trial) for trial in trials]
+        out: list[Array] = [np.empty(0)] * len(trials)
+        for needs_path in (False, True):
+            chosen = [i for i, own in enumerate(path) if own is needs_path]
+            for start in range(0, len(chosen), AT_A_TIME):
+                part = chosen[start : start + AT_A_TIME]
+                block = self.session.block if needs_path else self.still
+                found = bare.batch_with(block, [trials[i] for i in part])
+                for i, each in zip(part, found, strict=True):
+                    out[i] = self.session.mean(each.measured) if needs_path else each.measured
+        return out
+
+    def changes(self, trials: Sequence[Effects]) -> list[Array]:
+        """Return the change of the units' predicted poses by other effects than the point's.
+
+        Parameters
+        ----------
+        trials : sequence of tuple of Effect
+            Full sets of effects; those with a memory are compared on the path.
+
+        Returns
+        -------
+        list of (u, 6) arrays
+            Predicted with the trial minus predicted at the point, at O in F [m, rad].
+        """
+        path = [self.remembers(trial) for trial in trials]
+        base = dict.fromkeys(path)
+        both = self.predicted([self.effects, *trials])
+        base[self.remembers(self.effects)] = both[0]
+        for needs_path in base:
+            if base[needs_path] is None:
+                bare = self.model.with_effects().batch_with(self.session.block, [self.effects])
+                base[needs_path] = self.session.mean(bare[0].measured)
+        return [each - base[own] for each, own in zip(both[1:], path, strict=True)]

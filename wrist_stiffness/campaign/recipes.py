@@ -1,0 +1,259 @@
+"""How each law of the catalogue becomes columns: which trials, at which shapes.
+
+A law is linear in some parameters and not in others.  The linear ones become columns by differences;
+the others are a grid of shapes.  A few laws need other coordinates: a mass and its place are linear
+as a mass and its first moment; a gap, a hardening or a friction is a shape times a share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from wrist_stiffness.diagnosis import ShapeParameter
+from wrist_stiffness.diagnosis import Parameter as Factor
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.parameters import Estimate, Parameter
+
+Shape = tuple[float, ...]
+Values = dict[str, float]
+
+SMALL = 0.1
+"""Share of a parameter's prior scale at which a column is the tangent."""
+
+GRIDS: dict[str, tuple[float, ...]] = {
+    "time_constant_s": (1.0, 4.0, 12.0, 35.0, 120.0, 600.0),
+    "lag_s": (0.0, 120.0, 600.0, 2400.0),
+    "motor_share_percent": (0.0, 50.0, 100.0),
+    "hysteresis_deg": (0.0, 2.0, 6.0, 15.0),
+    "order": tuple(3.0 + 1.2 * i for i in range(40)),
+}
+"""Values to try of parameters in which a law is not linear, in the units of their names."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: (prediction at `trial` - prediction at `origin`) / size, per unit of a factor.
+
+    Parameters
+    ----------
+    factor : Factor
+        What stands in front of the column.
+    trial, origin : dict of str to float
+        Values of the law's parameters, all of them; an empty origin is the law's absence.
+    size : float
+        How many units of the factor the trial has more than the origin.
+    """
+
+    factor: Factor
+    trial: Values
+    size: float
+    origin: Values = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Columns of a law at a place.
+
+    Parameters
+    ----------
+    shape : tuple of ShapeParameter
+        Grids of what is not linear.
+    columns : callable
+        shape -> its columns.
+    start : callable
+        (factors, shape) -> values of the law's parameters with which a fit may begin.
+    """
+
+    shape: tuple[ShapeParameter, ...]
+    columns: Callable[[Shape], tuple[Column, ...]]
+    start: Callable[[Mapping[str, float], Shape], Values]
+
+
+def factor(parameter: Parameter) -> Factor:
+    """Return a linear parameter as the statistics know it."""
+    return Factor(parameter.key, parameter.lower, parameter.upper, parameter.scale)
+
+
+def recipe(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+    """Return how a law becomes columns.
+
+    Parameters
+    ----------
+    law : Law
+        Of the catalogue, or a user's own.
+    place : str
+        Component.
+    signals : frozenset of str
+        Components with a thermometer.
+    """
+    own = SPECIAL.get(law.id)
+    return own(law, place, signals) if own else plain(law, place, signals)
+
+
+def plain(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+    """Differences in the linear parameters, grids in those of `GRIDS`, the tangent in the rest."""
+    parameters = law.parameters(place)
+    gridded = [p for p in parameters if p.key in GRIDS and not _idle(p.key, place, signals)]
+    other = [p for p in parameters if p.key not in GRIDS]
+    shape = tuple(ShapeParameter(p.key, _grid(p.key, signals)) for p in gridded)
+    fixed = {p.key: 0.0 for p in parameters if p.key in GRIDS and p not in gridded}
+
+    def still(at: Shape) -> Values:
+        return {
+            **{p.key: 0.0 for p in other},
+            **fixed,
+            **dict(zip((p.key for p in gridded), at, strict=True)),
+        }
+
+    def columns(at: Shape) -> tuple[Column, ...]:
+        return tuple(
+            Column(factor(p), still(at) | {p.key: SMALL * p.scale}, SMALL * p.scale) for p in other
+        )
+
+    def start(found: Mapping[str, float], at: Shape) -> Values:
+        return still(at) | {p.key: found[p.key] for p in other}
+
+    return Recipe(tuple(s for s in shape if len(s.grid) > 1), columns, start)
+
+
+def _idle(key: str, place: str, signals: frozenset[str]) -> bool:
+    """Tell whether a parameter of warmth does nothing: the part has its own thermometer."""
+    return key in ("lag_s", "motor_share_percent") and place in signals
+
+
+def _grid(key: str, signals: frozenset[str]) -> tuple[float, ...]:
+    return GRIDS[key]
+
+
+def at_width(key: str, width: float) -> Callable[[Law, str, frozenset[str]], Recipe]:
+    """Return the recipe of a law with one parameter that is nearly linear, at a usual size."""
+
+    def make(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+        (parameter,) = law.parameters(place)
+        column = Column(factor(parameter), {key: width}, width)
+        return Recipe((), lambda at: (column,), lambda found, at: {key: found[key]})
+
+    return make
+
+
+def shares(
+    key: str, grids: Mapping[str, tuple[float, ...]], fixed: Mapping[str, float]
+) -> Callable[[Law, str, frozenset[str]], Recipe]:
+    """Return the recipe of a law that is linear in nothing: shapes of `grids`, times a share.
+
+    The share counts in units of `key`, so that it reads as that parameter.
+    """
+
+    def make(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+        own = {p.key: p for p in law.parameters(place)}
+        names = tuple(grids)
+
+        def columns(at: Shape) -> tuple[Column, ...]:
+            values = {**fixed, **dict(zip(names, at, strict=True))}
+            return (Column(factor(own[key]), values, values[key]),)
+
+        def start(found: Mapping[str, float], at: Shape) -> Values:
+            values = {**fixed, **dict(zip(names, at, strict=True))}
+            return values | {key: found[key]}
+
+        shape = tuple(ShapeParameter(f"at_{name}", grid) for name, grid in grids.items())
+        return Recipe(shape, columns, start)
+
+    return make
+
+
+MASS_G, ARM_MM = 10.0, 10.0
+
+
+def weight(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+    """A mass and its first moment, and the tilt of the base."""
+    own = {p.key: p for p in law.parameters(place)}
+    zero = dict.fromkeys(own, 0.0)
+    heavy = zero | {"mass_g": MASS_G}
+    columns = [Column(factor(own["mass_g"]), heavy, MASS_G)]
+    for axis in "xyz":
+        moment = Factor(f"moment_{axis}_gmm", plausible=30.0 * 20.0)
+        columns.append(
+            Column(moment, heavy | {f"{axis}_mm": ARM_MM}, MASS_G * ARM_MM, heavy)
+        )
+    for key in own.keys() - {"mass_g", "x_mm", "y_mm", "z_mm"}:
+        columns.append(Column(factor(own[key]), zero | {key: 100.0}, 100.0))
+
+    def start(found: Mapping[str, float], at: Shape) -> Values:
+        mass = found["mass_g"]
+        arm = {
+            f"{a}_mm": _clipped(own[f"{a}_mm"], found[f"moment_{a}_gmm"] / (mass or 1.0))
+            for a in "xyz"
+        }
+        tilt = {key: found[key] for key in own if key in found}
+        return zero | arm | tilt
+
+    return Recipe((), lambda at: tuple(columns), start)
+
+
+PLATE_MM = -12.0
+
+
+def moving_mass(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+    """A moving mass at the plate, the change of its place, and a round inertia."""
+    own = {p.key: p for p in law.parameters(place)}
+    at_plate = {"mass_g": 50.0, "x_mm": 0.0, "y_mm": 0.0, "z_mm": PLATE_MM, "inertia_gmm2": 0.0}
+    nothing = at_plate | {"mass_g": 0.0}
+    columns = [
+        Column(factor(own["mass_g"]), at_plate, 50.0),
+        *(
+            Column(
+                Factor(f"moment_{a}_gmm", plausible=50.0 * 20.0),
+                at_plate | {f"{a}_mm": at_plate[f"{a}_mm"] + 1.0},
+                50.0,
+                at_plate,
+            )
+            for a in "xyz"
+        ),
+        Column(factor(own["inertia_gmm2"]), nothing | {"inertia_gmm2": 1e4}, 1e4),
+    ]
+
+    def start(found: Mapping[str, float], at: Shape) -> Values:
+        mass = max(found["mass_g"], 1.0)
+        arm = {
+            f"{a}_mm": _clipped(
+                own[f"{a}_mm"], at_plate[f"{a}_mm"] + found[f"moment_{a}_gmm"] / mass
+            )
+            for a in "xyz"
+        }
+        return {"mass_g": mass, **arm, "inertia_gmm2": max(found["inertia_gmm2"], 0.0)}
+
+    return Recipe((), lambda at: tuple(columns), start)
+
+
+def _clipped(parameter: Parameter, value: float) -> float:
+    return min(max(value, parameter.lower), parameter.upper)
+
+
+GAPS_UM = (-60.0, -20.0, -7.0, -2.0, -0.5, 0.5, 2.0, 7.0, 20.0, 60.0)
+
+SPECIAL: dict[str, Callable[[Law, str, frozenset[str]], Recipe]] = {
+    "gravity": weight,
+    "inertia": moving_mass,
+    "backlash": at_width("width_mdeg", 20.0),
+    "joint_clearance": at_width("clearance_um", 5.0),
+    "flange_contact": shares("gap_um", {"gap_um": GAPS_UM}, {}),
+    "bushing_hardening": shares(
+        "hardening_percent_per_N", {"hardening_percent_per_N": (3.0, 30.0, 120.0, 400.0)}, {}
+    ),
+    "joint_friction": shares(
+        "coefficient",
+        {"coefficient": (0.02, 0.1, 0.3, 0.8), "presliding_um": (1.0, 5.0, 20.0)},
+        {"preload_N": 0.0},
+    ),
+}
+
+
+def effect_at(law: Law, place: str, values: Mapping[str, float]) -> Effect:
+    """Return the law with these values, each brought within its bounds."""
+    bounds = {p.key: p for p in law.parameters(place)}
+    return Effect(
+        law, place, {key: Estimate(_clipped(bounds[key], value)) for key, value in values.items()}
+    )
