@@ -12,7 +12,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting import Fit, fit
-from wrist_stiffness.diagnosis.observations import Observations
+from wrist_stiffness.diagnosis.observations import Labels, Observations
 from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
 from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.whitening import NoiseModel
@@ -32,12 +32,15 @@ class Judged:
         It has not seen those units, unless `by` says so.
     observations : Observations
         Residuals of those units, NaN where not measured or lost.
+    rows : (k,) int
+        Their numbers among the units of all sessions.
     by : str
         `another session`, `this session only` or `the fit's own data`.
     """
 
     fit: Fit
     observations: Observations
+    rows: Labels
     by: str
 
     @property
@@ -66,7 +69,7 @@ def judged(problem: FitProblem, progress: Progress = silent) -> Judged:
     aside = sealed_units(table, Settings().sealed_share)
     if len(problem.sessions) == 1:
         found = fit(problem, held_out=aside, progress=progress)
-        return Judged(found, found.observations.take(aside), THIS_SESSION)
+        return Judged(found, found.observations.take(aside), table.rows[aside], THIS_SESSION)
     found = fit(replace(problem, sessions=problem.sessions[:-1]), progress=progress)
     again = tuple(each for each in problem.free if each.per_session)
     own = {each.effect.name for each in again}
@@ -75,21 +78,9 @@ def judged(problem: FitProblem, progress: Progress = silent) -> Judged:
         problem.model.with_effects(*problem.model.effects, *wrist), problem.sessions[-1:], again
     )
     left = fit(last).observations if again else last.table.with_values(last.residual(np.empty(0)))
-    return Judged(found, left, ANOTHER_SESSION)
+    return Judged(found, left, table.rows[aside], ANOTHER_SESSION)
 
 
 def judged_by_itself(found: Fit) -> Judged:
     """Return a fit with what it leaves of its own data."""
-    return Judged(found, found.observations, SEEN)
-
-
-def noise_floor(noise: NoiseModel, observations: Observations) -> dict[str, float]:
-    """Return the root mean square that noise alone gives each quantity, by its key."""
-    inverse = np.linalg.inv(noise.factors(observations))
-    variance = np.einsum("nij,nij->ni", inverse, inverse)
-    mean = np.sum(np.where(observations.measured, variance, 0.0), axis=0)
-    mean = mean / np.maximum(observations.measured.sum(axis=0), 1)
-    return {
-        q.key: float(np.sqrt(mean[list(q.components)].sum())) * q.per_si
-        for q in observations.reported
-    }
+    return Judged(found, found.observations, found.observations.rows, SEEN)

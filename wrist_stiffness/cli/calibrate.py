@@ -1,0 +1,81 @@
+"""`wrist-stiffness calibrate`: fit a model to one wrist as it was set up."""
+
+from __future__ import annotations
+
+import argparse
+
+from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
+
+DESCRIPTION = """\
+Commissioning. Fit what differs from session to session (registration of the pose sensor, its target
+on the platform, encoder zeros, the load sensor's tare) and from wrist to wrist (axes, flange gaps,
+stiffness of links and bushings) to recordings with measured poses, each within what is usual, and
+write the model as it holds for the newest recording. Without this step a comparison with
+measurements shows little but the registration."""
+
+EPILOG = """\
+examples:
+  wrist-stiffness calibrate --fit monday -o wrist_7.yaml
+  wrist-stiffness calibrate wrist_7.yaml --fit monday tuesday --hold-out -o wrist_7.yaml
+
+Record poses all over the workspace from both sides, loads of several sizes and directions, and
+none. What a recording does not tell stays as it was, and is said. A recording whose notes
+(/recording_notes) hold {"calibrated": ["encoder_offset"]} keeps such effects as the model has
+them."""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `calibrate`."""
+    parser = commands.add_parser(
+        "calibrate",
+        help="fit a model to one wrist as it was set up",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
+    add_fit_options(parser)
+    parser.add_argument(
+        "--hold-out",
+        action="store_true",
+        help="judge by the last recording, or the end of the only one, which a first fit "
+        "does not see",
+    )
+    parser.set_defaults(run=_run)
+
+
+def add_fit_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of commands that write a fitted model."""
+    parser.add_argument(
+        "--fit",
+        nargs="+",
+        required=True,
+        metavar="RECORDING",
+        help="recordings with measured poses, or folders of such; each is a session of one wrist",
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="MODEL2", help="file to write")
+    add_recording_options(parser)
+    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.calibrate import calibrate_model
+    from wrist_stiffness.workflows.json_file import write_json
+
+    found = calibrate_model(
+        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+        recordings_named(arguments.fit, arguments),
+        arguments.output,
+        this_run(),
+        arguments.hold_out,
+        Progress("calibrate"),
+    )
+    print("\n".join(found.lines()))
+    print(f"\nwritten: {arguments.output}")
+    if arguments.json:
+        write_json(arguments.json, found.as_values())
+    return 0

@@ -1,0 +1,170 @@
+"""Fit a model to one wrist as it was set up, and write it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from wrist_stiffness.campaign.calibrating import Calibration, calibrate
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
+from wrist_stiffness.workflows.fit_report import (
+    Errors,
+    far_lines,
+    left_lines,
+    parameter_values,
+    told_lines,
+    untold_lines,
+    used_lines,
+)
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the written model says of the run that made it.
+
+    Parameters
+    ----------
+    command : str
+        As it was typed.
+    date : str
+        ISO 8601.
+    """
+
+    command: str
+    date: str
+
+    def step(self, parent: str | Path, recordings: Mapping[Path, MeasuredSession]) -> Step:
+        """Return the step from a parent's file to its child."""
+        hashes = {session.name: recording_sha256(path) for path, session in recordings.items()}
+        return Step(self.command, self.date, file_sha256(parent), hashes)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A calibration and what it was made from.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What was found.
+    sessions : tuple of MeasuredSession
+        What was measured, in the order of time.
+    output : Path
+        The model file that was written.
+    """
+
+    calibration: Calibration
+    sessions: tuple[MeasuredSession, ...]
+    output: Path
+
+    @property
+    def errors(self) -> Errors:
+        """Before and after."""
+        found = self.calibration
+        rows = {"model as it stands": found.before, "calibrated": found.after}
+        return Errors(rows, found.floor.rms(found.judged.observations), found.floor.source)
+
+    def lines(self) -> list[str]:
+        """Return what a technician reads."""
+        found = self.calibration
+        parameters = found.parameters
+        lines = used_lines(self.sessions, found.fit)
+        lines += ["", *self.errors.lines(), *left_lines(self.errors, found.judged)]
+        for session in self.sessions:
+            own = told_lines(each for each in parameters if each.session == session.name)
+            lines += ["", f"set up in {session.name}:", *(own or ["  nothing that the data tell"])]
+        wrist = told_lines(each for each in parameters if each.session is None)
+        lines += ["", "of this wrist:", *(wrist or ["  nothing that the data tell"])]
+        for title, part in (
+            ("farther off than usual:", far_lines(found.fit, parameters)),
+            ("not told by these recordings:", untold_lines(found.fit, parameters)),
+        ):
+            lines += ["", title, *part] if part else []
+        if found.calibrated:
+            lines += ["", f"not fitted, calibrated as the notes say: {', '.join(found.calibrated)}"]
+        return lines
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        found = self.calibration
+        return {
+            "schema": 1,
+            **self.errors.as_values(("before", "after")),
+            "judged_by": found.judged.by,
+            "sessions": [
+                {"name": session.name, "remarks": list(session.remarks)}
+                for session in self.sessions
+            ],
+            "lost": found.fit.lost,
+            "misfit": found.fit.misfit,
+            "settled": found.fit.arrived,
+            "calibrated_otherwise": list(found.calibrated),
+            "parameters": parameter_values(found.parameters),
+        }
+
+
+def calibrate_model(
+    model: str | Path,
+    recordings: Recordings,
+    output: str | Path,
+    run: Run,
+    hold_out: bool = False,
+    progress: Progress = lambda done, of: None,
+) -> Calibrated:
+    """Fit a model to recordings and write it as it holds for the newest one.
+
+    Parameters
+    ----------
+    model : path
+        Model file.
+    recordings : Recordings
+        With measured poses, of one wrist.
+    output : path
+        Model file to write.
+    run : Run
+        For the lineage.
+    hold_out : bool
+        Whether to judge by a part that a first fit has not seen.
+    progress : callable
+        Told steps done and steps at most.
+
+    Returns
+    -------
+    Calibrated
+        What was found.
+
+    Raises
+    ------
+    WristError
+        If a file cannot be read, used or written; then no model is written.
+    """
+    output = writable(output)
+    parent = load_model(model)
+    sessions = read_sessions(recordings, parent.table, progress)
+    step = run.step(model, sessions)
+    found = calibrate(parent, tuple(sessions.values()), hold_out, progress)
+    child = replace(found.model, lineage=(*parent.lineage, step))
+    save_model(child, output)
+    return Calibrated(found, tuple(sessions.values()), output)
+
+
+def writable(output: str | Path) -> Path:
+    """Return the path of a model to write, so that no fit ends in a typing error.
+
+    Raises
+    ------
+    InputError
+        If its folder does not exist.
+    """
+    output = Path(output)
+    if not output.parent.is_dir():
+        raise InputError(f"{output}: there is no folder {output.parent}")
+    return output

@@ -1,0 +1,175 @@
+"""What a fit tells: a technician in lines of text, a program in values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.campaign.fitting import Fit, Fitted
+from wrist_stiffness.campaign.judging import SEEN, THIS_SESSION, Judged
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+
+AT_THE_FLOOR = 1.15
+"""An error up to so many times the noise floor is called noise."""
+
+FAR = 3.0
+"""Standard deviations of its prior beyond which a parameter is farther off than usual."""
+
+TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
+
+JUDGED_BY = {
+    SEEN: "on the recordings of the fit; --hold-out judges by a part that the fit has not seen",
+    THIS_SESSION: "on the end of the session, which the fit has not seen; valid for this session "
+    "only",
+    "another session": "on the last session, which the fit has not seen",
+}
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Root mean squares by the key of the quantity, in the order in which they are told.
+
+    Parameters
+    ----------
+    rows : dict of str to dict
+        Errors by what they are of.
+    floor : dict
+        What noise alone gives.
+    floor_source : str
+        Where that is known from.
+    """
+
+    rows: Mapping[str, Mapping[str, float]]
+    floor: Mapping[str, float]
+    floor_source: str
+
+    @property
+    def over_floor(self) -> float:
+        """Last error over the noise floor, the larger of the quantities'."""
+        last = list(self.rows.values())[-1]
+        return max(
+            (last[key] / self.floor[key] for key in last if self.floor[key] > 0.0), default=1
+        )
+
+    def lines(self) -> list[str]:
+        """Return a table for people."""
+        keys = list(self.floor)
+        out = [" " * 28 + "".join(f"{TITLES.get(key, key):>12}" for key in keys)]
+        noise = f"noise alone ({self.floor_source})"
+        for name, row in {**self.rows, noise: self.floor}.items():
+            out.append(f"{name:28}" + "".join(f"{row[key]:12.3f}" for key in keys))
+        return out
+
+    def as_values(self, names: Sequence[str]) -> dict[str, dict[str, float]]:
+        """Return the errors for programs, under names of theirs in the order of the rows."""
+        rows = {
+            name: {f"rmse_{key}": value for key, value in row.items()}
+            for name, row in zip(names, self.rows.values(), strict=True)
+        }
+        return {"noise_floor": dict(self.floor), **rows}
+
+
+def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
+    """Tell what the fit saw, and what of the recordings could not be used."""
+    table = found.problem.table
+    dwells = sum(int(each.cut.dwell.sum()) for each in found.problem.sessions)
+    lost = found.lost + sum(each.lost for each in found.problem.sessions)
+    lines = [
+        f"{', '.join(session.name for session in sessions)}: {dwells} rests and "
+        f"{table.n_units - dwells} moments in motion"
+        + (f", {lost} lost beams left out" if lost else "")
+    ]
+    lines += [f"  {session.name}: {remark}" for session in sessions for remark in session.remarks]
+    if not found.arrived:
+        lines.append("the fit did not settle: read its numbers with doubt")
+    return lines
+
+
+def left_lines(errors: Errors, judged: Judged) -> list[str]:
+    """Tell how much is left, and how that was judged."""
+    ratio = errors.over_floor
+    left = (
+        "what is left is no more than noise"
+        if ratio <= AT_THE_FLOOR
+        else f"what is left is {ratio:.1f} times the noise: something is missing in the model, "
+        "'wrist-stiffness diagnose' finds out what"
+    )
+    return [f"judged {JUDGED_BY[judged.by]}", left]
+
+
+def told_lines(parameters: Iterable[Fitted]) -> list[str]:
+    """Return the estimates that the data tell, a line each."""
+    lines = []
+    for each in parameters:
+        if each.excited:
+            note = ", on its bound" if each.at_bound else ""
+            lines.append(
+                f"  {each.effect:30} {each.key:24}{plus_minus(each.value, each.sigma):>22}"
+                f"   {tolerances(each)}{note}"
+            )
+    return lines
+
+
+def far_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
+    """Tell what went farther than usual, and what to look at on the machine."""
+    checks = {
+        each.effect.name: each.effect.law.check.replace("{place}", each.effect.component)
+        for each in found.problem.free
+    }
+    return [
+        f"  {each.effect} {each.key}: {tolerances(each)}; {checks[each.effect]}"
+        for each in parameters
+        if each.excited and abs(each.moved) > FAR
+    ]
+
+
+def untold_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
+    """Tell what the data do not say, and what to record to see it."""
+    needs = {each.effect.name: each.effect.law.excited_by for each in found.problem.free}
+    untold: dict[str, list[str]] = {}
+    for each in parameters:
+        if not each.excited:
+            twin = f" (only together with {each.together[0]})" if each.together else ""
+            untold.setdefault(each.effect, []).append(f"{each.key}{twin}")
+    return [
+        f"  {effect}: {', '.join(keys)}; needs {needs[effect]}" for effect, keys in untold.items()
+    ]
+
+
+def parameter_values(parameters: Iterable[Fitted]) -> list[dict[str, Any]]:
+    """Return all parameters for programs."""
+    values = []
+    for each in parameters:
+        effect, _, component = each.effect.partition("@")
+        values.append(
+            {
+                "effect": effect,
+                "component": component,
+                "session": each.session,
+                "parameter": each.key,
+                "value": each.value,
+                "sigma": each.sigma,
+                "prior": each.prior,
+                "prior_sigma": each.prior_sigma,
+                "excited": each.excited,
+                "at_bound": each.at_bound,
+                "together_with": list(each.together),
+            }
+        )
+    return values
+
+
+def plus_minus(value: float, sigma: float) -> str:
+    """Return a value and its uncertainty with two digits of the latter."""
+    digits = 3
+    if np.isfinite(sigma) and sigma > 0.0:
+        digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
+    return f"{value:.{digits}f} +- {sigma:.{digits}f}"
+
+
+def tolerances(parameter: Fitted) -> str:
+    """Return how far a parameter went, in the words of a fitter."""
+    return f"{abs(parameter.moved):.1f} x its usual size"
