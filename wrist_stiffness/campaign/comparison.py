@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.contrast_sentences import Told
+from wrist_stiffness.campaign.noise_floor import NoiseFloor
 from wrist_stiffness.diagnosis import Observations, Quantity
-from wrist_stiffness.diagnosis.noise import replicate_variance
 from wrist_stiffness.diagnosis.resampling import time_blocks
-from wrist_stiffness.diagnosis.whitening import NoiseModel
 from wrist_stiffness.mechanism.components import Array
 
 JUDGES = 12
@@ -73,38 +72,6 @@ def _size(observations: Observations, length: Array) -> Size:
     return Size(float(length.mean()), rms, float(length.max()), float(scatter * slope))
 
 
-def repeatability(observations: Observations) -> tuple[dict[str, float], float]:
-    """Scatter of dwells that repeat a condition after a new approach.
-
-    Returns
-    -------
-    dict of str to float
-        Root mean square by the key of the quantity; empty without replicates.
-    float
-        Degrees of freedom.
-    """
-    n, m = observations.values.shape
-    values = np.where(observations.measured, observations.values, 0.0)
-    variance, freedom = replicate_variance(values, np.empty((n, m, 0)), observations)
-    if freedom < 1.0:
-        return {}, 0.0
-    return {
-        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
-        for q in observations.reported
-    }, freedom
-
-
-def noise_floor(noise: NoiseModel, observations: Observations) -> dict[str, float]:
-    """Root mean square that scatter alone gives each quantity, by its key."""
-    inverse = np.linalg.inv(noise.factors(observations))
-    variance = np.einsum("nij,nij->ni", inverse, inverse)
-    mean = np.mean(variance, axis=0, where=observations.measured)
-    return {
-        q.key: float(np.sqrt(np.nansum(mean[list(q.components)]))) * q.per_si
-        for q in observations.reported
-    }
-
-
 @dataclass(frozen=True, eq=False)
 class ComparedModel:
     """One model against the recordings.
@@ -146,24 +113,30 @@ class Comparison:
 
     Parameters
     ----------
+    sessions : tuple of str
+        Names, in the order of time.
     models : tuple of ComparedModel
         In the order in which they were named.
-    noise : NoiseModel
-        Scatter of one unit.
-    floor : dict of str to float
-        What noise alone gives each quantity.
-    repeated, freedom : dict of str to float, float
-        Repeatability and on how many numbers it rests.
+    noise : NoiseFloor
+        Scatter of the units.
+    repeated, repeated_by_side : dict of str to float
+        Repeatability of the measured pose from any side, and from the same side; empty where no
+        dwell was repeated.
     process : dict of str to float
         What a Gaussian process over the conditions leaves of the first model's error.
     """
 
+    sessions: tuple[str, ...]
     models: tuple[ComparedModel, ...]
-    noise: NoiseModel
-    floor: dict[str, float]
+    noise: NoiseFloor
     repeated: dict[str, float]
-    freedom: float
+    repeated_by_side: dict[str, float]
     process: dict[str, float]
+
+    @cached_property
+    def floor(self) -> dict[str, float]:
+        """What noise alone gives each quantity."""
+        return self.noise.rms(self.models[0].refitted)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -190,9 +163,7 @@ class Comparison:
         """The answer in a few sentences."""
         lines = []
         for model in self.models:
-            parts = [
-                f"{model.after[q.key].rms:.3g} {q.unit} of {q.name}" for q in self.quantities
-            ]
+            parts = [f"{model.after[q.key].rms:.3g} {q.unit} of {q.name}" for q in self.quantities]
             noisy = all(self.at_floor(model, q.key) for q in self.quantities)
             ratios = [model.after[q.key].rms / self.floor[q.key] for q in self.quantities]
             lines.append(
@@ -220,10 +191,14 @@ class Comparison:
         """Return what programs read, with units in the names."""
         return {
             "schema": 1,
+            "sessions": list(self.sessions),
             "verdict": list(self.verdict),
             "units": self.models[0].refitted.n_units,
             "noise_floor": {**self.floor, "source": self.noise.source},
-            "repeatability": {**self.repeated, "degrees_of_freedom": self.freedom},
+            "repeatability": {
+                "from_any_side": self.repeated,
+                "from_the_same_side": self.repeated_by_side,
+            },
             "gaussian_process": self.process,
             "models": [self._model_values(model) for model in self.models],
         }

@@ -186,11 +186,11 @@ def _motions(covariates: Mapping[str, Array]) -> Iterator[Condition]:
         )
     for motor in (1, 2):
         theta = covariates[f"theta_{motor}"]
-        for order, times in ((1, "once"), (2, "twice"), (3, "three times"), (4, "four times")):
+        for order, times in ((1, "once"), (2, "twice"), (4, "four times")):
             yield Condition(
                 "motor angle",
                 f"angle of motor {motor}, {times} a turn",
-                f"As motor {motor} turns, {times} a turn",
+                f"With the angle of motor {motor}, like a wave {times} a turn",
                 np.stack([np.cos(order * theta), np.sin(order * theta)], axis=1),
                 swings=True,
             )
@@ -206,6 +206,17 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Array) -> Iterator[
         yield Condition(
             "temperature", place, f"For every kelvin that {place} is warmer", column[:, None]
         )
+        for motor in (1, 2):
+            theta = covariates[f"theta_{motor}"]
+            turned = np.stack([np.cos(theta), np.sin(theta)], axis=1)
+            turned = turned - turned.mean(axis=0)
+            yield Condition(
+                "temperature",
+                f"{place} with the angle of motor {motor}",
+                f"With the temperature of {place} and the angle of motor {motor} together",
+                (column - column.mean())[:, None] * turned,
+                swings=True,
+            )
         for lag in LAGS_S:
             late = _lagged(column, covariates["time_s"], sessions, lag)
             yield Condition(

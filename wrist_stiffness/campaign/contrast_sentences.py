@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.conditions import Condition, conditions
-from wrist_stiffness.campaign.dependence import Dependence, dependences
+from wrist_stiffness.campaign.dependence import Dependence, Dependences, Labels, dependences
+from wrist_stiffness.campaign.noise_floor import NoiseFloor
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.resampling import time_blocks
-from wrist_stiffness.diagnosis.whitening import NoiseModel
 from wrist_stiffness.mechanism.components import Array
 
 SURE = 3.0
@@ -23,9 +23,24 @@ ALONG_AXIS = 0.9
 TWINS = 0.95
 """Correlation from which two conditions are the same in these recordings."""
 
-FEWEST_BLOCKS, MOST_BLOCKS = 12, 40
-WANDERS_IN_BLOCK = 3.0
-"""A block lasts so many correlation times of the slow wander, if enough blocks are left."""
+WANDER_S = 60.0
+"""Instruments wander over about this time.  Conditions that change faster are judged beyond every
+slower motion of the residual; slower ones against that motion, which takes far more to be sure."""
+
+SLOW = 0.3
+"""A condition is slow if less than this share of its variance is faster than the wander."""
+
+FAST_BLOCKS = 40
+"""Parts of the recordings whose signs are turned by chance, for fast conditions."""
+
+SLOW_BLOCK_S, FEWEST_SLOW_BLOCKS = 70.0, 8
+"""For slow conditions a part outlasts the wander; from fewer parts nothing could be sure."""
+
+SLOW_SHARE = 0.1
+"""A slow condition that explains less of the residual is not told apart from wander."""
+
+MOST_TWINS = 3
+"""No more twins of a condition are named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +108,9 @@ class Statement:
         what = " and ".join(self._told(change) for change in self.changes)
         text = f"{self.condition.lead}, {self.condition.subject} {what}."
         if self.twins:
-            text += f" (In these recordings the same as: {', '.join(self.twins)}.)"
+            more = len(self.twins) - MOST_TWINS
+            names = "; ".join(self.twins[:MOST_TWINS]) + (f"; {more} more" if more > 0 else "")
+            text += f" (In these recordings the same as: {names}.)"
         return text
 
     def _told(self, change: Change) -> str:
@@ -101,7 +118,7 @@ class Statement:
         amount, where = change.amount, change.where
         preposition = "along" if shift else "about"
         if self.condition.swings:
-            return f"{'swings' if shift else 'rocks'} by {amount} {preposition} {where}"
+            return f"{'swings' if shift else 'rocks'} by +-({amount}) {preposition} {where}"
         if self.condition.subject != "the platform":
             return f"grows by {amount} {preposition} {where}"
         if shift:
@@ -139,11 +156,15 @@ class Told:
         Topics on which nothing depends beyond chance, with their smallest chance.
     not_varied : tuple of str
         Topics of which these recordings say nothing.
+    too_short : tuple of str
+        Topics that change so slowly that the recordings are too short to tell them from the
+        wander of the instrument.
     """
 
     statements: tuple[Statement, ...]
     silent: dict[str, float]
     not_varied: tuple[str, ...]
+    too_short: tuple[str, ...]
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -156,6 +177,12 @@ class Told:
             lines.append(
                 f"Not varied here, so nothing can be said of: {', '.join(self.not_varied)}."
             )
+        if self.too_short:
+            lines.append(
+                f"Too short to be told from slow wander of the instrument: "
+                f"{', '.join(self.too_short)}; that takes "
+                f"{FEWEST_SLOW_BLOCKS * SLOW_BLOCK_S / 60.0:g} minutes of recording."
+            )
         return tuple(lines)
 
     def as_values(self) -> dict[str, Any]:
@@ -164,10 +191,11 @@ class Told:
             "depends_on": [each.as_values() for each in self.statements],
             "nothing_depends_on": dict(self.silent),
             "not_varied": list(self.not_varied),
+            "too_short_for": list(self.too_short),
         }
 
 
-def tell(observations: Observations, noise: NoiseModel, rng: np.random.Generator) -> Told:
+def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator) -> Told:
     """Say on which conditions the residual depends.
 
     Parameters
@@ -175,61 +203,113 @@ def tell(observations: Observations, noise: NoiseModel, rng: np.random.Generator
     observations : Observations
         Values are residuals after the registrations were refitted; covariates as
         `observing.observe` names them.
-    noise : NoiseModel
-        Their scatter and its colour.
+    floor : NoiseFloor
+        Scatter of the units.
     rng : numpy.random.Generator
         For what chance gives.
     """
     asked, not_varied = conditions(observations)
-    constant = (observations.sessions[:, None] == np.unique(observations.sessions)).astype(float)
-    answer = dependences(
-        observations.values,
-        _weights(observations, noise),
-        constant,
-        [each.columns for each in asked],
-        _blocks(observations, noise),
-        rng,
-    )
-    statements = tuple(
-        Statement(
-            asked[each.which],
-            _changes(each, observations),
-            each.p_value,
-            each.share,
-            _twins(each.which, asked, constant),
-        )
-        for each in answer.entered
-    )
+    sessions = observations.sessions
+    constant = (sessions[:, None] == np.unique(sessions)).astype(float)
+    trend = np.hstack([constant, _slow_motions(observations.times, sessions)])
+    weights = _weights(observations, floor)
+    total = float(np.nansum(weights * _beyond(constant, observations.values) ** 2))
+    slow = np.array([_is_slow(each.columns, constant, trend) for each in asked], dtype=bool)
+    span = _span(observations.times, sessions)
+    slow_blocks = int(span / SLOW_BLOCK_S)
+    too_short: dict[str, None] = {}
+    if slow_blocks < FEWEST_SLOW_BLOCKS:
+        too_short = dict.fromkeys(asked[which].topic for which in np.flatnonzero(slow))
+        asked = tuple(asked[which] for which in np.flatnonzero(~slow))
+        slow = slow[~slow]
+
+    def answer(chosen: Labels, base: Array, blocks: int) -> Dependences:
+        columns = [asked[which].columns for which in chosen]
+        labels = time_blocks(sessions, min(blocks, observations.n_units))
+        return dependences(observations.values, weights, base, columns, labels, rng)
+
+    statements: list[Statement] = []
+    chances = np.full(len(asked), np.nan)
+    base = constant
+    for chosen, under, blocks in (
+        (np.flatnonzero(~slow), trend, FAST_BLOCKS),
+        (np.flatnonzero(slow), constant, min(slow_blocks, FAST_BLOCKS)),
+    ):
+        found = answer(chosen, np.hstack([under, base]), blocks)
+        chances[chosen] = np.minimum(FAMILIES * found.p_values, 1.0)
+        for each in found.entered:
+            condition = asked[chosen[each.which]]
+            if under is constant and each.fall < SLOW_SHARE * total:
+                continue
+            base = np.hstack([base, condition.columns])
+            changes = _changes(each, condition, observations)
+            p_value = min(1.0, FAMILIES * each.p_value)
+            twins = _twins(condition, asked, constant)
+            statements.append(Statement(condition, changes, p_value, each.fall / total, twins))
     told = {each.condition.topic for each in statements}
     silent: dict[str, float] = {}
-    for condition, p_value in zip(asked, answer.p_values.tolist(), strict=True):
+    for condition, p_value in zip(asked, chances.tolist(), strict=True):
         if condition.topic not in told and np.isfinite(p_value):
             silent[condition.topic] = min(p_value, silent.get(condition.topic, 1.0))
-    return Told(statements, silent, not_varied)
+    return Told(
+        tuple(sorted(statements, key=lambda each: -each.share)),
+        silent,
+        not_varied,
+        tuple(too_short),
+    )
 
 
-def _weights(observations: Observations, noise: NoiseModel) -> Array:
+FAMILIES = 2
+"""Fast and slow conditions are asked apart, and both pay for it."""
+
+
+def _span(times: Array, sessions: Array) -> float:
+    """Time that was recorded in all sessions together [s]."""
+    return sum(float(np.ptp(times[sessions == each])) for each in np.unique(sessions))
+
+
+def _slow_motions(times: Array, sessions: Array) -> Array:
+    """Cosines of each session's time down to the period of the wander, (n, p)."""
+    columns = []
+    for session in np.unique(sessions):
+        own = sessions == session
+        passed = times[own] - times[own][0]
+        span = max(float(passed[-1]), 1e-9)
+        count = min(int(2.0 * span / WANDER_S), own.sum() // FEWEST_PER_MOTION)
+        for order in range(1, count + 1):
+            column = np.zeros(len(times))
+            column[own] = np.cos(np.pi * order * passed / span)
+            columns.append(column)
+    return np.column_stack(columns) if columns else np.empty((len(times), 0))
+
+
+FEWEST_PER_MOTION = 6
+"""Units for each slow motion that is taken out."""
+
+
+def _is_slow(columns: Array, constant: Array, trend: Array) -> bool:
+    whole, fast = _beyond(constant, columns), _beyond(trend, columns)
+    return bool(np.sum(fast**2) < SLOW * np.sum(whole**2))
+
+
+def _beyond(base: Array, columns: Array) -> Array:
+    """What least squares on the base leaves of the columns; NaN count as nothing."""
+    filled = np.nan_to_num(columns)
+    return np.asarray(filled - base @ np.linalg.lstsq(base, filled, rcond=None)[0])
+
+
+def _weights(observations: Observations, floor: NoiseFloor) -> Array:
     """Inverse variances of noise and of the misfit itself, (n, m)."""
-    inverse = np.linalg.inv(noise.factors(observations))
-    variance = np.einsum("nij,nij->ni", inverse, inverse)
-    misfit = np.nanmean(observations.values**2 - variance, axis=0, where=observations.measured)
-    total = variance + np.nan_to_num(np.maximum(misfit, 0.0))
-    return np.asarray(1.0 / total)
+    known = observations.measured
+    excess = np.where(known, np.nan_to_num(observations.values) ** 2 - floor.variance, 0.0)
+    misfit = np.maximum(excess.sum(axis=0), 0.0) / np.maximum(known.sum(axis=0), 1)
+    return np.asarray(1.0 / np.maximum(floor.variance + misfit, np.finfo(float).tiny))
 
 
-def _blocks(observations: Observations, noise: NoiseModel) -> np.ndarray:
-    """Blocks of neighbours, longer than the slow wander where there are units enough."""
-    times, sessions = observations.times, observations.sessions
-    span = sum(float(np.ptp(times[sessions == each])) for each in np.unique(sessions))
-    wanted = MOST_BLOCKS
-    if noise.colour_share > 0.0 and span > 0.0:
-        longest = WANDERS_IN_BLOCK * noise.colour_time
-        wanted = int(np.clip(span / longest, FEWEST_BLOCKS, MOST_BLOCKS))
-    return time_blocks(sessions, min(wanted, observations.n_units))
-
-
-def _changes(answer: Dependence, observations: Observations) -> tuple[Change, ...]:
-    """Shift and rotation of one condition, the surer one first if only one is sure."""
+def _changes(
+    answer: Dependence, condition: Condition, observations: Observations
+) -> tuple[Change, ...]:
+    """Shift and rotation of one condition: those that are sure, else the surer one."""
     q, m = answer.slope.shape
     covariance = answer.covariance.reshape(q, m, q, m)
     found = []
@@ -241,12 +321,16 @@ def _changes(answer: Dependence, observations: Observations) -> tuple[Change, ..
             mix, direction = -mix, -direction
         own = covariance[:, rows][:, :, :, rows]
         variance = np.einsum("a,i,aibj,b,j->", mix, direction, own, mix, direction)
+        # A swing is told as far as it was seen, not over a whole turn.
+        factor = quantity.per_si
+        if condition.swings:
+            factor *= 0.5 * float(np.ptp(condition.columns @ mix))
         found.append(
             Change(
                 quantity.name,
                 quantity.unit,
-                float(size[0]) * quantity.per_si,
-                float(np.sqrt(max(variance, 0.0))) * quantity.per_si,
+                float(size[0]) * factor,
+                float(np.sqrt(max(variance, 0.0))) * factor,
                 direction,
             )
         )
@@ -255,23 +339,22 @@ def _changes(answer: Dependence, observations: Observations) -> tuple[Change, ..
     return tuple(sure or sorted(found, key=lambda each: -each.size / each.uncertainty)[:1])
 
 
-def _twins(which: int, asked: tuple[Condition, ...], constant: Array) -> tuple[str, ...]:
+def _twins(own: Condition, asked: tuple[Condition, ...], constant: Array) -> tuple[str, ...]:
     """Names of conditions whose columns span the same as this one's, beyond the constants."""
-    basis = [_directions(each.columns, constant) for each in asked]
-    own = basis[which]
-    return tuple(
-        condition.name
-        for number, (condition, other) in enumerate(zip(asked, basis, strict=True))
-        if number != which
-        and own.shape[1] == other.shape[1]
-        and np.linalg.svd(own.T @ other, compute_uv=False).min(initial=1.0) > TWINS
-    )
+    basis = _directions(own.columns, constant)
+    found = []
+    for condition in asked:
+        other = _directions(condition.columns, constant)
+        if condition is not own and other.shape[1] == basis.shape[1]:
+            alike = np.linalg.svd(basis.T @ other, compute_uv=False)
+            if alike.min(initial=1.0) > TWINS:
+                found.append(condition.name)
+    return tuple(found)
 
 
 def _directions(columns: Array, constant: Array) -> Array:
     """Orthonormal basis of columns beyond the constants, (n, r)."""
-    beyond = columns - constant @ np.linalg.lstsq(constant, columns, rcond=None)[0]
-    left, size, _ = np.linalg.svd(beyond, full_matrices=False)
+    left, size, _ = np.linalg.svd(_beyond(constant, columns), full_matrices=False)
     return np.asarray(left[:, size > 1e-9 * max(float(size[0]), 1e-300)])
 
 
@@ -279,5 +362,3 @@ def _listed(words: tuple[str, ...]) -> str:
     if len(words) < 2:
         return "".join(words)
     return f"{', '.join(words[:-1])} or {words[-1]}"
-
-

@@ -27,8 +27,9 @@ REPEATS = 999
 MOST = 8
 """No more than so many conditions are told."""
 
-ALIKE = 1e-6
-"""A condition of which those before it leave less than this share of the square says nothing."""
+ALIKE = 0.15
+"""A condition of which those before it leave less than this share of the square tells little new,
+and that uncertainly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +46,15 @@ class Dependence:
         Of the slope, by its rows.
     p_value : float
         Chance that the largest of all conditions looks as strong without any dependence.
-    share : float
-        Part of the residual's weighted square that the condition takes away as it enters.
+    fall : float
+        Weighted square that the condition takes away from the residual as it enters.
     """
 
     which: int
     slope: Array
     covariance: Array
     p_value: float
-    share: float
+    fall: float
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def dependences(
     weights : (n, m) float
         Inverse variances.
     base : (n, p) float
-        Columns that are nobody's finding: a constant in each session.
+        Columns that are nobody's finding: a constant in each session, a slow wander.
     conditions : sequence of (n, q) float
         Each condition's columns.
     blocks : (n,) int
@@ -117,23 +118,24 @@ def dependences(
     signs = np.ones((REPEATS + 1, int(blocks.max()) + 1))
     signs[1:] = rng.choice([-1.0, 1.0], (REPEATS, signs.shape[1]))
     weighted = _Weighted(residual, weights, base, every, blocks)
-    total = weighted.energy([])
     chosen: list[int] = []
     p_entry: list[float] = []
-    shares: list[float] = []
+    falls: list[float] = []
     first = np.full(len(conditions), np.nan)
     while len(chosen) < min(MOST, len(conditions)):
         inside = [column for which in chosen for column in np.flatnonzero(owner == which)]
         gains = weighted.gains(inside, owner, signs)
-        p_values, strength = _corrected(gains)
+        p_values = _corrected(gains)
         if not chosen:
             first = p_values
-        best = int(np.argmax(strength))
-        if not p_values[best] <= CHANCE:
+        sure = np.flatnonzero(p_values <= CHANCE)
+        if len(sure) == 0:
             break
+        beyond_chance = gains[0, sure] - gains[1:, sure].mean(axis=0)
+        best = int(sure[np.argmax(beyond_chance)])
         chosen.append(best)
         p_entry.append(float(p_values[best]))
-        shares.append(float(gains[0, best]) / total)
+        falls.append(float(gains[0, best]))
     columns = [column for which in chosen for column in np.flatnonzero(owner == which)]
     slopes, covariance = weighted.fit(columns)
     slopes = slopes / scale[columns][:, None]
@@ -145,33 +147,30 @@ def dependences(
         flat = (own[:, None] * residual.shape[1] + np.arange(residual.shape[1])).ravel()
         entered.append(
             Dependence(
-                which, slopes[own], covariance[np.ix_(flat, flat)], p_entry[place], shares[place]
+                which, slopes[own], covariance[np.ix_(flat, flat)], p_entry[place], falls[place]
             )
         )
     return Dependences(tuple(entered), first)
 
 
-def _corrected(gains: Array) -> tuple[Array, Array]:
-    """Return p-values corrected for the number of conditions, and strengths, (k,) each.
+def _corrected(gains: Array) -> Array:
+    """Return p-values corrected for the number of conditions, (k,); NaN for no condition at all.
 
     Parameters
     ----------
     gains : (repeats + 1, k) float
-        Squares explained; the first row with the signs as they are, NaN for no condition at all.
+        Squares explained; the first row with the signs as they are.
     """
     alive = np.isfinite(gains[0])
-    strength = np.full(gains.shape[1], -np.inf)
     p_values = np.full(gains.shape[1], np.nan)
-    if not alive.any():
-        return p_values, strength
-    # In units of what chance explains, so that wide and narrow conditions compete fairly.
-    chance = gains[1:, alive].mean(axis=0)
-    relative = gains[:, alive] / np.where(chance > 0.0, chance, np.inf)
-    largest = relative[1:].max(axis=1)
-    strength[alive] = relative[0]
-    beaten = np.count_nonzero(largest[:, None] >= relative[0] * (1.0 - 1e-12), axis=0)
-    p_values[alive] = (1.0 + beaten) / (1.0 + len(largest))
-    return p_values, strength
+    if alive.any():
+        # In units of what chance explains, so that wide and narrow conditions compete fairly.
+        chance = gains[1:, alive].mean(axis=0)
+        relative = gains[:, alive] / np.where(chance > 0.0, chance, np.inf)
+        largest = relative[1:].max(axis=1)
+        beaten = np.count_nonzero(largest[:, None] >= relative[0] * (1.0 - 1e-12), axis=0)
+        p_values[alive] = (1.0 + beaten) / (1.0 + len(largest))
+    return p_values
 
 
 class _Weighted:
@@ -201,14 +200,6 @@ class _Weighted:
             self._columns.append(stacked[:, :-1])
             self._values.append(stacked[:, -1])
             self._size.append(whole**2)
-
-    def energy(self, inside: list[int]) -> float:
-        """Weighted square that the columns leave."""
-        parts = zip(self._columns, self._values, strict=True)
-        return sum(
-            float(np.sum(_beyond(_basis(columns[:, inside]), values) ** 2))
-            for columns, values in parts
-        )
 
     def gains(self, inside: list[int], owner: Labels, signs: Array) -> Array:
         """Return what each condition explains beyond the columns inside, (repeats + 1, k).

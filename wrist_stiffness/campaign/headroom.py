@@ -59,7 +59,9 @@ def held_out_process(observations: Observations, rng: np.random.Generator) -> Ar
             left = np.empty_like(flat)
             for pattern in np.unique(measured, axis=1).T:
                 same = np.flatnonzero((measured == pattern[:, None]).all(axis=0))
-                left[:, same] = _left(columns, flat[:, same], told[:, same], pattern, blocks, signal)
+                left[:, same] = _left(
+                    columns, flat[:, same], told[:, same], pattern, blocks, signal
+                )
             energy = float(np.sum(np.clip(left, -10.0, 10.0) ** 2))
             if energy < least:
                 best, least = left, energy
@@ -82,17 +84,22 @@ def _left(
 
 
 def _columns(covariates: Mapping[str, Array], length: float, rng: np.random.Generator) -> Array:
-    """Features of the process, (n, q): pose times load, pose with approach, and each by itself."""
+    """Features of the process, (n, q): the pose times what acts there, and each by itself."""
     pose = _standardised(covariates, ("theta_1", "theta_2"))
     load = _standardised(covariates, (*FORCES, *MOMENTS))
     approach = _standardised(covariates, ("approach_1", "approach_2"))
-    blocks = [np.ones((len(covariates["time_s"]), 1)), load]
+    force = np.stack([covariates[name] for name in FORCES], axis=1)
+    size = np.linalg.norm(force, axis=1, keepdims=True)
+    # Play follows the direction of a load and not its size.
+    direction = np.divide(force, size, out=np.zeros_like(force), where=size > 0.0)
+    acting = np.hstack([np.ones((len(force), 1)), load, approach, direction])
+    blocks = [acting]
     if pose.shape[1]:
         where = features(pose, length, rng)[:, -MOST_UNITS_OF_POSE:]
-        blocks += [where, *(where * column[:, None] for column in load.T)]
-    size = np.column_stack([np.sqrt(np.sum(load**2, axis=1))]) if load.shape[1] else load
-    groups = [np.hstack([pose, approach]), np.hstack([approach, size]), size]
+        blocks += [where * column[:, None] for column in acting.T]
+    strength = _standardised(covariates, ("force",))
     others = [name for name in covariates if name not in (*OWN, *FORCES, *MOMENTS)]
+    groups = [np.hstack([approach, strength]), strength]
     # Time itself is left out: what only drifts is no law.
     groups += [
         _standardised(covariates, (name,))

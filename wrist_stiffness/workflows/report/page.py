@@ -173,7 +173,7 @@ def _table(table: Table) -> str:
 
     def cells(row: tuple[str, ...], tag: str) -> str:
         return "".join(
-            f'<{tag}{" class=" + chr(34) + "number" + chr(34) if is_number else ""}>'
+            f"<{tag}{' class=' + chr(34) + 'number' + chr(34) if is_number else ''}>"
             f"{escape(cell)}</{tag}>"
             for cell, is_number in zip(row, numeric, strict=True)
         )

@@ -1,0 +1,97 @@
+"""What scatter alone makes of the error: the floor below which no model can bring it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.diagnosis.noise import FEWEST_REPLICATE_DOF, replicate_variance
+from wrist_stiffness.mechanism.components import Array
+
+SOURCES = {
+    "replicates": "dwells that repeat a pose and load from the same side",
+    "instrument": "what the instrument scatters within a dwell and the encoder hides; "
+    "no slow wander is in it, for want of repeated dwells",
+    "unpredictable": "what no smooth law of the conditions predicts, for want of anything better",
+}
+"""Where a floor may come from, in words."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFloor:
+    """Scatter of each unit.
+
+    Parameters
+    ----------
+    variance : (n, m) float
+        Of each component of each unit [m^2, rad^2].
+    source : str
+        One of `SOURCES`.
+    """
+
+    variance: Array
+    source: str
+
+    def rms(self, observations: Observations) -> dict[str, float]:
+        """Root mean square of each quantity, by its key, in the unit of its report."""
+        mean = np.sum(self.variance * observations.measured, axis=0)
+        mean = mean / np.maximum(observations.measured.sum(axis=0), 1)
+        return {
+            q.key: float(np.sqrt(mean[list(q.components)].sum())) * q.per_si
+            for q in observations.reported
+        }
+
+
+def noise_floor(observations: Observations) -> NoiseFloor:
+    """Find the scatter of the units.
+
+    Parameters
+    ----------
+    observations : Observations
+        Values are what is left after everything that the conditions predict was taken out.
+    """
+    shape = observations.values.shape
+    stated = np.zeros(shape)
+    if observations.covariance is not None:
+        stated = np.diagonal(
+            np.broadcast_to(observations.covariance, (*shape, shape[1])), axis1=1, axis2=2
+        )
+    apart = by_side(observations)
+    variance, freedom = scatter_of_repeats(apart)
+    if freedom >= FEWEST_REPLICATE_DOF and apart.replicate is not None:
+        known = stated[apart.replicate >= 0].mean(axis=0)
+        return NoiseFloor(stated + np.maximum(variance - known, 0.0), "replicates")
+    if observations.covariance is not None:
+        return NoiseFloor(stated, "instrument")
+    square = np.sum(np.nan_to_num(observations.values) ** 2, axis=0)
+    mean = square / np.maximum(observations.measured.sum(axis=0), 1)
+    return NoiseFloor(np.broadcast_to(mean, shape), "unpredictable")
+
+
+def by_side(observations: Observations) -> Observations:
+    """Return the table with replicates only of dwells that both motors approached alike."""
+    if observations.replicate is None:
+        return observations
+    sides = [np.sign(observations.covariate(f"approach_{motor}")) for motor in (1, 2)]
+    keys = np.column_stack([observations.replicate, *sides])
+    _, label = np.unique(keys, axis=0, return_inverse=True)
+    return replace(observations, replicate=np.where(observations.replicate >= 0, label, -1))
+
+
+def scatter_of_repeats(observations: Observations) -> tuple[Array, float]:
+    """Variance of a component inside groups of replicates, (m,), and its degrees of freedom."""
+    values = np.where(observations.measured, observations.values, 0.0)
+    return replicate_variance(values, np.empty((*values.shape, 0)), observations)
+
+
+def repeatability(observations: Observations) -> dict[str, float]:
+    """Root mean square scatter of repeated dwells by the key of the quantity; empty without any."""
+    variance, freedom = scatter_of_repeats(observations)
+    if freedom < 1.0:
+        return {}
+    return {
+        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
+        for q in observations.reported
+    }

@@ -1,0 +1,200 @@
+"""What is set up anew in every session, fitted again: registrations, encoder zeros, load tare.
+
+Without it every comparison with an instrument shows where that instrument stands and little else:
+T_measured = X T_true Y has two unknown registrations.  All four are known in closed form, so the
+fit costs little more than one prediction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.campaign.observing import Observed, UnitSession
+from wrist_stiffness.diagnosis.outliers import robust_scale
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.error_model import ErrorModel
+
+GROUPS = {
+    "measurement_frame": slice(0, 6),
+    "target_mounting": slice(6, 12),
+    "encoder_offset": slice(12, 14),
+    "load_bias": slice(14, 20),
+}
+"""Effects that stand for what is set up anew, with their columns."""
+
+PLAUSIBLE = np.concatenate(
+    [np.repeat([1e-3, 3e-3, 1e-3, 3e-3], 3), np.full(2, 1e-3), np.repeat([0.05, 2e-3], 3)]
+)
+"""Sizes that would not surprise [m, rad, N, N m]: they only make the columns comparable."""
+
+ROUNDS = 4
+
+REACH = 4.0
+"""Robust standard deviations from which a unit no longer pulls the fit."""
+
+UNSEEN = 1e-7
+"""Directions that the units hardly show, as a share of the best seen, stay as they are."""
+
+LOAD_STEP = np.repeat([1e-2, 1e-3], 3)
+"""Change of the load that shows what a tare does [N, N m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class SetUp:
+    """One session's set-up as a fit finds it, relative to what the model has.
+
+    Parameters
+    ----------
+    session : str
+        Name.
+    values : (20,) float
+        Shift and turn of the instrument in F, of the target in U, encoder zeros, tare
+        [m, rad, rad, N, N m].
+    residual : (u, 6) float
+        What it leaves of all units of the session [m, rad].
+    """
+
+    session: str
+    values: Array
+    residual: Array
+
+    @property
+    def sentence(self) -> str:
+        """What was taken up, for a technician."""
+        x, y, zero, tare = (self.values[columns] for columns in GROUPS.values())
+        parts = [
+            f"{name} {1e6 * np.linalg.norm(six[:3]):.3g} um and "
+            f"{1e3 * np.degrees(np.linalg.norm(six[3:])):.3g} mdeg"
+            for name, six in (("instrument", x), ("target", y))
+        ]
+        angles = " and ".join(f"{1e3 * angle:.3g}" for angle in np.degrees(zero))
+        parts.append(f"zeros of the motors {angles} mdeg")
+        parts.append(
+            f"tare {np.linalg.norm(tare[:3]):.2g} N and {1e3 * np.linalg.norm(tare[3:]):.2g} mN m"
+        )
+        return f"{self.session}: {', '.join(parts)}"
+
+
+def refit_set_up(
+    model: ErrorModel, observed: Observed, calibrated: Sequence[str] = ()
+) -> tuple[SetUp, ...]:
+    """Fit the set-up of every session anew.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        With which the sessions were observed.
+    observed : Observed
+        Of `observing.observe`.
+    calibrated : sequence of str
+        Effects among `GROUPS` that the recordings say were calibrated: they stay.
+
+    Returns
+    -------
+    tuple of SetUp
+        One for each session.
+    """
+    ends = np.cumsum([len(each.cut.dwell) for each in observed.sessions])
+    parts = np.split(observed.predicted, ends[:-1])
+    free = np.ones(len(PLAUSIBLE), dtype=bool)
+    for effect in calibrated:
+        free[GROUPS.get(effect, slice(0))] = False
+    return tuple(
+        _refit(model, session, predicted, free)
+        for session, predicted in zip(observed.sessions, parts, strict=True)
+    )
+
+
+def refitted_values(observed: Observed, set_ups: Sequence[SetUp]) -> Array:
+    """Return what the set-ups leave of the units of the table, (u, 6) [m, rad]."""
+    left = np.concatenate([each.residual for each in set_ups])
+    seen = np.concatenate(
+        [np.isfinite(np.concatenate([e.shift, e.turn], axis=1)) for e in observed.sessions]
+    )
+    return np.asarray(left[(seen & np.isfinite(left)).any(axis=1)])
+
+
+def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.ndarray) -> SetUp:
+    theta = session.mean(session.block.theta)
+    mechanism = model.table.mechanism
+    home = mechanism.forward(theta)
+    softness = _softness(model, session, theta)
+    instrument, target = (np.eye(3), np.zeros(3)), (np.eye(3), np.zeros(3))
+    zero, tare = np.zeros(2), np.zeros(6)
+
+    def said() -> tuple[Array, Array]:
+        """Rotation and shift of the platform as the instrument should see it."""
+        turn, shift = exp_twist(predicted + softness @ tare)
+        turn = turn @ mechanism.forward(theta + zero).platform
+        shift = shift + turn @ target[1]
+        return instrument[0] @ turn @ target[0], shift @ instrument[0].T + instrument[1]
+
+    def left() -> tuple[Array, Array]:
+        turn, shift = said()
+        twist = log_motion(turn @ np.swapaxes(home.platform, -1, -2), shift)
+        return session.residual(twist), turn
+
+    for _ in range(ROUNDS):
+        residual, turn = left()
+        columns = np.zeros((len(theta), 6, len(PLAUSIBLE)))
+        columns[:, :, :6] = np.eye(6)
+        columns[:, :3, 6:9] = columns[:, 3:, 9:12] = turn
+        columns[:, 3:, 12:14] = mechanism.jacobian(home)
+        columns[:, :, 14:] = softness
+        step = np.zeros(len(PLAUSIBLE))
+        step[free] = PLAUSIBLE[free] * _solved(columns[:, :, free] * PLAUSIBLE[free], residual)
+        instrument = _composed(exp_twist(step[:6]), instrument)
+        target = _composed(target, exp_twist(step[6:12]))
+        zero, tare = zero + step[12:14], tare + step[14:]
+    values = np.concatenate([log_motion(*instrument), log_motion(*target), zero, tare])
+    return SetUp(session.name, values, left()[0])
+
+
+def _composed(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return the motion `second`, followed by `first`."""
+    return first[0] @ second[0], first[0] @ second[1] + first[1]
+
+
+def _softness(model: ErrorModel, session: UnitSession, theta: Array) -> Array:
+    """Return how the units' elastic twist changes with the load, (u, 6, 6) [m/N, ...]."""
+    block, mean = session.block, session.mean
+    still = Block(
+        mean(block.time), theta, mean(block.load), load_on_platform=block.load_on_platform
+    )
+    bare = model.with_effects()
+    before = bare.batch(still).twist
+    columns = []
+    for axis, step in enumerate(LOAD_STEP):
+        # Towards zero, so that no load leaves the table's range.
+        moved = np.where(still.load[:, axis] > 0.0, -step, step)
+        load = still.load.copy()
+        load[:, axis] += moved
+        after = bare.batch(replace(still, load=load)).twist
+        columns.append((after - before) / moved[:, None])
+    return np.nan_to_num(np.stack(columns, axis=-1))
+
+
+def _solved(columns: Array, residual: Array) -> Array:
+    """Least squares that lost beams do not pull, shortest where the units do not tell, (p,)."""
+    known = np.isfinite(residual)
+    rows = np.where(known[:, :, None], columns, 0.0)
+    values = np.where(known, residual, 0.0)
+    weight, parameters = np.ones(len(values)), np.zeros(columns.shape[2])
+    for _ in range(ROUNDS):
+        miss = np.where(known, values - rows @ parameters, np.nan)
+        scale = robust_scale(miss)
+        distance = np.sqrt(np.nanmean(np.where(known, (miss / scale) ** 2, np.nan), axis=1))
+        weight = np.minimum(1.0, REACH / np.maximum(np.nan_to_num(distance), 1e-12))
+        factor = np.sqrt(weight)[:, None] / scale
+        white = (factor[:, :, None] * rows).reshape(-1, columns.shape[2])
+        gram = white.T @ white
+        size, vectors = np.linalg.eigh(gram)
+        seen = size > UNSEEN * size[-1]
+        moment = white.T @ (factor * values).reshape(-1)
+        parameters = vectors[:, seen] @ ((vectors[:, seen].T @ moment) / size[seen])
+    return np.asarray(parameters)
