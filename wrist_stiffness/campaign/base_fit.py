@@ -58,9 +58,11 @@ class BaseProblem(FitProblem):
         found = super().effects(z, session)
         at = self._home
         opened = np.zeros(len(at.parts.sectors.gap))
-        for effect in found:
+        for free, effect in zip(self.free, found, strict=True):
             if effect.law.id == "axis_misalignment":
-                added, _ = effect.law.advance(at, effect.component, effect.si, None)
+                # The gaps of a calibrated model fit its axes already: only further turns count.
+                turned = {key: value - free.effect.si[key] for key, value in effect.si.items()}
+                added, _ = effect.law.advance(at, effect.component, turned, None)
                 opened += at.carried(added)[1][0]
         return tuple(self._shimmed(effect, opened) for effect in found)
 
@@ -72,7 +74,9 @@ class BaseProblem(FitProblem):
             return effect
         (parameter,) = effect.parameters
         gap = effect.estimates[parameter.key].value - 1e6 * float(opened[own].mean())
-        return effect.with_values({parameter.key: float(np.clip(gap, parameter.lower, parameter.upper))})
+        return effect.with_values(
+            {parameter.key: float(np.clip(gap, parameter.lower, parameter.upper))}
+        )
 
     def _residuals(self, number: int, additions: list[tuple[Effect, ...]]) -> list[Array]:
         session = self.sessions[number]
@@ -159,12 +163,8 @@ def fit_base(model: ErrorModel, sessions: tuple[UnitSession, ...]) -> BaseFit:
         z, residual = trial, tried
         if before - after < ENOUGH * before:
             break
-    predicted = np.concatenate(
-        [each.predicted([each.effects])[0] for each in _at(problem, z)]
-    )
-    return BaseFit(
-        problem, z, tabulate(model, sessions, predicted), problem.columns(z)
-    )
+    predicted = np.concatenate([each.predicted([each.effects])[0] for each in _at(problem, z)])
+    return BaseFit(problem, z, tabulate(model, sessions, predicted), problem.columns(z))
 
 
 def _at(problem: BaseProblem, z: Array) -> list[SessionModel]:

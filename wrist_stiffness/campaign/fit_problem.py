@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.free_effects import FreeEffect
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.diagnosis.observations import Observations
@@ -141,26 +142,40 @@ class FitProblem:
             ]
         )
 
-    def columns(self, z: Array, progress: Progress = silent) -> Array:
+    def columns(self, z: Array) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
-        By one-sided differences, away from the nearer bound.
+        By one-sided differences, away from the nearer bound.  Where neither the parameter's effect
+        nor the step needs the path, effects with a memory are left out of the difference: that is
+        far quicker, and good enough for the slope.
         """
         step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
         blocks = []
-        for number in range(len(self.sessions)):
+        for number, model in enumerate(self._models):
+            base = (*self.model.effects, *self.effects(z, number))
+            quick = tuple(effect for effect in base if not model.remembers((effect,)))
             moved = [place for place, u in enumerate(self.unknowns) if u.session in (None, number)]
-            tried = [self.effects(z, number)]
+            tried, reference = [base, quick], []
             for place in moved:
                 other = z.copy()
                 other[place] += step[place]
-                tried.append(self.effects(other, number))
-            first, *others = self._residuals(number, tried)
+                trial = (*self.model.effects, *self.effects(other, number))
+                own = self.free[self.unknowns[place].free].effect
+                needs_path = model.remembers((own,))
+                reference.append(0 if needs_path else 1)
+                tried.append(
+                    trial
+                    if needs_path
+                    else tuple(effect for effect in trial if not model.remembers((effect,)))
+                )
+            references, others = (predicted := model.predicted(tried))[:2], predicted[2:]
+            session = self.sessions[number]
+            first = session.residual(references[0])
             block = np.zeros((*first.shape, len(z)))
-            for place, other in zip(moved, others, strict=True):
-                block[:, :, place] = np.nan_to_num((other - first) / step[place])
+            for place, which, other in zip(moved, reference, others, strict=True):
+                twist = references[0] + (other - references[which])
+                block[:, :, place] = np.nan_to_num((session.residual(twist) - first) / step[place])
             blocks.append(block)
-            progress(number + 1, len(self.sessions))
         return self._rows(blocks)
 
     @cached_property
@@ -182,7 +197,9 @@ class FitProblem:
 
     def _residuals(self, number: int, additions: Sequence[Sequence[Effect]]) -> list[Array]:
         session = self.sessions[number]
-        return [
-            session.residual(session.mean(prediction.measured))
-            for prediction in self.model.batch_with(session.block, additions)
-        ]
+        trials = [(*self.model.effects, *added) for added in additions]
+        return [session.residual(each) for each in self._models[number].predicted(trials)]
+
+    @cached_property
+    def _models(self) -> tuple[SessionModel, ...]:
+        return tuple(SessionModel(self.model, each, ()) for each in self.sessions)
