@@ -5,7 +5,6 @@ catalogue are not taken for wander, nor does fitting them make the wander look s
 """
 
 import numpy as np
-from scipy.linalg import qr
 from scipy.optimize import minimize_scalar
 
 from wrist_stiffness.diagnosis.observations import Array, Observations
@@ -15,21 +14,23 @@ SHARES = (0.1, 0.25, 0.5, 0.75, 0.95)
 TIMES_IN_STEPS = (1.5, 4.0, 10.0, 30.0)
 LARGEST_SHARE = 0.98
 
+ROUNDING = 1e-12
+"""Keeps the Gram matrix of exact data positive definite."""
+
 EVIDENCE = 3.0
 """Gain of log likelihood that the two numbers of the wander must bring."""
 
 
-def find_colour(everything: Array, observations: Observations, n_rich: int) -> tuple[float, float]:
+def find_colour(reduced: Array, observations: Observations) -> tuple[float, float]:
     """Share and correlation time of the slow wander.
 
     Parameters
     ----------
-    everything : (n, m, q + 1) array
-        Base and candidates in components of equal scatter; the observations are the last column.
+    reduced : (n, m, p + 1) array
+        Independent columns of base and candidates in components of equal scatter; the observations
+        are the last column.
     observations : Observations
         Tells what was measured, and when.
-    n_rich : int
-        Rank of base and candidates together.
 
     Returns
     -------
@@ -38,7 +39,6 @@ def find_colour(everything: Array, observations: Observations, n_rich: int) -> t
     """
     steps = np.diff(observations.times)[np.diff(observations.sessions) == 0]
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    reduced = _independent(everything, n_rich)
 
     def unlikely(share: float, time_constant: float) -> float:
         return -_restricted_likelihood(reduced, observations, share, time_constant)
@@ -57,21 +57,6 @@ def find_colour(everything: Array, observations: Observations, n_rich: int) -> t
     return float(finer.x), time_constant
 
 
-def _independent(everything: Array, n_rich: int) -> Array:
-    """Leading independent columns and the observations, (n, m, p + 1)."""
-    n, m, q = everything.shape
-    flat = everything.reshape(n * m, q)
-    design = flat[:, :-1]
-    norm = np.linalg.norm(design, axis=0)
-    design = design[:, norm > 0] / norm[norm > 0]
-    if design.shape[1] == 0:
-        return everything[:, :, -1:]
-    triangle, order = qr(design, mode="r", pivoting=True)
-    size = np.abs(np.diagonal(triangle))
-    chosen = order[: min(int((size > 1e-6 * size[0]).sum()), n_rich)]
-    return np.hstack([design[:, chosen], flat[:, -1:]]).reshape(n, m, -1)
-
-
 def _restricted_likelihood(
     reduced: Array, observations: Observations, share: float, time_constant: float
 ) -> float:
@@ -80,8 +65,11 @@ def _restricted_likelihood(
         reduced, measured, observations.times, observations.sessions, share, time_constant
     )
     p = reduced.shape[2] - 1
-    size = np.abs(np.diagonal(np.linalg.qr(white.reshape(-1, p + 1), mode="r")))
+    flat = white.reshape(-1, p + 1)
+    # The columns are independent and far from parallel, so their Gram matrix is safe.
+    factor = np.linalg.cholesky(flat.T @ flat + np.diag(np.full(p + 1, ROUNDING)))
+    size = np.diagonal(factor)
     freedom = int(measured.sum()) - p
-    log_information = 2 * np.log(size[:p] + 1e-300).sum()
+    log_information = 2 * np.log(size[:p]).sum()
     variance = size[p] ** 2 / freedom
-    return -0.5 * float(log_sum + log_information + freedom * np.log(variance + 1e-300))
+    return -0.5 * float(log_sum + log_information + freedom * np.log(variance))

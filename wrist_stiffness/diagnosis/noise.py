@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.diagnosis.colour import find_colour
 from wrist_stiffness.diagnosis.observations import Array, Observations
-from wrist_stiffness.diagnosis.projection import orthonormal
+from wrist_stiffness.diagnosis.projection import leading_directions, orthonormal
 from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors
 
 FEWEST_REPLICATE_DOF = 12
@@ -93,13 +93,7 @@ def share_inside_groups(
 
 def rich_basis(columns: Array, n_measured: int) -> Array:
     """Orthonormal basis of everything that could be structure, leading directions first."""
-    basis = orthonormal(columns)
-    most = int(RICH_SHARE * n_measured)
-    if basis.shape[1] <= most:
-        return basis
-    norm = np.linalg.norm(columns, axis=0)
-    left, _, _ = np.linalg.svd(columns / np.where(norm > 0, norm, 1.0), full_matrices=False)
-    return left[:, :most]
+    return leading_directions(columns, int(RICH_SHARE * n_measured))
 
 
 def estimate_noise(observations: Observations, base: Array, structure: Array) -> NoiseModel:
@@ -133,7 +127,8 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
     loss = 1 - basis.shape[1] / measured.sum()
     coupled = residual_covariance(left, loss)
     size = np.sqrt(np.diag(coupled))
-    share, time_constant = find_colour(everything / size[:, None], observations, basis.shape[1])
+    reduced = np.concatenate([basis, target[:, None]], axis=1).reshape(n, m, -1)
+    share, time_constant = find_colour(reduced / size[:, None], observations)
     repeated, freedom = replicate_variance(
         everything[:, :, -1], everything[:, :, :-1], observations
     )

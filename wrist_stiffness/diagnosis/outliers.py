@@ -3,11 +3,18 @@
 import numpy as np
 
 from wrist_stiffness.diagnosis.observations import Array, Mask, Observations
+from wrist_stiffness.diagnosis.projection import leading_directions
 
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
 
 ROUNDS = 15
+
+LEAST = 1e-3
+"""Directions weaker than this share of the strongest could follow a single lost beam."""
+
+RIDGE = 1e-9
+"""Keeps a direction solvable that only lost units show."""
 
 
 def robust_scale(values: Array) -> Array:
@@ -46,15 +53,14 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> Mask
     values = np.where(measured, observations.values, 0.0)
     size = robust_scale(observations.values)
     rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
-    norm = np.linalg.norm(rows, axis=0)
-    left, spread, _ = np.linalg.svd(rows / np.where(norm > 0, norm, 1.0), full_matrices=False)
-    rank = min(int((spread > 1e-3 * spread[0]).sum()), int(0.25 * measured.sum()))
-    basis, target = left[:, :rank], (values / size).reshape(-1)
+    basis = leading_directions(rows, int(0.25 * measured.sum()), LEAST)
+    target = (values / size).reshape(-1)
     weight = np.ones(n)
     distance = np.zeros(n)
     for _ in range(ROUNDS):
-        root = np.sqrt(np.repeat(weight, m))[:, None]
-        fit = basis @ np.linalg.lstsq(root * basis, root[:, 0] * target, rcond=None)[0]
+        weighted = np.repeat(weight, m)[:, None] * basis
+        gram = weighted.T @ basis + RIDGE * np.eye(basis.shape[1])
+        fit = basis @ np.linalg.solve(gram, weighted.T @ target)
         residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
         scaled = np.where(measured, residual / robust_scale(residual), 0.0)
         distance = np.sqrt(np.sum(scaled**2, axis=1) / np.maximum(measured.sum(axis=1), 1))

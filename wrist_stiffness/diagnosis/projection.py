@@ -17,6 +17,10 @@ ABSORBED = 1e-5
 """A column of which the base leaves less than this share of the norm lies inside the base."""
 
 
+SQUARED_ROUNDING = 1e-6
+"""Singular values below this share of the largest cannot be seen in a Gram matrix."""
+
+
 def orthonormal(columns: Array, original_norm: Array | None = None) -> Array:
     """Orthonormal basis of the columns, (N, r), blind to their scales.
 
@@ -34,6 +38,31 @@ def orthonormal(columns: Array, original_norm: Array | None = None) -> Array:
         return np.empty((columns.shape[0], 0))
     left, size, _ = np.linalg.svd(columns[:, keep] / norm[keep], full_matrices=False)
     return left[:, size > NEGLIGIBLE * size[0] * max(columns.shape)]
+
+
+def leading_directions(columns: Array, most: int, least: float = SQUARED_ROUNDING) -> Array:
+    """Orthonormal basis of the strongest directions of many columns, (N, r), blind to their scales.
+
+    By the Gram matrix: its cost grows with the rows only once, and directions far below the
+    strongest are lost in rounding, which is no loss where only the strong ones are wanted.
+
+    Parameters
+    ----------
+    columns : (N, k) array
+        Columns, possibly dependent.
+    most : int
+        Largest number of directions.
+    least : float, optional
+        Directions whose singular value is below this share of the largest are left out.
+    """
+    norm = np.linalg.norm(columns, axis=0)
+    if not (norm > 0).any() or most == 0:
+        return np.empty((len(columns), 0))
+    scaled = columns[:, norm > 0] / norm[norm > 0]
+    size, vectors = np.linalg.eigh(scaled.T @ scaled)
+    strong = np.flatnonzero(size > max(least, SQUARED_ROUNDING) ** 2 * size[-1])[::-1][:most]
+    directions: Array = np.linalg.qr(scaled @ (vectors[:, strong] / np.sqrt(size[strong])))[0]
+    return directions
 
 
 @dataclass(frozen=True, eq=False)
