@@ -12,6 +12,7 @@ from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.monitor_stream import MonitorStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import WristError
 
 pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered", "ignore:invalid value")
@@ -61,13 +62,14 @@ def test_only_our_own_errors_come_out(model, messages):
                 monitoring.on_joint_state(stamp, first, second)
         elif kind == "trajectory":
             with contextlib.suppress(WristError):
-                sent = correcting.on_trajectory(stamp, frame, first, second)
-                assert np.all(np.isfinite(sent.positions))
+                points = [planned_point(len(first), values, values) for values in second]
+                sent = correcting.on_trajectory(stamp, frame, first, points)
+                for point in sent.points:
+                    assert np.all(np.isfinite([point.positions, point.velocities]))
         elif kind == "pose":
             with contextlib.suppress(WristError):
                 monitoring.on_pose(stamp, frame, first, second)
             with contextlib.suppress(WristError):
                 monitoring.on_frame_pose(stamp, frame, first, second)
-            if len(first) == 3 and len(second) == 3:
-                with contextlib.suppress(WristError):
-                    monitoring.on_markers(stamp, frame, [first, second])
+            with contextlib.suppress(WristError):
+                monitoring.on_markers(stamp, frame, [first] * 3 + [second[:3]] * 4)

@@ -13,6 +13,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from wrist_stiffness.compensation.correction import correct
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.compensation.trajectory import STEP as DIFFERENCE_RAD
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
@@ -198,7 +199,13 @@ def test_a_whole_trajectory_is_corrected_point_by_point(graph, corrector, model)
     for i, (point, theta) in enumerate(zip(message.points, points, strict=True)):
         corrected = theta + expected(model, theta).delta
         assert np.allclose(point.positions, corrected[::-1], rtol=0, atol=1e-15)
-        assert point.velocities.tolist() == [0.1, 0.2]
+        # Motor 2 stands first: at 0.1 rad/s, motor 1 at 0.2.
+        speed = np.array([0.2, 0.1])
+        seconds = DIFFERENCE_RAD / np.linalg.norm(speed)
+        ahead, behind = (expected(model, theta + sign * seconds * speed).delta for sign in (1, -1))
+        wanted = speed + (ahead - behind) / (2.0 * seconds)
+        assert np.allclose(point.velocities, wanted[::-1], rtol=0, atol=1e-9)
+        assert len(point.accelerations) == 0
         assert point.time_from_start.sec == i
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from wrist_stiffness.compensation.safety import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
+from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load
@@ -59,14 +60,14 @@ class CorrectedTrajectory:
     ----------
     frame_id : str
         For the header: `wrist_corrected` where correction is on.
-    positions : (m, n) float
-        Of all points and joints [rad].
+    points : tuple of PlannedPoint
+        The motors' angles, speeds and accelerations corrected.
     fault : WristError or None
         Why it passes unchanged although correction is on.
     """
 
     frame_id: str
-    positions: Array
+    points: tuple[PlannedPoint, ...]
     fault: WristError | None
 
 
@@ -175,11 +176,11 @@ class CorrectionStream(Stream):
         stamp_ns: int,
         frame_id: str,
         names: Sequence[str],
-        points: Sequence[Sequence[float]],
+        points: Sequence[PlannedPoint],
     ) -> CorrectedTrajectory:
         """Correct every point of a trajectory under the load at its start.
 
-        A trajectory is a plan: it is neither slewed nor held by the hysteresis.
+        A trajectory is a plan: it is neither slewed nor held by the hysteresis, and not remembered.
 
         Parameters
         ----------
@@ -189,8 +190,8 @@ class CorrectionStream(Stream):
             Its header's frame.
         names : sequence of str
             Joint names.
-        points : sequence of sequences
-            Positions of every point [rad].
+        points : sequence of PlannedPoint
+            Of all these joints (see `planned_point`).
 
         Returns
         -------
@@ -200,21 +201,23 @@ class CorrectionStream(Stream):
         Raises
         ------
         InputError
-            If a motor is missing or an angle is not finite: it is not to be forwarded.
+            If a motor is missing or named twice: it is not to be forwarded.
         """
-        angles = [self._motor_angles(names, positions) for positions in points]
-        sent = np.array(points, dtype=float).reshape(len(points), len(names))
+        places = self.settings.motors.places(names, "trajectory")
+        unchanged = tuple(points)
         if not self.enabled:
-            return CorrectedTrajectory(frame_id, sent, None)
+            return CorrectedTrajectory(frame_id, unchanged, None)
         try:
             if frame_id == CORRECTED_FRAME:
                 raise InputError(TWICE)
             load = self._load(stamp_ns)
-            corrected = [self._within_limits(stamp_ns, load, theta) for theta in angles]
+            corrected = tuple(
+                corrected_point(self._corrected_at(stamp_ns, load, point, places), places, point)
+                for point in points
+            )
         except WristError as error:
-            return CorrectedTrajectory(CORRECTED_FRAME, sent, error)
-        sent[:, list(self.settings.motors.places(names))] = np.reshape(corrected, (-1, 2))
-        return CorrectedTrajectory(CORRECTED_FRAME, sent, None)
+            return CorrectedTrajectory(CORRECTED_FRAME, unchanged, error)
+        return CorrectedTrajectory(CORRECTED_FRAME, corrected, None)
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
         theta = self.settings.motors.angles(names, positions, COMMAND)
@@ -276,6 +279,15 @@ class CorrectionStream(Stream):
         limits = self.model.table.geometry.limits
         return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
 
-    def _within_limits(self, stamp_ns: int, load: Load, theta: Array) -> Array:
+    def _corrected_at(
+        self, stamp_ns: int, load: Load, point: PlannedPoint, places: Sequence[int]
+    ) -> Callable[[Array], Array]:
+        """Return the corrected angles as a function of the planned ones, near a point."""
         limits = self.running_model().model.table.geometry.limits
-        return within_joint_limits(theta, self._correction(stamp_ns, load, theta).delta, limits)
+        theta_dot = point.velocities[list(places)] if len(point.velocities) else None
+
+        def corrected(theta: Array) -> Array:
+            delta = self._correction(stamp_ns, load, theta, theta_dot).delta
+            return within_joint_limits(theta, delta, limits)
+
+        return corrected

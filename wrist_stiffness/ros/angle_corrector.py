@@ -18,6 +18,7 @@ from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.parameters import CORRECTION, correction_settings
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
@@ -138,18 +139,20 @@ class AngleCorrector(WristNode):
         # A zero stamp says "at once".
         stamp_ns = nanoseconds(message.header.stamp) or self.get_clock().now().nanoseconds
         try:
-            trajectory = self.stream.on_trajectory(
-                stamp_ns,
-                message.header.frame_id,
-                message.joint_names,
-                [point.positions for point in message.points],
-            )
+            names = message.joint_names
+            points = [
+                planned_point(len(names), point.positions, point.velocities, point.accelerations)
+                for point in message.points
+            ]
+            trajectory = self.stream.on_trajectory(stamp_ns, message.header.frame_id, names, points)
         except WristError as error:
             self.warn(error)
             return
         message.header.frame_id = trajectory.frame_id
-        for point, positions in zip(message.points, trajectory.positions, strict=True):
-            point.positions = positions
+        for point, planned in zip(message.points, trajectory.points, strict=True):
+            point.positions = planned.positions
+            point.velocities = planned.velocities
+            point.accelerations = planned.accelerations
         self._trajectory.publish(message)
         if trajectory.fault is not None:
             self.warn(trajectory.fault)

@@ -1,0 +1,110 @@
+"""Speeds and accelerations of a corrected plan, against differences in time of its positions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.compensation.contact_policy import ContactSettings
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.trajectory import corrected_point, planned_point
+from wrist_stiffness.errors import InputError, UnreachablePoseError
+from wrist_stiffness.model.error_model import ErrorModel
+
+NAMES = ("motor_2_joint", "gripper", "motor_1_joint")
+SECOND = 1_000_000_000
+EVERY_LOAD = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+# Shares of the correction's own speed and acceleration: truncation and search error of both sides.
+SPEED, ACCELERATION = 1e-3, 0.03
+
+
+@pytest.fixture(scope="module")
+def stream(make_table):
+    """A wrist so soft that its corrections reach a degree."""
+    model = ErrorModel("soft", make_table(softness=60.0), "closed_form")
+    stream = CorrectionStream(model, replace(EVERY_LOAD, correction_limit=0.2), enabled=True)
+    stream.loads.add(SECOND, "wrist_base", (0.3, 0.0, -2.0), (0.0, 0.0, 0.0))
+    return stream
+
+
+def plan(t):
+    """Angles, speeds and accelerations of all joints at a time [s]."""
+    angles = np.array([0.3 * np.sin(2.0 * t), t, 0.4 * np.cos(1.5 * t)])
+    speeds = np.array([0.6 * np.cos(2.0 * t), 1.0, -0.6 * np.sin(1.5 * t)])
+    return angles, speeds, np.array([-4.0 * angles[0], 0.0, -2.25 * angles[2]])
+
+
+def corrected(stream, times):
+    points = [planned_point(3, *plan(t)) for t in times]
+    answer = stream.on_trajectory(SECOND, "", NAMES, points)
+    assert answer.fault is None
+    return answer.points
+
+
+def test_speeds_and_accelerations_are_those_of_the_corrected_path(stream):
+    step_s = 1e-2
+    for t in np.linspace(0.0, 3.0, 7):
+        before, here, after = corrected(stream, [t - step_s, t, t + step_s])
+        _, speeds, accelerations = plan(t)
+        added = here.velocities - speeds
+        motion = [np.stack(plan(x)[0]) for x in (t - step_s, t, t + step_s)]
+        change = [p.positions - m for p, m in zip((before, here, after), motion, strict=True)]
+        wanted = (change[2] - change[0]) / (2.0 * step_s)
+        assert np.allclose(added, wanted, rtol=0, atol=SPEED * np.abs(wanted).max() + 1e-7)
+        wanted = (change[2] - 2.0 * change[1] + change[0]) / step_s**2
+        added = here.accelerations - accelerations
+        assert np.allclose(added, wanted, rtol=0, atol=ACCELERATION * np.abs(wanted).max() + 1e-4)
+        assert np.abs(here.velocities - speeds).max() > 1e-5
+        assert (here.positions[1], here.velocities[1], here.accelerations[1]) == (t, 1.0, 0.0)
+
+
+def test_what_the_plan_does_not_have_is_not_made_up(stream):
+    (point,) = stream.on_trajectory(SECOND, "", NAMES, [planned_point(3, plan(0.5)[0])]).points
+    assert (len(point.velocities), len(point.accelerations)) == (0, 0)
+
+
+def test_at_rest_a_plan_stays_at_rest(stream):
+    planned = planned_point(3, [0.1, 0.0, 0.2], [0.0, 0.5, 0.0], [0.0, 0.0, 0.0])
+    (point,) = stream.on_trajectory(SECOND, "", NAMES, [planned]).points
+    assert point.velocities.tolist() == [0.0, 0.5, 0.0]
+    assert point.accelerations.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_at_the_border_the_speed_is_that_of_the_plan(stream):
+    """The correction has faded with a continuous slope; beyond the border there is none.
+
+    The differences reach back into the fade by a seventh of its width.
+    """
+    _, upper = stream.model.table.workspace.rectangle
+    planned = planned_point(3, [0.0, 0.0, upper[0] - 1e-4], [0.0, 0.0, 1.0])
+    (point,) = stream.on_trajectory(SECOND, "", NAMES, [planned]).points
+    assert point.velocities == pytest.approx([0.0, 0.0, 1.0], abs=0.01)
+
+
+def test_beside_the_domain_a_point_counts_as_uncorrected():
+    """c(x) = x + x below zero, and no answer above: half of the slope is seen."""
+
+    def path(theta):
+        if theta[0] > 0.0:
+            raise UnreachablePoseError("beyond")
+        return 2.0 * theta
+
+    point = corrected_point(path, (0, 1), planned_point(2, [0.0, 0.0], [1.0, 0.0]))
+    assert point.velocities == pytest.approx([1.5, 0.0])
+
+
+BAD = {
+    "short": ((0.0, 0.0), (), (), "2 positions for 3 names"),
+    "nan": ((0.0, float("nan"), 0.0), (), (), "positions .* are not finite"),
+    "speed": ((0.0,) * 3, (0.0, 0.0, float("inf")), (), "velocities .* are not finite"),
+    "beyond": ((0.0,) * 3, (0.0, 0.0, 1e308), (), "beyond 1e.09"),
+    "speeds": ((0.0,) * 3, (0.0,), (), "1 velocities for 3 names"),
+    "acceleration": ((0.0,) * 3, (), (float("nan"),) * 3, "accelerations .* are not finite"),
+}
+
+
+@pytest.mark.parametrize(("positions", "speeds", "accelerations", "text"), BAD.values(), ids=BAD)
+def test_a_point_that_is_none_is_refused(positions, speeds, accelerations, text):
+    with pytest.raises(InputError, match=text):
+        planned_point(3, positions, speeds, accelerations)
