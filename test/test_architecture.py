@@ -36,6 +36,7 @@ LIBRARIES_USED = {
     "fem": ROBOT | {"netgen", "skfem", "pymetis"},
     "web": ROBOT | {"nicegui", "plotly"},
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
+    "workflows": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
 }
 DRAWING = "matplotlib"
 

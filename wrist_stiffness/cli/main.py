@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from wrist_stiffness import __version__
-from wrist_stiffness.cli import cell, explain, predict, replay, simulate, table
+from wrist_stiffness.cli import cell, explain, plan, predict, replay, simulate, table
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -32,7 +32,14 @@ Three commands to begin with (each uses the shipped wrist where none is named):
 Exit codes: 0 done, 1 the answer is no, 2 wrong use or bad input."""
 
 
-EXTRA_OF = {"netgen": "fem", "skfem": "fem", "pymetis": "fem", "matplotlib": "plot"}
+EXTRA_OF = {
+    "netgen": "fem",
+    "skfem": "fem",
+    "pymetis": "fem",
+    "matplotlib": "plot",
+    "distributed": "fleet",
+    "cloudpickle": "fleet",
+}
 """The extra that installs a library which a robot does without."""
 
 
@@ -48,7 +55,7 @@ class CommandModule(Protocol):
         """Add this command's parser."""
 
 
-COMMANDS: tuple[CommandModule, ...] = (table, predict, explain, simulate, replay, cell)
+COMMANDS: tuple[CommandModule, ...] = (table, predict, explain, simulate, replay, plan, cell)
 
 
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:

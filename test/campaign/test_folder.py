@@ -1,0 +1,45 @@
+"""Which recordings an argument names."""
+
+import pytest
+
+from wrist_stiffness.campaign.folder import recordings_in
+from wrist_stiffness.errors import RecordingError
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    """Two bare files, a rosbag2 folder, one that a killed recorder left, and what is none."""
+    for name in ("b.mcap", "a.mcap", "notes.txt"):
+        (tmp_path / name).touch()
+    for folder, file in (("day_2", "metadata.yaml"), ("day_1", "day_1_0.mcap"), ("cad", "x.step")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / file).touch()
+    return tmp_path
+
+
+def test_a_folder_stands_for_the_recordings_in_it_by_name(campaign):
+    assert [path.name for path in recordings_in([campaign])] == [
+        "a.mcap",
+        "b.mcap",
+        "day_1",
+        "day_2",
+    ]
+
+
+@pytest.mark.parametrize("name", ["day_1", "day_2", "a.mcap"])
+def test_a_recording_stands_for_itself(campaign, name):
+    assert recordings_in([campaign / name]) == [campaign / name]
+
+
+def test_none_is_named_twice(campaign):
+    assert len(recordings_in([campaign / "b.mcap", campaign])) == 4
+
+
+def test_any_other_file_is_left_to_the_reader_which_says_what_it_is(campaign):
+    assert recordings_in([campaign / "notes.txt"]) == [campaign / "notes.txt"]
+
+
+@pytest.mark.parametrize(("name", "reason"), [("cad", "no recording"), ("x", "does not exist")])
+def test_a_folder_without_recordings_is_an_error(campaign, name, reason):
+    with pytest.raises(RecordingError, match=reason):
+        recordings_in([campaign / name])

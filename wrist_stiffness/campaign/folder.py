@@ -1,0 +1,61 @@
+"""Which recordings an argument names: one, or all of a folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording.reader import METADATA_FILE
+
+STORAGE = ".mcap"
+
+
+def is_recording(path: Path) -> bool:
+    """Tell whether a path is one recording: an MCAP file, or a rosbag2 folder.
+
+    A recorder that was killed leaves no `metadata.yaml`; its files still bear the folder's name and
+    a number.
+    """
+    if not path.is_dir():
+        return path.suffix == STORAGE
+    if (path / METADATA_FILE).is_file():
+        return True
+    storage = list(path.glob(f"*{STORAGE}"))
+    own = re.compile(re.escape(path.name) + r"_\d+")
+    return bool(storage) and all(own.fullmatch(file.stem) for file in storage)
+
+
+def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
+    """Return the recordings that paths name: a folder of recordings stands for all of them.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Recordings, or folders in which recordings lie side by side.
+
+    Returns
+    -------
+    list of Path
+        Folders' recordings by name; none twice.
+
+    Raises
+    ------
+    RecordingError
+        If a path does not exist, or a folder holds no recording.
+    """
+    found: dict[Path, None] = {}
+    for path in map(Path, paths):
+        if not path.exists():
+            raise RecordingError(f"{path} does not exist")
+        if is_recording(path) or not path.is_dir():
+            found[path] = None
+            continue
+        inside = sorted(entry for entry in path.iterdir() if is_recording(entry))
+        if not inside:
+            raise RecordingError(
+                f"{path} holds no recording: neither rosbag2 folders nor {STORAGE} files"
+            )
+        found |= dict.fromkeys(inside)
+    return list(found)

@@ -1,0 +1,185 @@
+"""One function over many recordings, on the processors of this machine or of a Dask cluster.
+
+For a command that takes a folder of recordings, each of a wrist of its own::
+
+    def summary(path: Path, model: str) -> dict[str, float]:     # at the top of a module
+        session = read_session(path, load_model(model).table)
+        return {"poses": len(session)}
+
+    rows = map_recordings(partial(summary, model="wrist.yaml"), recordings_in([folder]), ...)
+
+Workers are processes of their own: function and result are pickled, so the function is one of a
+module and everything else reaches it by `functools.partial`.  Paths are opened where the worker
+runs; a cluster needs them on a file system that all see.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from itertools import islice
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from wrist_stiffness.errors import InputError, WristError
+
+Result = TypeVar("Result")
+Progress = Callable[[int, int], None]
+
+CONNECT_S = 10.0
+
+NAME = "wrist_stiffness"
+
+
+@dataclass(frozen=True)
+class FleetRow(Generic[Result]):
+    """What one recording gave.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    result : any
+        What the function returned; None where it failed.
+    error : str
+        Why it failed, one line; empty where it did not.
+    """
+
+    path: Path
+    result: Result | None
+    error: str = ""
+
+
+def map_recordings(
+    function: Callable[[Path], Result],
+    paths: Sequence[Path],
+    scheduler_address: str | None = None,
+    workers: int | None = None,
+    progress: Progress = lambda done, of: None,
+) -> list[FleetRow[Result]]:
+    """Call a function of one recording for each of many.
+
+    Parameters
+    ----------
+    function : callable
+        Of a path; can be pickled.
+    paths : sequence of Path
+        Recordings (see `campaign.folder.recordings_in`).
+    scheduler_address : str, optional
+        Of a running Dask scheduler, `tcp://HOST:PORT`; processes of this machine if None.
+    workers : int, optional
+        Processes on this machine; one for each processor, at most one for each recording, if None.
+    progress : callable
+        Told recordings done and in all.
+
+    Returns
+    -------
+    list of FleetRow
+        In the order of the paths.  A recording that fails is a row with its error, not a stop.
+
+    Raises
+    ------
+    InputError
+        If no scheduler answers at the address, or its workers have not this package's version.
+    ModuleNotFoundError
+        Without the extra `fleet`, where more than one recording is given or a scheduler.
+    """
+    if len(paths) <= 1 and scheduler_address is None:
+        return [attempt(function, path) for path in paths]
+    import cloudpickle
+    from distributed import as_completed
+
+    rows: list[FleetRow[Result]] = [FleetRow(path, None) for path in paths]
+    # As bytes: a worker that cannot load the function says so instead of dying over it.
+    pickled = cloudpickle.dumps(function)
+    with _client(scheduler_address, workers or _processors(len(paths))) as client:
+        waiting = iter(range(len(paths)))
+        number: dict[Any, int] = {}
+
+        def submitted(count: int) -> list[Any]:
+            new = {
+                client.submit(_answer, pickled, paths[i], pure=False): i
+                for i in islice(waiting, count)
+            }
+            number.update(new)
+            return list(new)
+
+        # One recording for each thread at a time: a worker that dies over one takes no other along.
+        running = as_completed(submitted(sum(client.nthreads().values())))
+        for done, future in enumerate(running, 1):
+            i = number.pop(future)
+            rows[i] = _row(paths[i], future)
+            progress(done, len(paths))
+            running.update(submitted(1))
+    return rows
+
+
+def attempt(function: Callable[[Path], Result], path: Path) -> FleetRow[Result]:
+    """Call a function of one recording; whatever goes wrong becomes the row's error."""
+    try:
+        return FleetRow(path, function(path))
+    except WristError as error:
+        return FleetRow(path, None, " ".join(str(error).split()))
+    except Exception as error:
+        # A fault of one wrist's code path must not take the rest of the fleet's table with it.
+        return FleetRow(path, None, f"{type(error).__name__}: {' '.join(str(error).split())}")
+
+
+def _processors(most: int) -> int:
+    return min(most, len(os.sched_getaffinity(0)))
+
+
+@contextmanager
+def _client(scheduler_address: str | None, workers: int) -> Iterator[Any]:
+    from distributed import Client, LocalCluster
+
+    if scheduler_address is None:
+        with (
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+            ) as local,
+            Client(local) as client,
+        ):
+            yield client
+        return
+    try:
+        client = Client(scheduler_address, timeout=CONNECT_S)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {scheduler_address} within {CONNECT_S:g} s"
+        ) from error
+    with client:
+        _require_same_version(client, scheduler_address)
+        yield client
+
+
+def _require_same_version(client: Any, scheduler_address: str) -> None:
+    """Refuse a cluster without workers, or with workers that compute something else."""
+    try:
+        found = set(client.run(version, NAME).values())
+    except PackageNotFoundError as error:
+        raise InputError(f"{scheduler_address}: {NAME} is not installed at its workers") from error
+    if not found:
+        raise InputError(f"{scheduler_address}: the Dask scheduler has no workers")
+    if found != {version(NAME)}:
+        raise InputError(
+            f"{scheduler_address}: its workers have {NAME} {', '.join(sorted(found))}, this "
+            f"machine has {version(NAME)}"
+        )
+
+
+def _answer(pickled: bytes, path: Path) -> FleetRow[Any]:
+    return attempt(lambda one: pickle.loads(pickled)(one), path)
+
+
+def _row(path: Path, future: Any) -> FleetRow[Any]:
+    """Return what a worker answered; one that died took the recording's row with it."""
+    if future.status == "finished":
+        row: FleetRow[Any] = future.result()
+        return row
+    reason = " ".join(str(future.exception()).split())
+    return FleetRow(path, None, f"the worker died: {reason}")
