@@ -39,8 +39,8 @@ def main() -> None:
     path = sys.argv[1] if len(sys.argv) > 1 else shipped_file("config/palmieri2015_model.yaml")
     model = load_model(path)
     table = model.table
-    rng = np.random.default_rng(0)
-    theta = rng.uniform(-0.6, 0.6, (SAMPLES, 2))
+    second = 1e-3 * np.arange(SAMPLES)
+    theta = 0.6 * np.stack([np.sin(2.0 * np.pi * second), np.cos(3.0 * np.pi * second)], axis=1)
     load = Load(np.array([0.3, -0.2, -0.8, 0.005, 0.0, -0.01]))
     settings = StreamSettings(contact=ContactSettings("gain", gain=1.0))
     predicting = PredictionStream(model, settings)

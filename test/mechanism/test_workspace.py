@@ -123,7 +123,7 @@ def test_angles_that_are_not_finite_lie_nowhere(workspace, bad):
 def test_configuration_inside_is_the_forward_kinematics(workspace):
     theta = np.array([0.3, -0.2])
     inside = workspace.configuration(theta)
-    assert np.array_equal(inside.bodies, ORTHOGONAL.forward(theta).bodies)
+    assert np.allclose(inside.bodies, ORTHOGONAL.forward(theta).bodies, rtol=0.0, atol=1e-15)
 
 
 def test_configuration_names_a_pose_outside_the_rectangle(workspace):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.rigid_motion import log_motion
+from wrist_stiffness.mechanism.single_motion import log_one
 from wrist_stiffness.model.error_model import Prediction
 
 TOLERANCE = 1e-10
@@ -77,14 +77,14 @@ def correct(
     """
     prediction = predict(command)
     desired = prediction.configuration
-    task = objective.matrix(desired)
-    step_of_task = np.linalg.pinv(task[:, 3:] @ mechanism.jacobian(desired))
-    before = residual_twist(prediction, desired.platform)
+    cancelling = objective.cancelling(desired, mechanism.jacobian(desired))
+    # Where the command itself is driven, what remains is the error.
+    before = prediction.twist
     reached = Correction(np.zeros(2), before, before, prediction)
     size = np.inf
     for _ in range(MAX_ITERATIONS):
-        step = -step_of_task @ (task @ reached.after)
-        last, size = size, float(np.max(np.abs(step)))
+        step = -cancelling.dot(reached.after)
+        last, size = size, max(map(abs, step.tolist()))
         # The steps shrink by a constant factor, so the last two of them bound what is missing.
         if size < TOLERANCE or (size < last < np.inf and size**2 < TOLERANCE * (last - size)):
             return as_applied(mechanism, reached, reached.delta + step)
@@ -119,8 +119,8 @@ def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Co
     """
     jacobian = mechanism.jacobian(correction.prediction.configuration)
     after = correction.after.copy()
-    after[3:] += jacobian @ (delta - correction.delta)
-    return replace(correction, delta=delta, after=after)
+    after[3:] += jacobian.dot(delta - correction.delta)
+    return Correction(delta, correction.before, after, correction.prediction)
 
 
 def residual_twist(prediction: Prediction, desired: Array) -> Array:
@@ -139,4 +139,4 @@ def residual_twist(prediction: Prediction, desired: Array) -> Array:
         Twist at O in F [m, rad].
     """
     rotation, shift = prediction.motion
-    return log_motion(rotation @ prediction.configuration.platform @ desired.T, shift)
+    return log_one(rotation.dot(prediction.configuration.platform).dot(desired.T), shift)

@@ -15,6 +15,9 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.vectors import skew, triad
 
+DEPENDENT = 1e-6
+"""The motors' columns of the task are dependent below this ratio of their singular values."""
+
 ObjectiveName = Literal["pointing", "orientation", "tool_point"]
 OBJECTIVES: tuple[ObjectiveName, ...] = ("pointing", "orientation", "tool_point")
 
@@ -49,3 +52,43 @@ class Objective:
             start = np.eye(3)[np.argmin(np.abs(normal))]
             rotation = triad(normal, start)[:, 1:].T
         return np.hstack([np.zeros_like(rotation), rotation])
+
+    def cancelling(self, configuration: Configuration, jacobian: Array) -> Array:
+        """Return the matrix from a residual twist at O in F to the motor angles that cancel it.
+
+        Parameters
+        ----------
+        configuration : Configuration
+            Where the platform is.
+        jacobian : (3, 2) float
+            Of the platform's angular velocity there.
+
+        Returns
+        -------
+        (2, 6) float
+            (M J)^+ M with the task's `matrix` M and the twists J of the motors, for the least
+            squares; no motion where the motors do not reach the task.
+        """
+        matrix = np.zeros((2, 6))
+        if self.name == "tool_point":
+            point = skew(configuration.platform @ self.tool_point)
+            matrix[:, :3] = inverse = pseudo_inverse(-point @ jacobian)
+            matrix[:, 3:] = -inverse @ point
+        else:
+            if self.name == "pointing":
+                # Turns about the normal do not count.
+                normal = configuration.platform.dot(self.normal)
+                jacobian = jacobian - normal[:, None] * normal.dot(jacobian)
+            matrix[:, 3:] = pseudo_inverse(jacobian)
+        return matrix
+
+
+def pseudo_inverse(columns: Array) -> Array:
+    """Return the pseudo-inverse (2, n) of two columns (n, 2)."""
+    (first, product), (_, second) = columns.T.dot(columns).tolist()
+    determinant = first * second - product * product
+    if determinant <= (DEPENDENT * max(first, second)) ** 2:
+        return np.linalg.pinv(columns)
+    inverse = np.array([[second, -product], [-product, first]])
+    inverse /= determinant
+    return inverse.dot(columns.T)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import cos, sin, sqrt
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.mechanism.single_motion import exp_one
 from wrist_stiffness.mechanism.vectors import skew
 
 
@@ -24,10 +26,10 @@ def pose_of_twist(twist: Array) -> tuple[Array, Array]:
     quaternion : (4,) float
         Rotation, x y z w with w >= 0 for angles up to pi.
     """
-    half = 0.5 * float(np.sqrt(twist[3:] @ twist[3:]))
-    # sinc is of pi x: sin(half) / half, without a division by zero.
-    vector = 0.5 * np.sinc(half / np.pi) * twist[3:]
-    return exp_twist(twist)[1], np.append(vector, np.cos(half))
+    u, v, w = twist[3:].tolist()
+    half = 0.5 * sqrt(u * u + v * v + w * w)
+    scale = 0.5 * sin(half) / half if half > 0.0 else 0.5
+    return exp_one(twist)[1], np.array([scale * u, scale * v, scale * w, cos(half)])
 
 
 def seen_from(point: Array) -> Array:

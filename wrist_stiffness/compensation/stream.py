@@ -148,5 +148,7 @@ class PredictionStream(Stream):
         prediction = running.advance(stamp_ns, theta, load, theta_dot)
         if self.settings.load_noise is not None:
             added = load_covariance(running.model, prediction, load, self.settings.load_noise)
-            prediction = replace(prediction, covariance=prediction.covariance + added)
+            if prediction.added_covariance is not None:
+                added = added + prediction.added_covariance
+            prediction = replace(prediction, added_covariance=added)
         return PredictedSample(stamp_ns, load_stamp_ns, prediction)

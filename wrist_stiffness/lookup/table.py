@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import hypot
 from typing import Any, Literal
-
-import numpy as np
 
 from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.biharmonic import BiharmonicSpline, Kernel
@@ -20,6 +19,7 @@ from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
 from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism
+from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.mechanism.statics import ContactOperators, component_shares, contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
 
@@ -116,6 +116,11 @@ class Table:
         """Spline of the rated load's s and phi: the paper's maps."""
         return BiharmonicSpline.fit(self.nodes, self.map_values, self.header.kernel)
 
+    @cached_property
+    def single_pose(self) -> SinglePoseStatics:
+        """The closed form for one pose at a time."""
+        return SinglePoseStatics(self.components, self.geometry.gravity)
+
     def operators_at(
         self, configuration: Configuration, evaluation: Evaluation | None = None
     ) -> ContactOperators:
@@ -146,7 +151,7 @@ class Table:
 
         Parameters
         ----------
-        wrench : (..., 6) float
+        wrench : (6,) float
             Load on the platform at O [N, N m].
 
         Raises
@@ -155,8 +160,8 @@ class Table:
             If a force or a moment is larger than the geometry's limits or not finite.
         """
         limits = self.geometry.limits
-        halves = np.linalg.norm(np.reshape(wrench, (*np.shape(wrench)[:-1], 2, 3)), axis=-1)
-        force, moment = (float(np.max(halves[..., i], initial=0.0)) for i in range(2))
+        components = wrench.tolist()
+        force, moment = hypot(*components[:3]), hypot(*components[3:])
         if not force <= limits.force:
             raise LoadRangeError(
                 f"load: force {force:.3g} N at O, the table ends at {limits.force:g} N"

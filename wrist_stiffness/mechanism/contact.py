@@ -8,8 +8,11 @@ from any guess of the active set; its fallback, one change at a time, always end
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -21,6 +24,8 @@ PATIENCE = 5
 """Block exchanges without progress before changes are made one at a time."""
 
 MAX_PIVOTS = 5000
+
+NOT_DEFINITE = "contact: the flexibility of the flanges is singular or not positive definite"
 
 BLOCK_STEPS = 12
 """Block exchanges for many poses together before the rest are solved one by one."""
@@ -58,29 +63,34 @@ def solve_contact(
         raise InputError(f"contact: {m} gaps, but a flexibility of shape {approach.shape}{guess}")
     if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(approach))):
         raise InputError("contact: a gap or a flexibility is not finite")
-    closed = np.zeros(m, dtype=bool) if active is None else active.copy()
-    force = np.zeros(m)
-    if not np.any(closed) and np.all(gap >= 0.0):
-        return force, closed
-    length_scale = float(np.max(np.abs(gap)))
-    softest = float(np.max(np.diagonal(approach)))
+    return settle(approach, gap, active)
+
+
+def settle(
+    approach: Array, gap: Array, guess: NDArray[np.bool_] | None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve the contact problem of finite inputs that belong together (see `solve_contact`).
+
+    The forces are those of the sectors that are found, whatever the guess was: it leaves no trace.
+    """
+    gaps = gap.tolist()
+    if min(gaps, default=0.0) >= 0.0:
+        return np.zeros(len(gap)), np.zeros(len(gap), dtype=bool)
+    closed = gap < 0.0 if guess is None else guess
+    length_scale = max(max(gaps), -min(gaps))
+    softest = max(approach.diagonal().tolist())
     if softest <= 0.0:
-        raise InputError("contact: the flexibility of the flanges is not positive definite")
-    force_scale = length_scale / softest
-    fewest, patience = m + 1, PATIENCE
+        raise InputError(NOT_DEFINITE)
+    least_opening = -RELATIVE_TOLERANCE * length_scale
+    least_force = least_opening / softest
+    fewest, patience = len(gap) + 1, PATIENCE
     for _ in range(MAX_PIVOTS):
-        force[:] = 0.0
-        if np.any(closed):
-            try:
-                force[closed] = np.linalg.solve(approach[np.ix_(closed, closed)], -gap[closed])
-            except np.linalg.LinAlgError as error:
-                raise InputError("contact: the flexibility of the flanges is singular") from error
-        opening = gap + approach @ force
-        wrong = np.where(
-            closed,
-            force < -RELATIVE_TOLERANCE * force_scale,
-            opening < -RELATIVE_TOLERANCE * length_scale,
-        )
+        force = held_force(approach, gap, closed)
+        opening = gap + approach.dot(force)
+        # What is held is closed but for rounding, and what is open has no force.
+        if min(force.tolist()) >= least_force and min(opening.tolist()) >= least_opening:
+            return np.maximum(force, 0.0), closed
+        wrong = np.where(closed, force < least_force, opening < least_opening)
         count = int(np.count_nonzero(wrong))
         if count == 0:
             return np.maximum(force, 0.0), closed
@@ -90,10 +100,35 @@ def solve_contact(
             patience -= 1
         else:
             wrong[: -1 - int(np.argmax(wrong[::-1]))] = False
-        closed ^= wrong
+        closed = closed ^ wrong
     raise InputError(
         f"contact: no solution after {MAX_PIVOTS} exchanges; is the matrix positive definite?"
     )
+
+
+def held_force(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
+    """Return the forces that close the given sectors of one pose, of either sign, (m,) [N].
+
+    Raises
+    ------
+    InputError
+        If the flexibility of these sectors is not positive definite.
+    """
+    force = np.zeros(len(gap))
+    places, square = _places(closed.tobytes())
+    if len(places):
+        _, held, failed = dposv(approach.take(square), gap.take(places))
+        if failed:
+            raise InputError(NOT_DEFINITE)
+        force[places] = -held
+    return force
+
+
+@lru_cache(maxsize=256)
+def _places(closed: bytes) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return where held sectors stand in a vector and in a raveled square matrix."""
+    places = np.flatnonzero(np.frombuffer(closed, dtype=bool))
+    return places, len(closed) * places[:, None] + places
 
 
 def solve_contacts(approach: Array, gap: Array) -> tuple[Array, NDArray[np.bool_]]:

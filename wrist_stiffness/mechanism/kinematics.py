@@ -156,6 +156,12 @@ class Mechanism:
         return along @ columns, (IDENTITY - along) @ columns, skew(axes) @ columns
 
     @cached_property
+    def _driving(self) -> tuple[Array, Array, Array]:
+        """Motor axes as columns (3, 2), the part that is free of b, the signs of the rest."""
+        axes = np.stack([self.a1, self.a2], axis=-1)
+        return axes, axes * [1.0, 0.0], np.array([-1.0, 1.0])
+
+    @cached_property
     def _home_inverse(self) -> Array:
         """Inverse of the rows (b0, c0, b0 x c0) and (d0, c0, d0 x c0), (2, 3, 3)."""
         driven = np.stack([self.b0, self.d0])
@@ -292,10 +298,9 @@ class Mechanism:
                 f"|D| below {HOME_TOLERANCE:.0e}, "
                 "the axes of joint_2, joint_3 and joint_4 are coplanar"
             )
-        to_b = configuration.dual[..., 0, :]
-        first = self.a1 - configuration.b * (to_b @ self.a1)[..., None]
-        second = configuration.b * (to_b @ self.a2)[..., None]
-        return np.stack([first, second], axis=-1)
+        axes, direct, sign = self._driving
+        about_b = sign * (configuration.dual[..., 0, :] @ axes)
+        return direct + configuration.b[..., :, None] * about_b[..., None, :]
 
     def tilt(self, theta: Array) -> Array:
         """Angle of the platform normal from home [rad], (...) for `theta` (..., 2)."""

@@ -12,6 +12,7 @@ from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism, angles_text
+from wrist_stiffness.mechanism.single_pose import SinglePoseKinematics
 from wrist_stiffness.mechanism.vectors import triad
 
 BORDER_POINTS = 721
@@ -57,6 +58,15 @@ class Workspace:
         lower, upper = self.operative_border.min(axis=0), self.operative_border.max(axis=0)
         centre, half = (lower + upper) / 2.0, (upper - lower) / 2.0
         return centre - self.limits.map_margin * half, centre + self.limits.map_margin * half
+
+    @cached_property
+    def _single_pose(self) -> SinglePoseKinematics:
+        return SinglePoseKinematics(self.mechanism)
+
+    @cached_property
+    def _edges(self) -> list[list[float]]:
+        """Lower and upper motor angles of the domain's rectangle by motor [rad]."""
+        return np.transpose(self.rectangle).tolist()
 
     def operative(self, theta: Array) -> NDArray[np.bool_]:
         """Tell which poses lie in the operative workspace, (...) for `theta` (..., 2) [rad]."""
@@ -122,10 +132,14 @@ class Workspace:
             If |D| is below its limit.
         """
         theta = np.asarray(theta, dtype=float)
-        configuration = self.mechanism.forward(theta)
-        lower, upper = self.rectangle
-        if not ((theta >= lower) & (theta <= upper)).all():
-            low, high = np.degrees(lower), np.degrees(upper)
+        configuration = self._single_pose.forward(theta)
+        if configuration is None:
+            # It says why there is none.
+            configuration = self.mechanism.forward(theta)
+        (first_low, first_high), (second_low, second_high) = self._edges
+        theta_1, theta_2 = theta.tolist()
+        if not (first_low <= theta_1 <= first_high and second_low <= theta_2 <= second_high):
+            low, high = np.degrees(self.rectangle)
             raise UnreachablePoseError(
                 f"motor angles {angles_text(theta)} outside the table's domain "
                 f"({low[0]:.2f} to {high[0]:.2f}, {low[1]:.2f} to {high[1]:.2f})"

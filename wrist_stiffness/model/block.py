@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Configuration
-from wrist_stiffness.mechanism.vectors import block_diagonal
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class Load:
         """Return the wrench in F at a configuration, (6,) [N, N m]."""
         if not self.on_platform:
             return self.wrench
-        return block_diagonal(configuration.platform) @ self.wrench
+        return (self.wrench.reshape(2, 3) @ configuration.platform.T).ravel()
 
 
 @dataclass(frozen=True)

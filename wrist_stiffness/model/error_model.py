@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.kinematics import Configuration
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.mechanism.single_motion import exp_one
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import Memory, evaluate
@@ -34,29 +34,38 @@ class Prediction:
     ----------
     twist : (6,) float
         At O in F, own weight included [m, rad].
-    covariance : (6, 6) float
-        Of the twist, from the table's stated error, the encoder step and the effects' parameters.
     configuration : Configuration
         The rigid wrist.
     active : (m,) bool
         Flange sectors in contact.
     measured : (6,) float
         What the pose sensor would say of the twist; the same without effects of the sensor.
+    model : ErrorModel
+        Made the prediction.
+    added_covariance : (6, 6) float, optional
+        Covariance beyond the model's table: of the effects' parameters, of the load.
     warnings : tuple of str
         Effects that were left out or have left first order.
     """
 
     twist: Array
-    covariance: Array
     configuration: Configuration
     active: NDArray[np.bool_]
     measured: Array
+    model: ErrorModel = field(repr=False)
+    added_covariance: Array | None = None
     warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the twist, (6, 6); made where it is asked for, as a search does not."""
+        own = self.model.table_covariance(self.configuration, self.twist)
+        return own if self.added_covariance is None else own + self.added_covariance
 
     @property
     def motion(self) -> tuple[Array, Array]:
         """Rotation R_err (3, 3) and shift s (3,) [m]."""
-        return exp_twist(self.twist)
+        return exp_one(self.twist)
 
     @property
     def shift_norm(self) -> float:
@@ -201,15 +210,13 @@ class ErrorModel:
         configuration = self.table.workspace.configuration(theta)
         wrench = load.in_base(configuration)
         self.table.check_load(wrench)
-        operators = self.table.operators_at(configuration, self.evaluation)
-        response = respond(operators, wrench, active=active)
-        return Prediction(
-            response.twist,
-            self.table_covariance(configuration, response.twist),
-            configuration,
-            response.active,
-            response.twist,
-        )
+        if self.evaluation == "closed_form":
+            twist, _, active = self.table.single_pose.respond(configuration, wrench, active)
+        else:
+            operators = self.table.operators_at(configuration, self.evaluation)
+            response = respond(operators, wrench, active=active)
+            twist, active = response.twist, response.active
+        return Prediction(twist, configuration, active, twist, self)
 
     def batch(self, block: Block) -> BlockPrediction:
         """Predict the pose error of a whole recording, in bounded memory.
@@ -293,12 +300,16 @@ class ErrorModel:
         (6, 6) float
             Translation first, in F.
         """
-        jacobian = np.zeros((6, 2))
-        jacobian[3:] = self.table.mechanism.jacobian(configuration)
+        jacobian = self.table.mechanism.jacobian(configuration)
         step = self.table.geometry.limits.encoder_step
-        relative = self.table.header.errors["stated_relative"]
-        scale = np.repeat([np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])], 3)
-        return jacobian @ jacobian.T * step**2 / 12.0 + np.diag((relative * scale) ** 2 / 3.0)
+        covariance = np.zeros((6, 6))
+        covariance[3:, 3:] = jacobian.dot(jacobian.T)
+        covariance *= step**2 / 12.0
+        each = self.table.header.errors["stated_relative"] ** 2 / 3.0
+        x, y, z, u, v, w = twist.tolist()
+        shift, turn = each * (x * x + y * y + z * z), each * (u * u + v * v + w * w)
+        covariance.ravel()[::7] += [shift, shift, shift, turn, turn, turn]
+        return covariance
 
 
 class Session:
@@ -377,7 +388,7 @@ class Session:
         model.table.check_load(sample.load.wrench)
         result, later = evaluate(model, sample.block, memory)
         twist = result.twist[0]
-        covariance = model.table_covariance(configuration, twist)
+        covariance = np.zeros((6, 6))
         others = []
         for number, other in enumerate(model.variations):
             before = None if self._others is None else self._others[number]
@@ -385,7 +396,13 @@ class Session:
             others.append(after)
             covariance += np.outer(moved.twist[0] - twist, moved.twist[0] - twist)
         prediction = Prediction(
-            twist, covariance, configuration, result.active[0], result.measured[0], result.warnings
+            twist,
+            configuration,
+            result.active[0],
+            result.measured[0],
+            model,
+            covariance,
+            result.warnings,
         )
         return prediction, later, others
 
