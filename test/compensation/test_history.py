@@ -205,6 +205,26 @@ def test_speeds_are_used_where_given_and_else_differences(model, speedy, names, 
         assert found[0] == pytest.approx(1e-3 * wanted, rel=1e-3)
 
 
+def test_a_frozen_contact_comes_back_neither_by_the_residual_nor_by_the_memory(model):
+    """Creep would follow the contact force; what is corrected for is the payload alone."""
+    parameters = {"delayed_percent": Estimate(80.0), "time_constant_s": Estimate(1.0)}
+    creeping = model.with_effects(Effect(find_law("creep"), "joint_3", parameters))
+    quick = replace(AT_ONCE.safety, deadband_steps=0.0)
+    commands = []
+    for push in (0.0, 3.0):
+        stream = CorrectionStream(creeping, StreamSettings(safety=quick), enabled=True)
+        for i in range(30):
+            stamp = SECOND + i * SECOND // 10
+            force = DOWN[:3] * (1.0 + (push if i >= 10 else 0.0))
+            stream.loads.add(stamp, "wrist_base", force, DOWN[3:])
+            command = stream.on_command(stamp, "", NAMES, [0.1, 0.2])
+        assert stream.contact.in_contact is (push > 0.0)
+        commands.append(command)
+    free, pushed = commands
+    assert np.array_equal(free.theta, pushed.theta)
+    assert np.array_equal(free.correction.after, pushed.correction.after)
+
+
 def test_a_temperature_that_is_too_old_is_dropped_with_a_word(warm, model):
     stream = PredictionStream(warm, StreamSettings(signal_age_limit_s=2.0))
     stream.temperatures.add("link_1", SECOND, 60.0)

@@ -1,29 +1,33 @@
 """Whether a live run and its replay are equal to the bit, and why where they are not.
 
 Replay knows every load by its stamp.  A live node may see a load only after the joint state to
-which it belongs, and then predicts with the load before: that is the one difference there may be.
+which it belongs, and then predicts with the load before: no other cause of a difference is known.  A
+model with a memory carries it on, so the live run is followed sample by sample.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from wrist_stiffness.compensation.intake import BASE_FRAME
+from wrist_stiffness.compensation.load_history import LoadIntake
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.errors import WristError
-from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.errors import StaleLoadError, WristError
+from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.recording.messages import (
-    Header,
-    JointState,
-    PoseWithCovarianceStamped,
-    WrenchStamped,
-)
+from wrist_stiffness.recording.messages import Header, JointState, PoseWithCovarianceStamped
 from wrist_stiffness.recording.reader import open_recording
-from wrist_stiffness.recording.topics import JOINT_STATES, LOAD_ESTIMATE
+from wrist_stiffness.recording.topics import (
+    COVARIATES,
+    JOINT_STATES,
+    LOAD_ESTIMATE,
+    TEMPERATURES,
+)
 from wrist_stiffness.workflows.replay import pose_message
+from wrist_stiffness.workflows.signals_ahead import SignalsAhead
 
 PREDICTED = "/pose_error_predicted"
 
@@ -40,7 +44,8 @@ class RunComparison:
     equal : int
         Equal to the bit, covariance included.
     late : int
-        Not equal, but equal to the bit with an older load: the right one had not arrived.
+        Not equal, but equal to the bit where an older load is taken, here or, in a model with a
+        memory, earlier: the right one had not arrived.
     unexplained : int
         Not equal for any other reason.
     only_live, only_replay : int
@@ -76,8 +81,8 @@ def compare_runs(live: str | Path, replayed: str | Path, model: str | Path) -> R
     """
     first, second = _predictions(live), _predictions(replayed)
     common = first.keys() & second.keys()
-    different = {stamp: first[stamp] for stamp in common if first[stamp] != second[stamp]}
-    late = _explained_by_late_loads(live, different, model)
+    different = {stamp for stamp in common if first[stamp] != second[stamp]}
+    late = _explained_by_late_loads(live, first, different, model) if different else 0
     return RunComparison(
         equal=len(common) - len(different),
         late=late,
@@ -96,42 +101,54 @@ def _predictions(path: str | Path) -> dict[int, PoseWithCovarianceStamped]:
 
 
 def _explained_by_late_loads(
-    live: str | Path, different: dict[int, PoseWithCovarianceStamped], model: str | Path
+    live: str | Path,
+    published: Mapping[int, PoseWithCovarianceStamped],
+    different: set[int],
+    model: str | Path,
 ) -> int:
-    if not different:
-        return 0
-    states: dict[int, JointState] = {}
-    loads: list[WrenchStamped] = []
-    for _, _, message in open_recording(live).messages([JOINT_STATES, LOAD_ESTIMATE]):
-        if isinstance(message, JointState) and message.header.stamp_ns in different:
-            states[message.header.stamp_ns] = message
-        elif isinstance(message, WrenchStamped):
-            loads.append(message)
-    loads.sort(key=lambda load: load.header.stamp_ns)
-    error_model = load_model(model)
+    """Follow the live run, taking at every sample the load with which it was published."""
+    source = open_recording(live)
+    signals = [
+        topic.name
+        for topic in source.topics
+        if topic.name in (LOAD_ESTIMATE, TEMPERATURES) or topic.name.startswith(COVARIATES)
+    ]
+    stream = PredictionStream(load_model(model), StreamSettings())
+    running = stream.running_model()
+    ahead = SignalsAhead(
+        source, {name: name for name in signals}, (stream,), lambda topic, reason: None
+    )
     explained = 0
-    for stamp, published in different.items():
-        older = [load for load in loads if load.header.stamp_ns <= stamp][-1 - LATE_LOADS : -1]
-        explained += any(
-            _predicted(error_model, load, states[stamp]) == published for load in older
-        )
+    for _, log_time_ns, state in source.messages([JOINT_STATES]):
+        ahead.read_for(log_time_ns)
+        if not isinstance(state, JointState) or state.header.stamp_ns not in published:
+            continue
+        stamp_ns = state.header.stamp_ns
+        if not running.remembers and stamp_ns not in different:
+            continue
+        motors = stream.settings.motors
+        theta = motors.angles(state.name, state.position)
+        theta_dot = motors.speeds(state.name, state.velocity)
+        header = Header(stamp_ns, BASE_FRAME)
+        for load in _newest_first(stream.loads, stamp_ns):
+            try:
+                made = running.preview(stamp_ns, load, theta_dot)(theta)
+            except WristError:
+                continue
+            if pose_message(header, made.twist, made.covariance) == published[stamp_ns]:
+                explained += stamp_ns in different
+                if running.remembers:
+                    running.advance(stamp_ns, theta, load, theta_dot)
+                break
     return explained
 
 
-def _predicted(
-    model: ErrorModel, load: WrenchStamped, state: JointState
-) -> PoseWithCovarianceStamped | None:
-    stream = PredictionStream(model, StreamSettings())
-    force, torque = load.wrench.force, load.wrench.torque
-    try:
-        stream.loads.add(
-            load.header.stamp_ns,
-            load.header.frame_id,
-            (force.x, force.y, force.z),
-            (torque.x, torque.y, torque.z),
-        )
-        sample = stream.on_joint_state(state.header.stamp_ns, state.name, state.position)
-    except WristError:
-        return None
-    header = Header(state.header.stamp_ns, BASE_FRAME)
-    return pose_message(header, sample.prediction.twist, sample.prediction.covariance)
+def _newest_first(loads: LoadIntake, stamp_ns: int) -> Iterator[Load]:
+    """Yield the load that belongs to a stamp, then those that a late one may have left in use."""
+    for _ in range(1 + LATE_LOADS):
+        try:
+            stamp_ns, load = loads.at(stamp_ns)
+        except StaleLoadError:
+            return
+        yield load
+        stamp_ns -= 1
