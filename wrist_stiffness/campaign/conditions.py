@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.diagnosis.observations import Labels
 from wrist_stiffness.mechanism.components import Array
 
 FEWEST = 4
@@ -19,8 +20,8 @@ UNLOADED = 0.02
 LAGS_S = (300.0, 900.0)
 """Time constants with which a temperature may be felt late."""
 
-OWN = ("time_s", "held_s", "loaded_at_rest", "force", "moment")
-OWN += tuple(f"{name}_{motor}" for name in ("theta", "approach", "speed") for motor in (1, 2))
+OF_MOTORS = tuple(f"{name}_{motor}" for name in ("theta", "approach", "speed") for motor in (1, 2))
+OWN = ("time_s", "held_s", "loaded_at_rest", "force", "moment", *OF_MOTORS)
 FORCES, MOMENTS = ("fx", "fy", "fz"), ("mx", "my", "mz")
 
 
@@ -41,7 +42,11 @@ class Condition:
     subject : str
         What changes: the platform itself, or a gap or give that grows.
     swings : bool
-        Whether the columns are a cosine and a sine.
+        Whether the columns belong to a wave, of which only the part that was seen is told.
+    axis : str
+        What a picture shows it against, with unit.
+    along : (n,) float, optional
+        Its values; the first column where None.
     """
 
     topic: str
@@ -50,6 +55,8 @@ class Condition:
     columns: Array
     subject: str = "the platform"
     swings: bool = False
+    axis: str = ""
+    along: Array | None = None
 
 
 def conditions(observations: Observations) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
@@ -74,7 +81,7 @@ def conditions(observations: Observations) -> tuple[tuple[Condition, ...], tuple
     return varied, tuple(silent)
 
 
-def _varies(columns: Array, sessions: Array) -> bool:
+def _varies(columns: Array, sessions: Labels) -> bool:
     """Tell whether enough units differ from the rest of their session in every column."""
     for column in columns.T:
         size = np.abs(column).max()
@@ -87,7 +94,7 @@ def _varies(columns: Array, sessions: Array) -> bool:
     return True
 
 
-def _every(covariates: Mapping[str, Array], sessions: Array) -> Iterator[Condition]:
+def _every(covariates: Mapping[str, Array], sessions: Labels) -> Iterator[Condition]:
     yield from _approaches(covariates)
     yield from _loads(covariates)
     at_rest = covariates["loaded_at_rest"] - 0.5
@@ -97,12 +104,14 @@ def _every(covariates: Mapping[str, Array], sessions: Array) -> Iterator[Conditi
         "loaded at rest",
         "When the load is put on at rest rather than carried through the move",
         (at_rest * loaded)[:, None],
+        axis="carried (-0.5), unloaded (0), loaded at rest (0.5)",
     )
     yield Condition(
         "hold time",
         "hold time",
         "For every tenfold of the time that pose and load have been held",
         np.log10(np.maximum(covariates["held_s"], 0.1))[:, None],
+        axis="log10 of the time held [s]",
     )
     yield from _motions(covariates)
     yield from _temperatures(covariates, sessions)
@@ -110,7 +119,8 @@ def _every(covariates: Mapping[str, Array], sessions: Array) -> Iterator[Conditi
         "time in the session",
         "time",
         "For every minute of a session",
-        covariates["time_s"][:, None] / 60.0,
+        (covariates["time_s"] - covariates["time_s"].min())[:, None] / 60.0,
+        axis="time [min]",
     )
     for name, column in covariates.items():
         if name not in (*OWN, *FORCES, *MOMENTS) and not name.startswith("T_"):
@@ -126,6 +136,7 @@ def _approaches(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             f"approach of motor {motor}",
             f"When motor {motor} is approached with rising rather than falling angle",
             sense[:, None],
+            axis=f"approach of motor {motor} (-0.5 falling, 0.5 rising)",
         )
         yield Condition(
             "approach direction",
@@ -133,6 +144,7 @@ def _approaches(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             "For every newton more of load",
             (sense * (force - force.mean()))[:, None],
             f"the gap between both approaches of motor {motor}",
+            axis=f"approach of motor {motor} x load above its mean [N]",
         )
 
 
@@ -144,6 +156,7 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             name,
             f"For every newton of load along +{name[1]}",
             covariates[name][:, None],
+            axis=f"{name} [N]",
         )
     for name in MOMENTS:
         yield Condition(
@@ -151,6 +164,7 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             name,
             f"For every 0.01 N m of load about +{name[1]}",
             100.0 * covariates[name][:, None],
+            axis=f"{name} [0.01 N m]",
         )
     for name in FORCES:
         yield Condition(
@@ -159,30 +173,44 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             "For every newton more of load",
             (covariates[name] * (force - force.mean()))[:, None],
             f"the give per newton along {name[1]}",
+            axis=f"{name} x load above its mean [N^2]",
         )
     yield Condition(
-        "load size", "force", "For every newton of load, whatever its direction", force[:, None]
+        "load size",
+        "force",
+        "For every newton of load, whatever its direction",
+        force[:, None],
+        axis="size of the force [N]",
     )
     yield Condition(
         "load size",
         "moment",
         "For every 0.01 N m of load, whatever its direction",
         100.0 * moment[:, None],
+        axis="size of the moment [0.01 N m]",
     )
     loaded = (force > UNLOADED * force.max()) | (moment > UNLOADED * moment.max())
-    yield Condition("zero load", "zero load", "Without any load", (~loaded).astype(float)[:, None])
+    yield Condition(
+        "zero load",
+        "zero load",
+        "Without any load",
+        (~loaded).astype(float)[:, None],
+        axis="loaded (0) or not (1)",
+    )
 
 
 def _motions(covariates: Mapping[str, Array]) -> Iterator[Condition]:
     for motor in (1, 2):
         speed = np.degrees(covariates[f"speed_{motor}"])
         lead = f"For every degree per second of motor {motor}"
-        yield Condition("speed", f"speed of motor {motor}", lead, speed[:, None])
+        axis = f"speed of motor {motor} [deg/s]"
+        yield Condition("speed", f"speed of motor {motor}", lead, speed[:, None], axis=axis)
         yield Condition(
             "speed",
             f"speed of motor {motor} either way",
             f"{lead}, either way",
             np.abs(speed)[:, None],
+            axis=axis,
         )
     for motor in (1, 2):
         theta = covariates[f"theta_{motor}"]
@@ -193,44 +221,54 @@ def _motions(covariates: Mapping[str, Array]) -> Iterator[Condition]:
                 f"With the angle of motor {motor}, like a wave {times} a turn",
                 np.stack([np.cos(order * theta), np.sin(order * theta)], axis=1),
                 swings=True,
+                axis=f"angle of motor {motor} [deg]",
+                along=np.degrees(theta),
             )
 
 
-def _temperatures(covariates: Mapping[str, Array], sessions: Array) -> Iterator[Condition]:
+def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator[Condition]:
     found = False
     for name, column in covariates.items():
         if not name.startswith("T_"):
             continue
         found = True
         place = name[2:].replace("_", " ")
+        axis = f"temperature of {place} [degC]"
         yield Condition(
-            "temperature", place, f"For every kelvin that {place} is warmer", column[:, None]
+            "temperature",
+            place,
+            f"For every kelvin that {place} is warmer",
+            column[:, None],
+            axis=axis,
         )
         for motor in (1, 2):
             theta = covariates[f"theta_{motor}"]
             turned = np.stack([np.cos(theta), np.sin(theta)], axis=1)
-            turned = turned - turned.mean(axis=0)
             yield Condition(
                 "temperature",
                 f"{place} with the angle of motor {motor}",
                 f"With the temperature of {place} and the angle of motor {motor} together",
-                (column - column.mean())[:, None] * turned,
+                (column - column.mean())[:, None] * (turned - turned.mean(axis=0)),
                 swings=True,
+                axis=axis,
+                along=column,
             )
         for lag in LAGS_S:
             late = _lagged(column, covariates["time_s"], sessions, lag)
+            minutes = f"{lag / 60.0:g} min"
             yield Condition(
                 "temperature lag",
-                f"{place}, {lag / 60.0:g} min late",
-                f"For every kelvin that {place} was warmer, felt about {lag / 60.0:g} min late",
+                f"{place}, {minutes} late",
+                f"For every kelvin that {place} was warmer, felt about {minutes} late",
                 # What the temperature itself tells is not asked twice.
                 (late - column)[:, None],
+                axis=f"lagged minus present temperature of {place} [K]",
             )
     if not found:
         yield Condition("temperature", "none", "", np.zeros((len(sessions), 1)))
 
 
-def _lagged(column: Array, time: Array, sessions: Array, lag: float) -> Array:
+def _lagged(column: Array, time: Array, sessions: Labels, lag: float) -> Array:
     """First-order lag of a signal, (n,), beginning each session in balance."""
     late = column.copy()
     for i in range(1, len(column)):
@@ -248,5 +286,7 @@ def _other(name: str, column: Array) -> Condition:
             name,
             f"With {name} at {values[1]:g} rather than {values[0]:g}",
             (column == values[1]).astype(float)[:, None],
+            axis=name,
+            along=column,
         )
-    return Condition(name, name, f"For every unit more of {name}", column[:, None])
+    return Condition(name, name, f"For every unit more of {name}", column[:, None], axis=name)

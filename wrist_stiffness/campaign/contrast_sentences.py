@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.conditions import Condition, conditions
-from wrist_stiffness.campaign.dependence import Dependence, Dependences, Labels, dependences
+from wrist_stiffness.campaign.dependence import Dependence, Dependences, dependences
 from wrist_stiffness.campaign.noise_floor import NoiseFloor
 from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.diagnosis.observations import Labels
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.mechanism.components import Array
 
@@ -181,7 +182,7 @@ class Told:
             lines.append(
                 f"Too short to be told from slow wander of the instrument: "
                 f"{', '.join(self.too_short)}; that takes "
-                f"{FEWEST_SLOW_BLOCKS * SLOW_BLOCK_S / 60.0:g} minutes of recording."
+                f"{np.ceil(FEWEST_SLOW_BLOCKS * SLOW_BLOCK_S / 60.0):g} minutes of recording."
             )
         return tuple(lines)
 
@@ -263,12 +264,12 @@ FAMILIES = 2
 """Fast and slow conditions are asked apart, and both pay for it."""
 
 
-def _span(times: Array, sessions: Array) -> float:
+def _span(times: Array, sessions: Labels) -> float:
     """Time that was recorded in all sessions together [s]."""
     return sum(float(np.ptp(times[sessions == each])) for each in np.unique(sessions))
 
 
-def _slow_motions(times: Array, sessions: Array) -> Array:
+def _slow_motions(times: Array, sessions: Labels) -> Array:
     """Cosines of each session's time down to the period of the wander, (n, p)."""
     columns = []
     for session in np.unique(sessions):
@@ -293,7 +294,7 @@ def _is_slow(columns: Array, constant: Array, trend: Array) -> bool:
 
 
 def _beyond(base: Array, columns: Array) -> Array:
-    """What least squares on the base leaves of the columns; NaN count as nothing."""
+    """Columns without what least squares on the base explains; NaN count as nothing."""
     filled = np.nan_to_num(columns)
     return np.asarray(filled - base @ np.linalg.lstsq(base, filled, rcond=None)[0])
 

@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wrist_stiffness.diagnosis.observations import Labels
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-
-Labels = NDArray[np.int64]
 
 CHANCE = 0.01
 """Probability with which noise may let any condition in."""
@@ -123,7 +121,7 @@ def dependences(
     falls: list[float] = []
     first = np.full(len(conditions), np.nan)
     while len(chosen) < min(MOST, len(conditions)):
-        inside = [column for which in chosen for column in np.flatnonzero(owner == which)]
+        inside = _columns_of(chosen, owner)
         gains = weighted.gains(inside, owner, signs)
         p_values = _corrected(gains)
         if not chosen:
@@ -136,7 +134,7 @@ def dependences(
         chosen.append(best)
         p_entry.append(float(p_values[best]))
         falls.append(float(gains[0, best]))
-    columns = [column for which in chosen for column in np.flatnonzero(owner == which)]
+    columns = _columns_of(chosen, owner)
     slopes, covariance = weighted.fit(columns)
     slopes = slopes / scale[columns][:, None]
     spread = np.repeat(scale[columns], residual.shape[1])
@@ -151,6 +149,11 @@ def dependences(
             )
         )
     return Dependences(tuple(entered), first)
+
+
+def _columns_of(chosen: list[int], owner: Labels) -> list[int]:
+    """Places of the columns of these conditions, in their order."""
+    return [column for which in chosen for column in np.flatnonzero(owner == which).tolist()]
 
 
 def _corrected(gains: Array) -> Array:
@@ -253,8 +256,7 @@ class _Weighted:
 
 
 def _inverse(gram: Array) -> Array:
-    inverse: Array = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
-    return inverse
+    return np.asarray(np.linalg.pinv(gram, rcond=1e-10, hermitian=True), dtype=np.float64)
 
 
 def _basis(columns: Array) -> Array:

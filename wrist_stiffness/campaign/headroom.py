@@ -13,6 +13,7 @@ import numpy as np
 from wrist_stiffness.campaign.conditions import FORCES, MOMENTS, OWN
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.discrepancy import features
+from wrist_stiffness.diagnosis.observations import Labels, Mask
 from wrist_stiffness.diagnosis.outliers import robust_scale
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.mechanism.components import Array
@@ -30,7 +31,7 @@ MOST_UNITS_OF_POSE = 24
 
 
 def held_out_process(observations: Observations, rng: np.random.Generator) -> Array:
-    """What a Gaussian process over the conditions leaves of blocks that it has not seen.
+    """Return what a Gaussian process over the conditions leaves of blocks it has not seen.
 
     Length and signal are those that leave least; a process that helps nowhere leaves all.
 
@@ -69,7 +70,7 @@ def held_out_process(observations: Observations, rng: np.random.Generator) -> Ar
 
 
 def _left(
-    columns: Array, values: Array, told: Array, known: Array, blocks: Array, signal: float
+    columns: Array, values: Array, told: Array, known: Mask, blocks: Labels, signal: float
 ) -> Array:
     """Residuals of ridge regression on all other blocks, (n, m); zero where not known."""
     seen = columns * known[:, None]

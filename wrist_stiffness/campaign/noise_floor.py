@@ -10,6 +10,9 @@ from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.noise import FEWEST_REPLICATE_DOF, replicate_variance
 from wrist_stiffness.mechanism.components import Array
 
+FEWEST_REPEATS = 6
+"""Degrees of freedom from which a repeatability is told."""
+
 SOURCES = {
     "replicates": "dwells that repeat a pose and load from the same side",
     "instrument": "what the instrument scatters within a dwell and the encoder hides; "
@@ -87,9 +90,9 @@ def scatter_of_repeats(observations: Observations) -> tuple[Array, float]:
 
 
 def repeatability(observations: Observations) -> dict[str, float]:
-    """Root mean square scatter of repeated dwells by the key of the quantity; empty without any."""
+    """Root mean square scatter of repeated dwells by the key of the quantity; empty with too few."""
     variance, freedom = scatter_of_repeats(observations)
-    if freedom < 1.0:
+    if freedom < FEWEST_REPEATS:
         return {}
     return {
         q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si

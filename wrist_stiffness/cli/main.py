@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from wrist_stiffness import __version__
-from wrist_stiffness.cli import cell, explain, plan, predict, replay, simulate, table
+from wrist_stiffness.cli import cell, compare, explain, plan, predict, replay, simulate, table
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -55,7 +55,7 @@ class CommandModule(Protocol):
         """Add this command's parser."""
 
 
-COMMANDS: tuple[CommandModule, ...] = (table, predict, explain, simulate, replay, plan, cell)
+COMMANDS: tuple[CommandModule, ...] = (table, predict, explain, simulate, replay, compare, plan, cell)
 
 
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:

@@ -1,0 +1,200 @@
+"""How far models are off from recordings, where and under which condition."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.campaign.comparing import compare_models
+from wrist_stiffness.campaign.comparison import ComparedModel, Comparison, Size
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.noise_floor import SOURCES
+from wrist_stiffness.campaign.worst_poses import WorstPose, worst_poses
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.workflows.calibrate import Run
+from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+
+Progress = Callable[[int, int], None]
+
+SEED = 0
+"""Of what chance gives: the same recordings give the same answer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A comparison and what it was made from.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What was found.
+    border : (b, 2) float
+        Motor angles on the border of the operative workspace [rad].
+    remarks : tuple of str
+        What could not be used of the recordings.
+    fitted_here : tuple of str
+        Models that were fitted to one of these very recordings.
+    provenance : Provenance
+        Files and versions.
+    """
+
+    comparison: Comparison
+    border: Array
+    remarks: tuple[str, ...]
+    fitted_here: tuple[str, ...]
+    provenance: Provenance
+
+    def worst(self, model: ComparedModel) -> tuple[WorstPose, ...]:
+        """Return the poses at which a model fails worst."""
+        found = self.comparison
+        return worst_poses(model.refitted, found.floor, found.sessions)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the numbers."""
+        fitted = tuple(
+            f"{name} was fitted to one of these recordings: its error here flatters it"
+            for name in self.fitted_here
+        )
+        return (*self.remarks, *fitted)
+
+    def lines(self) -> list[str]:
+        """Return the answer for a terminal."""
+        found = self.comparison
+        out = [*found.verdict, "", *self._table()]
+        for model in found.models:
+            out += ["", f"{model.name}: on what the error depends"]
+            out += [f"  - {sentence}" for sentence in model.told.sentences]
+        last = found.models[-1]
+        out += ["", f"{last.name}: worst poses", *self._worst_lines(last)]
+        if self.notes:
+            out += ["", *(f"note: {note}" for note in self.notes)]
+        return out
+
+    def _table(self) -> list[str]:
+        found = self.comparison
+        wide = max(34, *(len(model.name) + 4 for model in found.models))
+        keys = [q.key for q in found.quantities]
+        heads = "".join(f"{f'{q.name} [{q.unit}]':>29}" for q in found.quantities)
+        out = [" " * wide + heads, " " * wide + f"{'mean':>11}{'RMS':>9}{'max':>9}" * len(keys)]
+        for title, stage in (
+            ("as it stands", "before"),
+            ("registrations, zeros, tare refitted", "after"),
+        ):
+            out.append(title)
+            for model in found.models:
+                sizes: dict[str, Size] = getattr(model, stage)
+                cells = "".join(
+                    f"{sizes[k].mean:11.4g}{sizes[k].rms:9.4g}{sizes[k].maximum:9.4g}" for k in keys
+                )
+                out.append(f"  {model.name:{wide - 2}}{cells}")
+        for title, level in self.levels():
+            cells = "".join(f"{'':11}{level[k]:9.4g}{'':9}" for k in keys)
+            out.append(f"{title:{wide}}{cells}".rstrip())
+        out.append(f"noise floor from: {SOURCES[found.noise.source]}")
+        return out
+
+    def levels(self) -> list[tuple[str, dict[str, float]]]:
+        """Return what the errors are to be compared with, by name."""
+        found = self.comparison
+        levels = [("noise floor", found.floor)]
+        if found.repeated_by_side:
+            levels.append(("repeatability, from the same side", found.repeated_by_side))
+        if found.repeated:
+            levels.append(("repeatability, from any side", found.repeated))
+        return [*levels, ("Gaussian process on unseen blocks", found.process)]
+
+    def _worst_lines(self, model: ComparedModel) -> list[str]:
+        keys = [q.key for q in self.comparison.quantities]
+        titles = "".join(f"{f'{q.name} [{q.unit}]':>13}" for q in self.comparison.quantities)
+        out = [f"{'time [s]':>10}{'motors [deg]':>18}{'force [N]':>24}{titles}  session"]
+        for pose in self.worst(model):
+            motors = " ".join(f"{angle:.1f}" for angle in pose.theta_deg)
+            force = " ".join(f"{value:.2f}" for value in pose.load[:3])
+            errors = "".join(f"{pose.errors[key]:13.3g}" for key in keys)
+            out.append(f"{pose.time_s:10.1f}{motors:>18}{force:>24}{errors}  {pose.session}")
+        return out
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        values = self.comparison.as_values()
+        for model, own in zip(self.comparison.models, values["models"], strict=True):
+            own["worst_poses"] = [pose.as_values() for pose in self.worst(model)]
+        return {
+            **values,
+            "notes": list(self.notes),
+            "provenance": self.provenance.as_values(),
+        }
+
+
+def compare(
+    models: Sequence[str | Path],
+    recordings: Recordings,
+    run: Run,
+    progress: Callable[[str], Progress] = lambda label: lambda done, total: None,
+) -> Compared:
+    """Compare models with recordings of one wrist.
+
+    Parameters
+    ----------
+    models : sequence of path
+        Model files, the one to be improved upon first.
+    recordings : Recordings
+        Each a session.
+    run : Run
+        For the report.
+    progress : callable
+        From a label to a function that is told steps done and in all.
+
+    Returns
+    -------
+    Compared
+        Errors, contrasts, worst poses.
+
+    Raises
+    ------
+    WristError
+        If a model or a recording cannot be used.
+    """
+    names = unique_names(models)
+    loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]
+    table = loaded[0][1].table
+    sessions = read_sessions(recordings, table, progress("reading"))
+    comparison = compare_models(
+        loaded, list(sessions.values()), np.random.default_rng(SEED), progress("comparing")
+    )
+    hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
+    fitted_here = tuple(
+        name
+        for name, model in loaded
+        if any(set(step.recordings.values()) & set(hashes.values()) for step in model.lineage)
+    )
+    files = {name: file_sha256(path) for name, path in zip(names, models, strict=True)}
+    return Compared(
+        comparison,
+        table.workspace.operative_border,
+        remarks_of(sessions.values()),
+        fitted_here,
+        Provenance(run.command, run.date, files, hashes),
+    )
+
+
+def unique_names(paths: Sequence[str | Path]) -> list[str]:
+    """Return file names without suffix, whole paths where two are alike."""
+    stems = [Path(path).stem for path in paths]
+    count = Counter(stems)
+    return [
+        stem if count[stem] == 1 else str(path) for stem, path in zip(stems, paths, strict=True)
+    ]
+
+
+def remarks_of(sessions: Sequence[MeasuredSession] | Any) -> tuple[str, ...]:
+    """Return what the sessions say of themselves, each with its session's name."""
+    return tuple(f"{session.name}: {remark}" for session in sessions for remark in session.remarks)

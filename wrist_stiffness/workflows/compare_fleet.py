@@ -1,0 +1,103 @@
+"""One line for each of many recordings, each of a wrist of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from wrist_stiffness.campaign.folder import recordings_in
+from wrist_stiffness.workflows.calibrate import Run
+from wrist_stiffness.workflows.compare import compare
+from wrist_stiffness.workflows.fleet import FleetRow, map_recordings
+from wrist_stiffness.workflows.read_sessions import Recordings
+
+
+@dataclass(frozen=True)
+class FleetComparison:
+    """The last model against each recording by itself.
+
+    Parameters
+    ----------
+    rows : tuple of FleetRow
+        What `compare` gives for a program, or the error.
+    """
+
+    rows: tuple[FleetRow[dict[str, Any]], ...]
+
+    def lines(self) -> list[str]:
+        """Return one table for a terminal."""
+        wide = max(len(str(row.path)) for row in self.rows)
+        out = [
+            f"{'recording':{wide}}{'s [um]':>10}{'floor':>8}{'phi [mdeg]':>12}{'floor':>8}  "
+            "strongest dependence"
+        ]
+        for row in self.rows:
+            if row.result is None:
+                out.append(f"{row.path!s:{wide}}  not compared: {row.error}")
+            else:
+                out.append(f"{row.path!s:{wide}}{_cells(row.result)}")
+        return out
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read."""
+        return {
+            "schema": 1,
+            "recordings": [
+                {"recording": str(row.path), "error": row.error or None, "comparison": row.result}
+                for row in self.rows
+            ],
+        }
+
+
+def _cells(values: dict[str, Any]) -> str:
+    model = values["models"][-1]
+    out = ""
+    for key, width in (("s_um", 10), ("phi_mdeg", 12)):
+        size = model["after_registration"].get(key)
+        # A recording may lack a quantity.
+        rms = "-" if size is None else f"{size['rms']:.3g}"
+        floor = "-" if size is None else f"{values['noise_floor'][key]:.3g}"
+        out += f"{rms:>{width}}{floor:>8}"
+    depends = model["depends_on"]
+    return f"{out}  {depends[0]['condition'] if depends else 'none beyond chance'}"
+
+
+def compare_each(
+    models: Sequence[str | Path],
+    recordings: Recordings,
+    run: Run,
+    scheduler: str | None,
+    progress: Callable[[int, int], None],
+) -> FleetComparison:
+    """Compare models with every recording by itself, in parallel.
+
+    Parameters
+    ----------
+    models : sequence of path
+        Model files.
+    recordings : Recordings
+        Recordings, or folders of them.
+    run : Run
+        For the report.
+    scheduler : str or None
+        Address of a Dask scheduler; processes of this machine if None.
+    progress : callable
+        Told recordings done and in all.
+
+    Raises
+    ------
+    InputError
+        If there is no recording, or no scheduler answers.
+    """
+    paths = recordings_in(recordings.paths)
+    one = partial(_values, models=list(models), recordings=recordings, run=run)
+    return FleetComparison(tuple(map_recordings(one, paths, scheduler, progress=progress)))
+
+
+def _values(
+    path: Path, models: list[str | Path], recordings: Recordings, run: Run
+) -> dict[str, Any]:
+    return compare(models, replace(recordings, paths=[path]), run).as_values()
