@@ -1,8 +1,8 @@
 """Whether a live run and its replay are equal to the bit, and why where they are not.
 
 Replay knows every load by its stamp.  A live node may see a load only after the joint state to
-which it belongs, and then predicts with the load before: no other cause of a difference is known.  A
-model with a memory carries it on, so the live run is followed sample by sample.
+which it belongs, and then predicts with the load before: no other cause of a difference is known.
+A model with a memory carries it on, so the live run is followed sample by sample.
 """
 
 from __future__ import annotations
