@@ -1,18 +1,20 @@
-"""The project's own statistics as a solver: `wrist_stiffness.diagnosis` with words as candidates.
+"""The project's statistics with the simulation's words: `wrist_stiffness.diagnosis` alone.
 
 This judges the search, the colour of the noise, the classes and the abstentions.  It does not judge
-the effects of the error model, whose columns would come from laws of its own.
+the laws of the error model; `own_diagnosis` does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from bench_wrist import SECONDS, Array
-from dictionary import Word, nuisance_names
+from bench_wrist import Array
+from dictionary import Dictionary
 from observe import Riddle
-from solvers import Answer, Whitened, predict
+from solvers import Answer, explained, nothing
+from whitened import Whitened
 
 from wrist_stiffness.diagnosis.candidates import Candidate, Parameter
 from wrist_stiffness.diagnosis.diagnose import diagnose
@@ -35,25 +37,28 @@ def _rows(columns: Array) -> Callable[..., Array]:
     return given
 
 
-def diagnosis_core(riddle: Riddle, words: Sequence[Word]) -> Answer:
-    """Diagnose the first session; predict the second by a joint fit of the best members."""
+def diagnosis_core(riddle: Riddle, words: Dictionary) -> Answer:
+    """Diagnose the first day; what the findings explain is the fit of their best members."""
     train = riddle.train
+    rows = train.measured.any(axis=1)
+    values = np.where(train.measured, train.residual, np.nan)[rows]
     observations = Observations(
-        values=train.residual,
-        covariates=dict(zip(CONDITIONS, train.conditions.T, strict=True)),
-        covariance=train.covariance,
-        time_s=train.conditions[:, CONDITIONS.index("time")] * SECONDS,
+        values=values,
+        covariates=dict(zip(CONDITIONS, train.conditions[rows].T, strict=True)),
+        covariance=train.covariance[rows],
+        time_s=train.conditions[rows, CONDITIONS.index("time")] * riddle.case.seconds,
         quantities=QUANTITIES,
     )
-    nuisances, candidates = [], []
-    for word in words:
-        columns = _rows(word.train)
-        if word.name in nuisance_names():
-            nuisances.append(Nuisance(word.name, columns, per_session=True))
-        else:
-            effect, component = word.name.split("@")
-            free = tuple(Parameter(f"direction_{i}") for i in range(word.train.shape[2]))
-            candidates.append(Candidate(effect, component, free, columns))
+    nuisances = [
+        Nuisance(word.name, _rows(word.train[rows]), per_session=True) for word in words.nuisance
+    ]
+    base = words.base.train[rows]
+    nuisances.append(Nuisance("base", _rows(base), prior_std=(1.0,) * base.shape[2]))
+    candidates = []
+    for word in words.searched:
+        effect, component = word.name.split("@")
+        free = tuple(Parameter(f"direction_{i}") for i in range(word.train.shape[2]))
+        candidates.append(Candidate(effect, component, free, _rows(word.train[rows])))
     result = diagnose(
         observations,
         tuple(candidates),
@@ -62,9 +67,9 @@ def diagnosis_core(riddle: Riddle, words: Sequence[Word]) -> Answer:
         Settings(permutations=PERMUTATIONS),
     )
     names = tuple(finding.names for finding in result.findings)
-    chosen = [word for word in words if word.name in {members[0] for members in names}]
-    predicted = np.zeros_like(riddle.test.residual)
-    if chosen:
-        fit = Whitened(train, [word for word in words if word.name in nuisance_names()])
-        predicted = predict(chosen, fit.fit(chosen)[0])
-    return Answer(result.verdict, names, predicted)
+    chosen = [word for word in words.searched if word.name in {members[0] for members in names}]
+    unseen = tuple(f"{each.effect}@{each.component}" for each in result.not_excited)
+    if not chosen:
+        return replace(nothing(riddle, result.verdict), not_excited=unseen)
+    fitted = explained(chosen, Whitened(train, words).fit(chosen)[0])
+    return Answer(result.verdict, names, fitted, unseen)

@@ -6,17 +6,21 @@ known beforehand: a word is the span of several draws of its shape, as few direc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-from bench_wrist import SECONDS, Array, wrist
+from bench_wrist import TRUTH, Array, code_version, wrist
 from cases import ABSORBED, Case
-from observe import QUIET, settings_of, times, unit_labels, unit_means
+from observe import day_of, run_cell, settings_of, times
+from units import unit_labels, unit_means
 
+from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect
+from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect, places
 from wrist_stiffness.simulation.cell import VirtualCell
 from wrist_stiffness.simulation.size import Scale
 
@@ -25,6 +29,18 @@ KEPT = 3e-3
 
 SMALL = 0.3
 """Share of the plausible magnitude at which a law is taken as linear."""
+
+QUICK_DRAWS, DRAWS = 3, 6
+"""Draws of an effect's shape."""
+
+QUICK_BASES, BASES = 60, 160
+"""Wrong bases that are drawn to know what a wrong base does: 160 leave 0.1 of a unit's variance
+unknown, 60 leave 0.4."""
+
+FIRST_BASE = 50_000
+"""Seeds of these bases, which no case has."""
+
+SOURCES = ("dictionary.py", "observe.py", "units.py", "registered.py", "bench_wrist.py")
 
 
 @dataclass(frozen=True)
@@ -44,23 +60,57 @@ class Word:
     test: Array
 
 
-def words_of(name: str, experiment: str, draws: int) -> Word | None:
+@dataclass(frozen=True)
+class Dictionary:
+    """What the laws do in one design.
+
+    Parameters
+    ----------
+    words : tuple of Word
+        Of all effects, those that every session refits included.
+    base : Word
+        What a wrong base does: the sum of the columns' squares is its covariance.
+    """
+
+    words: tuple[Word, ...]
+    base: Word
+
+    @property
+    def searched(self) -> list[Word]:
+        """Words that a search may choose."""
+        return [word for word in self.words if word.name not in nuisance_names()]
+
+    @property
+    def nuisance(self) -> list[Word]:
+        """Words that are refitted in every session."""
+        return [word for word in self.words if word.name in nuisance_names()]
+
+
+def design_of(case: Case) -> tuple[str, bool]:
+    """Return what words depend on: the experiment, and whether only rests are measured."""
+    return case.experiment, case.static
+
+
+def _blank(design: tuple[str, bool]) -> Case:
+    experiment, static = design
+    return Case((), 0.0, "exact", experiment, "cmm" if static else "interferometer", seed=0)
+
+
+def word_of(name: str, design: tuple[str, bool], draws: int) -> Word | None:
     """Return the span of an effect at a place, None where nothing changes or no draw can be run."""
     effect, component = name.split("@")
-    entry = CATALOGUE[effect]
-    case = Case((), 0.0, "exact", experiment, "interferometer", 0)
+    entry, case = CATALOGUE[effect], _blank(design)
+    forms = [f for e, c, f in places({effect: entry}) if c == component]
     both = []
     for session in (0, 1):
         settings = settings_of(case, session)
-        scale = Scale(wrist(), settings, SECONDS)
-        quiet = replace(settings, instrument="ideal", load_sensor=QUIET)
-        labels = unit_labels(VirtualCell(wrist(), quiet, np.random.default_rng(0)), times())
+        scale = Scale(wrist(), settings, case.seconds)
+        cell = VirtualCell(wrist(), settings, np.random.default_rng(0))
+        labels = unit_labels(cell.program, times(case), case.static)
         columns = []
         for draw in range(draws):
-            form = entry.forms[draw % len(entry.forms)]
-            if effect == "gravity" and form == "tilt" and component != "platform":
-                form = "mass"
             magnitude = SMALL * entry.plausible
+            form = forms[draw % len(forms)]
             hidden = HiddenEffect(effect, component, form, magnitude, 7000 + draw)
             try:
                 columns.append(unit_means(labels, scale.signature(hidden)) / SMALL)
@@ -76,52 +126,82 @@ def words_of(name: str, experiment: str, draws: int) -> Word | None:
     return Word(name, both[0] @ mix, both[1] @ mix)
 
 
-def _one(task: tuple[str, str, int]) -> Word | None:
-    return words_of(*task)
+def base_draw(number: int, design: tuple[str, bool]) -> tuple[Array, Array]:
+    """Return what one drawn wrong base leaves after registration on both days, two (u, 6)."""
+    wrong = replace(_blank(design), base="wrong", seed=FIRST_BASE + number)
+    one, two = (_quiet(wrong, session) - _right(design, session) for session in (0, 1))
+    return one, two
 
 
+def _quiet(case: Case, session: int) -> Array:
+    return day_of(case, session, run_cell(case, (), session, quiet=True)).units.residual
+
+
+@cache
+def _right(design: tuple[str, bool], session: int) -> Array:
+    return _quiet(_blank(design), session)
+
+
+def _task(task: tuple[Callable[..., object], tuple[object, ...]]) -> object:
+    function, arguments = task
+    return function(*arguments)
+
+
+@cache
 def dictionary(
-    experiment: str, components: bool, draws: int, processes: int, folder: Path
-) -> list[Word]:
-    """Return the words of all effects, from the folder where they were kept before.
+    design: tuple[str, bool], quick: bool, folder: Path, processes: int = 1
+) -> Dictionary:
+    """Return what the laws do in a design, from the folder where it was kept before.
 
     Parameters
     ----------
-    experiment : str
-        As in `CellSettings`.
-    components : bool
-        Every place, or the first place of each effect alone.
-    draws : int
-        Of an effect's shape.
-    processes : int
-        To spread the work over.
+    design : (str, bool)
+        See `design_of`.
+    quick : bool
+        The first place of each effect alone, and few draws.
     folder : Path
         Cache.
+    processes : int
+        To spread the work over.
     """
     names = [
         f"{effect}@{component}"
         for effect, entry in CATALOGUE.items()
-        for component in (entry.components if components else entry.components[:1])
+        for component in (entry.components[:1] if quick else entry.components)
     ]
-    path = folder / f"words_{experiment}_{len(names)}_{draws}.npz"
+    version = code_version(TRUTH, SOURCES)
+    kind = f"{design[0]}{'_rests' if design[1] else ''}{'_quick' if quick else ''}"
+    path = folder / f"words_{kind}_{version}.npz"
     if not path.exists():
-        with ProcessPoolExecutor(processes) as pool:
-            words = list(pool.map(_one, [(name, experiment, draws) for name in names]))
-        arrays = {
-            f"{word.name}|{part}": getattr(word, part)
-            for word in words
-            if word is not None
-            for part in ("train", "test")
-        }
-        partial = path.with_suffix(".part.npz")
-        np.savez_compressed(partial, **arrays)
-        partial.replace(path)
+        _make(names, design, quick, path, processes)
     with np.load(path, allow_pickle=False) as kept:
-        return [
+        found = [
             Word(name, kept[f"{name}|train"], kept[f"{name}|test"])
-            for name in names
+            for name in ("base", *names)
             if f"{name}|train" in kept
         ]
+    return Dictionary(tuple(found[1:]), found[0])
+
+
+def _make(
+    names: list[str], design: tuple[str, bool], quick: bool, path: Path, processes: int
+) -> None:
+    bases, draws = (QUICK_BASES, QUICK_DRAWS) if quick else (BASES, DRAWS)
+    tasks = [(base_draw, (number, design)) for number in range(bases)]
+    tasks += [(word_of, (name, design, draws)) for name in names]
+    progress, made = Progress(f"words of {path.stem}"), []
+    with ProcessPoolExecutor(processes) as pool:
+        for one in pool.map(_task, tasks):
+            made.append(one)
+            progress(len(made), len(tasks))
+    drawn = [np.stack(day, axis=-1) / np.sqrt(bases) for day in zip(*made[:bases], strict=True)]
+    arrays = {"base|train": drawn[0], "base|test": drawn[1]}
+    for word in made[bases:]:
+        if word is not None:
+            arrays |= {f"{word.name}|train": word.train, f"{word.name}|test": word.test}
+    partial = path.with_suffix(".part.npz")
+    np.savez_compressed(partial, **arrays)
+    partial.replace(path)
 
 
 def nuisance_names() -> tuple[str, ...]:

@@ -1,25 +1,35 @@
-"""From a case to what a solver is given: residuals of dwells and of moments in motion."""
+"""From a case to what a solver is given: measured sessions, and their residuals as units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from zlib import crc32
 
 import numpy as np
-from bench_wrist import RATE_HZ, SECONDS, Array
+from bench_wrist import RATE_HZ, Array, Mask, wrist
 from cases import Case
+from registered import Registration, difference, register
+from units import last_sense, lost_samples, unit_labels, unit_means
 
-from wrist_stiffness.errors import InputError
-from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.model.block import Block
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
-from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
+from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
-from wrist_stiffness.simulation.residual import residual
+from wrist_stiffness.simulation.residual import BasePose, base_pose
 from wrist_stiffness.simulation.size import Scale, sample_covariance
 
-MOVING_EVERY = 10
-"""One sample in so many counts as a unit of its own while the wrist moves."""
+PROGRAM_SEED = 101
+"""Of the first session; the second has the next one."""
+
+SPREAD = 0.7
+"""Of the logarithm of an ordinary wrist's magnitudes about the plausible one."""
 
 QUIET = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
+
+THERMOMETER_STEP_K = 0.1
+"""As in the recordings, once a second."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +39,9 @@ class Session:
     Parameters
     ----------
     residual : (u, 6) float
-        Measured against the table [m, rad].
+        Measured against the table after registration [m, rad]; zero where not measured.
+    measured : (u, 6) bool
+        Which components were.
     covariance : (u, 6, 6) float
         Of a unit on its own: white noise and hidden encoder counts.
     wander : (6u, 6u) float
@@ -40,117 +52,215 @@ class Session:
     """
 
     residual: Array
+    measured: Mask
     covariance: Array
     wander: Array
     conditions: Array
 
 
 @dataclass(frozen=True)
+class Day:
+    """One session in all its forms.
+
+    Parameters
+    ----------
+    recorded : MeasuredSession
+        What a recording would hold.
+    units : Session
+        The same as one table.
+    base : BasePose
+        What the table predicts for each sample, in F.
+    registration : Registration
+        That was taken off the residuals.
+    labels : (n,) int
+        Unit of each sample.
+    """
+
+    recorded: MeasuredSession
+    units: Session
+    base: BasePose
+    registration: Registration
+    labels: np.ndarray
+
+    def explained(self, rotation: Array, shift: Array) -> Array:
+        """Return what predicted poses (n, 3, 3), (n, 3) in F explain of the residual, (u, 6)."""
+        seen, base = (
+            self.registration.seen(each) for each in (BasePose(rotation, shift), self.base)
+        )
+        return unit_means(self.labels, difference(seen.rotation, seen.shift, base))
+
+
+@dataclass(frozen=True)
 class Riddle:
-    """A case as a solver gets it: learn from the first session, be judged by the second.
+    """A case as a solver gets it: learn from the first day, be judged by the second.
 
     Parameters
     ----------
     case : Case
-        The answer; only the baseline that is told may look.
+        The answer; only a baseline that is told may look.
     hidden : tuple of HiddenEffect
         With magnitudes; likewise.
-    train, test : Session
+    days : (Day, Day)
         Two days of the same wrist.
-    floor : (u, 6) float
-        Residuals of the second day of a wrist that is exactly its table, with the same noise:
-        for scores only.
+    bare : (Session, Session)
+        The same days, noise for noise, of the same wrist without the hidden effects: for scores
+        and for the baseline that is told.
+    parts : dict of str to float
+        Of an ordinary wrist: how much each effect adds to the error of the second day.
     """
 
     case: Case
     hidden: tuple[HiddenEffect, ...]
-    train: Session
-    test: Session
-    floor: Array
+    days: tuple[Day, Day]
+    bare: tuple[Session, Session]
+    parts: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def train(self) -> Session:
+        """Units of the first day."""
+        return self.days[0].units
+
+    @property
+    def test(self) -> Session:
+        """Units of the second day."""
+        return self.days[1].units
 
 
 def settings_of(case: Case, session: int) -> CellSettings:
     """Return the settings of one session of a case, without its effects."""
     return CellSettings(
         rate_hz=RATE_HZ,
-        program_seconds=SECONDS,
-        program_seed=101 + session,
+        program_seconds=case.seconds,
+        program_seed=PROGRAM_SEED + session,
         experiment=case.experiment,
         instrument=case.instrument,
+        sees=case.sees,
+        lost_beams=case.lost_beams,
         base=case.base,
         base_seed=case.seed,
         session=session,
+        truth=case.path,
     )
 
 
-def times() -> Array:
+def noise_seed(case: Case, session: int) -> int:
+    """Return the seed of all noise of one session: no two cases share it."""
+    return crc32(f"{case.key}|{session}".encode())
+
+
+def times(case: Case) -> Array:
     """Return the times of the samples of a session [s]."""
-    return np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+    return np.arange(round(case.seconds * RATE_HZ)) / RATE_HZ
 
 
-def unit_labels(cell: VirtualCell, time_s: Array) -> np.ndarray:
-    """Return the number of the unit that each sample belongs to, -1 for none, (n,)."""
-    program = np.concatenate([cell.desired(time_s), cell.program.load(time_s)], axis=1)
-    still = ~np.any(np.diff(program, axis=0, prepend=program[:1]) != 0.0, axis=1)
-    labels = np.full(len(time_s), -1)
-    number = -1
-    for i, rests in enumerate(still):
-        if rests and (i == 0 or not still[i - 1]):
-            number += 1
-        if rests:
-            labels[i] = number
-        elif i % MOVING_EVERY == 0:
-            number += 1
-            labels[i] = number
-    return labels
+@lru_cache(maxsize=4)
+def _scale(settings: CellSettings, seconds: float) -> Scale:
+    return Scale(wrist(), settings, seconds)
 
 
-def unit_means(labels: np.ndarray, values: Array) -> Array:
-    """Return the mean of samples (n, ...) over each unit, (u, ...)."""
-    used = labels >= 0
-    _, place = np.unique(labels[used], return_inverse=True)
-    out = np.zeros((place.max() + 1, *values.shape[1:]))
-    np.add.at(out, place, values[used])
-    counts = np.bincount(place).reshape(-1, *([1] * (values.ndim - 1)))
-    return out / counts
+def scale_of(case: Case) -> Scale:
+    """Return the measure of sizes in the first session of a case."""
+    # Sizes do not depend on what the sensor sees: cases share the work.
+    whole = replace(settings_of(case, 0), sees="pose", lost_beams=0.0, truth="fast")
+    return _scale(whole, case.seconds)
 
 
-def hidden_effects(table: Table, case: Case) -> tuple[HiddenEffect, ...]:
-    """Return the case's effects with the magnitudes that have its size in the first session.
+def hidden_effects(case: Case) -> tuple[HiddenEffect, ...]:
+    """Return the case's effects with their magnitudes: its size in the first session.
 
     Raises
     ------
     InputError
         If one cannot be as large as that.
     """
-    if not case.effects:
-        return ()
-    scale = Scale(table, settings_of(case, 0), SECONDS)
-    return tuple(
-        scale.sized(
-            HiddenEffect(*place, ALL[place[0]].plausible, 1000 * case.seed + number), case.size
-        )
+    shape = 1000 * case.seed
+    drawn = [
+        HiddenEffect(*place, ALL[place[0]].plausible, shape + number)
         for number, place in enumerate(case.effects)
+    ]
+    if case.ordinary:
+        factors = np.exp(SPREAD * np.random.default_rng(shape).normal(size=len(drawn)))
+        return tuple(
+            replace(each, magnitude=min(f * each.magnitude, ALL[each.effect].limit))
+            for each, f in zip(drawn, factors, strict=True)
+        )
+    return tuple(scale_of(case).sized(each, case.size) for each in drawn)
+
+
+def run_cell(
+    case: Case, hidden: tuple[HiddenEffect, ...], session: int, quiet: bool = False
+) -> CellSample:
+    """Return what the sensors say in one session of a wrist with these effects.
+
+    `quiet`: sensors without noise that always measure, and the same rests within the count.
+    """
+    settings = replace(settings_of(case, session), hidden=hidden)
+    if quiet:
+        settings = replace(settings, instrument="ideal", load_sensor=QUIET)
+    seed = 0 if quiet else noise_seed(case, session)
+    cell = VirtualCell(wrist(), settings, np.random.default_rng(seed))
+    time_s = times(case)
+    return cell.run(time_s, cell.desired(time_s))
+
+
+def measured_session(case: Case, session: int, sample: CellSample) -> MeasuredSession:
+    """Return a session as a recording would hold it."""
+    time_s, name = times(case), f"day_{session + 1}"
+    held = np.arange(len(time_s)) // round(RATE_HZ) * round(RATE_HZ)
+    shown = THERMOMETER_STEP_K * np.round(sample.temperature / THERMOMETER_STEP_K)
+    temperatures = dict(zip(SENSED, shown[held].T, strict=True))
+    pose = instrument(case.instrument)
+    white = np.repeat([pose.shift.white, pose.rotation.white], 3)
+    return MeasuredSession(
+        name,
+        Block(time_s, sample.encoder, sample.wrench, temperatures=temperatures),
+        sample.measured_shift,
+        sample.measured_rotation,
+        np.diag(white**2),
+        {"pose_sensor": case.instrument, "session": name, "load_source": "ft"},
     )
 
 
-def observe(table: Table, case: Case, hidden: tuple[HiddenEffect, ...], session: int) -> Session:
+def observe(case: Case, hidden: tuple[HiddenEffect, ...], session: int) -> Day:
     """Run one session of a case."""
-    settings = replace(settings_of(case, session), hidden=hidden)
-    time_s = times()
-    cell = VirtualCell(table, settings, np.random.default_rng([case.seed, session]))
-    command = cell.desired(time_s)
-    sample = cell.run(time_s, command)
-    labels = unit_labels(cell, time_s)
+    return day_of(case, session, run_cell(case, hidden, session))
+
+
+def day_of(case: Case, session: int, sample: CellSample) -> Day:
+    """Return a session in all its forms."""
+    table, time_s = wrist(), times(case)
+    cell = VirtualCell(table, settings_of(case, session), np.random.default_rng(0))
+    labels = unit_labels(cell.program, time_s, case.static)
+    base = base_pose(table, sample.encoder, sample.wrench)
+    rotation, shift = sample.measured_rotation.copy(), sample.measured_shift.copy()
+    if case.lost_beams:
+        lost = lost_samples(difference(rotation, shift, base))
+        rotation[lost], shift[lost] = np.nan, np.nan
+    found = register(rotation, shift, base)
+    left = unit_means(labels, difference(rotation, shift, found.seen(base)))
+    return Day(
+        measured_session(case, session, sample),
+        _session(case, cell, sample, labels, left),
+        base,
+        found,
+        labels,
+    )
+
+
+def _session(
+    case: Case, cell: VirtualCell, sample: CellSample, labels: np.ndarray, left: Array
+) -> Session:
+    """Return units with residuals (u, 6) that are NaN where not measured."""
+    time_s = times(case)
     pose = instrument(case.instrument)
     white = np.repeat([pose.shift.white, pose.rotation.white], 3)
     slow = np.repeat([pose.shift.wander, pose.rotation.wander], 3)
-    used = labels[labels >= 0]
-    counts = np.bincount(used)[np.unique(used)]
+    counts = np.bincount(labels[labels >= 0])
     theta, at = unit_means(labels, sample.encoder), unit_means(labels, time_s)
-    covariance = sample_covariance(table, theta, case.instrument) - np.diag(slow**2)
+    covariance = sample_covariance(wrist(), theta, case.instrument) - np.diag(slow**2)
     covariance -= (1.0 - 1.0 / counts)[:, None, None] * np.diag(white**2)
     alike = np.exp(-np.abs(at[:, None] - at) / pose.shift.wander_time_s)
+    command = cell.desired(time_s)
     speed = np.diff(command, axis=0, prepend=command[:1]) * RATE_HZ
     conditions = np.column_stack(
         [
@@ -158,32 +268,36 @@ def observe(table: Table, case: Case, hidden: tuple[HiddenEffect, ...], session:
             2.0 * unit_means(labels, speed),
             0.5 * unit_means(labels, last_sense(speed)),
             unit_means(labels, sample.wrench) / np.repeat([1.0, 0.02], 3),
-            at / SECONDS,
+            at / case.seconds,
             unit_means(labels, sample.temperature[:, SENSED.index("frame")]) / 5.0,
         ]
     )
     return Session(
-        unit_means(labels, residual(table, sample)),
+        np.nan_to_num(left),
+        np.isfinite(left),
         covariance,
         np.kron(alike, np.diag(slow**2)),
         conditions,
     )
 
 
-def last_sense(speed: Array) -> Array:
-    """Return the sign of each motor's motion now or before its rest, (n, 2)."""
-    out = np.sign(speed)
-    for i in range(1, len(out)):
-        out[i] = np.where(out[i] == 0.0, out[i - 1], out[i])
-    return out
+def pose_riddle(case: Case) -> Riddle:
+    """Return a case ready to be solved.
 
-
-def pose_riddle(table: Table, case: Case) -> Riddle | None:
-    """Return a case ready to be solved, None where its size is out of reach."""
-    try:
-        hidden = hidden_effects(table, case)
-    except InputError:
-        return None
-    train, test = (observe(table, case, hidden, session) for session in (0, 1))
-    floor = observe(table, replace(case, effects=(), base="exact"), (), 1).residual
-    return Riddle(case, hidden, train, test, floor)
+    Raises
+    ------
+    InputError
+        If its size is out of reach.
+    """
+    hidden = hidden_effects(case)
+    one, two = (observe(case, hidden, session) for session in (0, 1))
+    if not hidden:
+        return Riddle(case, hidden, (one, two), (one.units, two.units))
+    bare = tuple(observe(case, (), session).units for session in (0, 1))
+    parts = {}
+    if case.ordinary:
+        for number, each in enumerate(hidden):
+            others = hidden[:number] + hidden[number + 1 :]
+            without = observe(case, others, 1).units.residual
+            parts[f"{each.effect}@{each.component}"] = two.units.residual - without
+    return Riddle(case, hidden, (one, two), (bare[0], bare[1]), parts)

@@ -1,66 +1,152 @@
-"""Run the hidden-effect benchmark: pose riddles, ask solvers, keep scores, print tables.
+"""Run the hidden-effect benchmark: pose riddles, ask solvers, keep scores.
 
-    python bench/hidden_effects/run.py --quick            # one place an effect, about 3 minutes
-    python bench/hidden_effects/run.py --processes 4      # all; stop and start again at will
-    python bench/hidden_effects/run.py --report           # only the tables of what is there
+    python bench/hidden_effects/run.py --quick --processes 2   # a look at everything, 3 minutes
+    python bench/hidden_effects/run.py --processes 4           # all; stop and start again at will
+    python bench/hidden_effects/run.py --only joint_clearance --solvers own_diagnosis
+    python bench/hidden_effects/page.py                        # tables and pictures of the results
 
-Each finished case is one line of results.jsonl; a second start goes on where the first ended.
+Each answer is one line of the results file, with the digest of the code that gave it: a second
+start does what is missing or was done by other code, and goes on.  A case that fails leaves its
+error as a line and does not stop the others.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict
-from functools import cache
-from pathlib import Path
-from typing import Any
 
 # Several processes share the cores: threads of the linear algebra below them only get in the way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from bench_wrist import wrist
+import json
+import signal
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from bench_wrist import PROJECT, TRUTH, code_version
 from cases import Case, full_cases, quick_cases
 from diagnosis_core import diagnosis_core
-from dictionary import Word, dictionary
-from observe import pose_riddle
-from score import score, table
-from solvers import BASELINES
+from dictionary import Dictionary, design_of, dictionary
+from elastic_net import elastic_net
+from observe import Riddle, pose_riddle
+from own_diagnosis import own_diagnosis
+from score import score
+from solvers import (
+    Solver,
+    always_none,
+    gaussian_process,
+    geometry_only,
+    spans_of_the_laws,
+    stepwise_bic,
+    told_the_answer,
+)
 
 from wrist_stiffness.cli.progress import Progress
+from wrist_stiffness.errors import InputError
 
-SOLVERS = BASELINES | {"diagnosis_core": diagnosis_core}
+SOLVERS: dict[str, Solver] = {
+    "always_none": always_none,
+    "told_the_answer": told_the_answer,
+    "geometry_only": geometry_only,
+    "stepwise_bic": stepwise_bic,
+    "elastic_net": elastic_net,
+    "gaussian_process": gaussian_process,
+    "spans_of_the_laws": spans_of_the_laws,
+    "diagnosis_core": diagnosis_core,
+    "own_diagnosis": own_diagnosis,
+}
 
-DRAWS = 6
-QUICK_DRAWS = 3
+TRUTH_FILES = (
+    *("bench_wrist.py", "cases.py", "observe.py", "units.py", "registered.py", "dictionary.py"),
+    *("whitened.py", "score.py"),
+)
+FILES = {
+    "elastic_net": ("solvers.py", "elastic_net.py"),
+    "diagnosis_core": ("solvers.py", "diagnosis_core.py"),
+    "own_diagnosis": ("own_diagnosis.py",),
+}
+
+LONGEST_S = 600
+"""A riddle or an answer that takes longer is given up."""
+
+RESTARTS = 5
+"""Of the pool, after a process was killed from outside."""
 
 
-@cache
-def _words(experiment: str, quick: bool, folder: Path) -> list[Word]:
-    return dictionary(experiment, not quick, QUICK_DRAWS if quick else DRAWS, 1, folder)
+def version_of(solver: str) -> str:
+    """Return the digest of all code that an answer and its score depend on."""
+    rooms = {"own_diagnosis": PROJECT, "diagnosis_core": (*TRUTH, "diagnosis")}.get(solver, TRUTH)
+    return code_version(rooms, (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 
-def solve(case: Case, quick: bool, folder: Path) -> list[dict[str, Any]]:
-    """Return the scores of all solvers on one case; one line that says so where it cannot be."""
-    riddle = pose_riddle(wrist(), case)
-    if riddle is None:
-        return [{"key": case.key, "solver": "out_of_reach"}]
-    words = _words(case.experiment, quick, folder)
-    return [
-        asdict(score(riddle, name, solver(riddle, words), words))
-        for name, solver in SOLVERS.items()
-    ]
+def solve(case: Case, solvers: Sequence[str], quick: bool, folder: Path) -> list[dict[str, Any]]:
+    """Return a line for each solver on one case; a line with `error` where there is no answer."""
+    begun = time.perf_counter()
+    try:
+        with time_limit(LONGEST_S):
+            riddle = pose_riddle(case)
+    except InputError as error:
+        return [_without(case, name, "out_of_reach", str(error)) for name in solvers]
+    except Exception as error:
+        return [_without(case, name, "error", repr(error)) for name in solvers]
+    posed = time.perf_counter() - begun
+    words = dictionary(design_of(case), quick, folder)
+    return [_ask(riddle, name, words, posed) for name in solvers]
 
 
-def read(path: Path) -> list[dict[str, Any]]:
-    """Return the lines of a results file; a last line that was cut off does not count."""
-    return list(_lines(path)) if path.exists() else []
+def _ask(riddle: Riddle, name: str, words: Dictionary, posed: float) -> dict[str, Any]:
+    begun = time.perf_counter()
+    try:
+        with time_limit(LONGEST_S):
+            answer = SOLVERS[name](riddle, words)
+            seconds = time.perf_counter() - begun
+            line = asdict(score(riddle, name, answer, words, version_of(name), seconds))
+            return line | {"posed_s": posed}
+    except Exception as error:
+        return _without(riddle.case, name, "error", repr(error))
 
 
-def _lines(path: Path) -> Iterator[dict[str, Any]]:
+def _without(case: Case, solver: str, why: str, text: str) -> dict[str, Any]:
+    return {
+        "key": case.key,
+        "solver": solver,
+        "version": version_of(solver),
+        "kind": case.kind,
+        why: text,
+    }
+
+
+class time_limit:
+    """Context that raises TimeoutError after so many seconds; in the main thread of a process."""
+
+    def __init__(self, seconds: int) -> None:
+        self._seconds = seconds
+
+    def __enter__(self) -> None:
+        """Start the alarm."""
+        signal.signal(signal.SIGALRM, self._ring)
+        signal.alarm(self._seconds)
+
+    def __exit__(self, *failure: object) -> None:
+        """Stop it."""
+        signal.alarm(0)
+
+    def _ring(self, number: int, frame: FrameType | None) -> None:
+        raise TimeoutError(f"longer than {self._seconds} s")
+
+
+def read(path: Path) -> Iterator[dict[str, Any]]:
+    """Yield the lines of a results file; a last line that was cut off does not count."""
+    if not path.exists():
+        return
     for text in path.read_text(encoding="utf-8").splitlines():
         try:
             yield json.loads(text)
@@ -68,47 +154,86 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
             continue
 
 
-def report(lines: list[dict[str, Any]]) -> str:
-    """Return the tables of all results."""
-    scored = [line for line in lines if line["solver"] != "out_of_reach"]
-    unreached = len(lines) - len(scored)
-    if not scored:
-        return "no results yet"
-    parts = [table(scored, "kind"), table(scored, "effect")]
-    return "\n\n".join([*parts, f"Out of reach within the catalogue's limits: {unreached} cases."])
+def current(path: Path, solvers: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the lines that today's code gave."""
+    versions = {name: version_of(name) for name in solvers}
+    return [line for line in read(path) if versions.get(line["solver"]) == line["version"]]
 
 
 def main() -> None:
-    """Run what is missing, then print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Run what is missing."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="the small subset")
-    parser.add_argument("--report", action="store_true", help="run nothing, print the tables")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--most", type=int, help="stop after so many cases")
+    parser.add_argument("--minutes", type=float, help="begin no case after so many minutes")
+    parser.add_argument("--only", default="", help="cases whose key holds this text")
+    parser.add_argument("--solvers", default=",".join(SOLVERS), help="names with commas between")
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
     arguments = parser.parse_args()
+    unknown = set(arguments.solvers.split(",")) - SOLVERS.keys()
+    if unknown:
+        parser.error(f"{', '.join(sorted(unknown))}: solvers are {', '.join(SOLVERS)}")
     arguments.output.mkdir(parents=True, exist_ok=True)
     path = arguments.output / ("quick.jsonl" if arguments.quick else "full.jsonl")
-    if not arguments.report:
-        cases = quick_cases() if arguments.quick else full_cases()
-        done = {line["key"] for line in read(path)}
-        run([case for case in cases if case.key not in done][: arguments.most], path, arguments)
-    print(report(read(path)))
+    solvers = arguments.solvers.split(",")
+    done = defaultdict(set)
+    for line in current(path, solvers):
+        done[line["key"]].add(line["solver"])
+    cases = [
+        c for c in (quick_cases() if arguments.quick else full_cases()) if arguments.only in c.key
+    ]
+    todo = [
+        (case, missing)
+        for case in cases
+        if (missing := [name for name in solvers if name not in done[case.key]])
+    ][: arguments.most]
+    print(f"{len(todo)} of {len(cases)} cases to do, results in {path}", flush=True)
+    run(todo, path, arguments)
 
 
-def run(cases: list[Case], path: Path, arguments: argparse.Namespace) -> None:
+def run(todo: Sequence[tuple[Case, list[str]]], path: Path, arguments: argparse.Namespace) -> None:
     """Solve cases and append their scores to the results file as they come."""
-    draws = QUICK_DRAWS if arguments.quick else DRAWS
-    for experiment in sorted({case.experiment for case in cases}):
-        dictionary(experiment, not arguments.quick, draws, arguments.processes, arguments.output)
-    progress = Progress("cases")
-    with ProcessPoolExecutor(arguments.processes) as pool, path.open("a", encoding="utf-8") as out:
-        waiting = [pool.submit(solve, case, arguments.quick, arguments.output) for case in cases]
-        for number, finished in enumerate(as_completed(waiting)):
+    for design in sorted({design_of(case) for case, _ in todo}):
+        dictionary(design, arguments.quick, arguments.output, arguments.processes)
+    begun, progress = time.monotonic(), Progress("cases")
+    left = dict.fromkeys(range(len(todo)))
+    for _ in range(RESTARTS):
+        try:
+            with ProcessPoolExecutor(arguments.processes) as pool:
+                _drain(pool, todo, left, path, arguments, begun, progress)
+            return
+        except BrokenProcessPool:
+            print("a process was killed; what it worked on is tried again", flush=True)
+
+
+def _drain(
+    pool: ProcessPoolExecutor,
+    todo: Sequence[tuple[Case, list[str]]],
+    left: dict[int, None],
+    path: Path,
+    arguments: argparse.Namespace,
+    begun: float,
+    progress: Progress,
+) -> None:
+    waiting = {
+        pool.submit(solve, *todo[number], arguments.quick, arguments.output): number
+        for number in left
+    }
+    with path.open("a", encoding="utf-8") as out:
+        for finished in as_completed(waiting):
+            if finished.cancelled():
+                continue
             # One write a case: a run that is stopped leaves whole cases behind.
             out.write("".join(json.dumps(line) + "\n" for line in finished.result()))
             out.flush()
-            progress(number + 1, len(cases))
+            del left[waiting[finished]]
+            progress(len(todo) - len(left), len(todo))
+            if arguments.minutes and time.monotonic() - begun > 60.0 * arguments.minutes:
+                for future in waiting:
+                    future.cancel()
 
 
 if __name__ == "__main__":

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.drive import Drive
+from wrist_stiffness.simulation.exact import ExactWrist
 from wrist_stiffness.simulation.experiment import experiment
 from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, instrument
@@ -26,6 +26,9 @@ from wrist_stiffness.simulation.wrist import TrueState, TrueWrist
 
 SENSED = (*HEATED, "ambient")
 """Bodies whose temperature the cell knows."""
+
+
+TRUTHS = ("fast", "exact")
 
 
 @dataclass(frozen=True)
@@ -56,11 +59,15 @@ class CellSettings:
         `exact`, or `wrong` as the seed draws it.
     session : int
         Number of the session: registrations of a wrong base differ between them.
+    truth : str
+        `fast`, or `exact`: at the rests where a static instrument measures, the equilibrium of all
+        bodies at once.  It leaves out laws that need motion.
 
     Raises
     ------
     InputError
-        If the rate or the duration is not positive, or the instrument or its view not known.
+        If the rate or the duration is not positive, the instrument or its view not known, or the
+        truth not to be had with this instrument.
     """
 
     rate_hz: float = 100.0
@@ -75,6 +82,7 @@ class CellSettings:
     base: str = "exact"
     base_seed: int = 0
     session: int = 0
+    truth: str = "fast"
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -82,7 +90,12 @@ class CellSettings:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"cell: {name} = {value} is not a positive number")
-        instrument(self.instrument)
+        if self.truth not in TRUTHS:
+            raise InputError(f"truth {self.truth!r} is not one of {', '.join(TRUTHS)}")
+        if self.truth == "exact" and not instrument(self.instrument).static:
+            raise InputError(
+                f"exact truth needs an instrument that measures at rests, {self.instrument} does not"
+            )
         PoseView(self.sees, self.lost_beams, np.random.default_rng(0))
 
 
@@ -121,6 +134,24 @@ class CellSample:
         return CellSample(*(getattr(self, field.name)[place] for field in fields(self)))
 
 
+def true_laws(table: Table, settings: CellSettings) -> list[Law]:
+    """Return all laws by which the true wrist departs from its table."""
+    return [
+        *(build(hidden, table) for hidden in settings.hidden),
+        *base_laws(settings.base, table, settings.base_seed, settings.session),
+    ]
+
+
+def at_rests(wrist: ExactWrist, state: TrueState, rests: NDArray[np.bool_]) -> TrueState:
+    """Return the state of n samples with the exact pose where `rests` (n,) says so."""
+    rotation, shift = state.rotation.copy(), state.shift.copy()
+    for i in np.flatnonzero(rests):
+        theta = state.block.configuration.theta[i]
+        exact = wrist.solve(theta, state.block.load[i], state.block.temperature[i])
+        rotation[i], shift[i] = exact.rotation, exact.shift
+    return replace(state, rotation=rotation, shift=shift)
+
+
 class VirtualCell:
     """A wrist at work.
 
@@ -143,11 +174,10 @@ class VirtualCell:
             np.random.default_rng(settings.program_seed),
             settings.program_seconds,
         )
-        self._laws: Sequence[Law] = [
-            *(build(hidden, table) for hidden in settings.hidden),
-            *base_laws(settings.base, table, settings.base_seed, settings.session),
-        ]
+        self._laws = true_laws(table, settings)
         self._wrist = TrueWrist(table, self._laws)
+        # Laws have histories: each wrist has laws of its own.
+        self._exact = ExactWrist(table, true_laws(table, settings))
         drive_rng, load_rng, pose_rng, view_rng = rng.spawn(4)
         sensor, pose_sensor = settings.load_sensor, instrument(settings.instrument)
         self._static = pose_sensor.static
@@ -207,6 +237,8 @@ class VirtualCell:
         phase = self.program.phase(time_s)
         load, room = self.program.load(phase), self.program.ambient(phase)[:, 0]
         true = self._wrist.run(time_s, shaft, load, room)
+        if self.settings.truth == "exact":
+            true = at_rests(self._exact, true, self._rest_ends(time_s))
         encoder, wrench, rotation, shift = self._readings(time_s, shaft, load, true)
         noise = self._pose_noise(time_s)
         # A tracker's errors in position and orientation are separate, not one rigid motion.

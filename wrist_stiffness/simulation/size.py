@@ -70,7 +70,12 @@ class Scale:
         quiet = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
         # The size is that of the whole motion, whatever part of it the sensor sees.
         self._quiet = replace(
-            settings, instrument="ideal", sees="pose", lost_beams=0.0, load_sensor=quiet
+            settings,
+            instrument="ideal",
+            sees="pose",
+            lost_beams=0.0,
+            load_sensor=quiet,
+            truth="fast",
         )
         self.time_s = np.arange(max(1, round(seconds * settings.rate_hz))) / settings.rate_hz
         self._without = without = self._run(())
