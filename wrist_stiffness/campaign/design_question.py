@@ -86,7 +86,8 @@ def between(
     Parameters
     ----------
     classes : sequence of sequences of Effect
-        Rivals; the first of each class with the values that the diagnosis found.
+        Rivals; the first of each class with the values that the diagnosis found, or at its prior
+        means where it found them in other coordinates.
     silent : sequence of Effect
         What the diagnosis could not have seen.
     rng : numpy.random.Generator
@@ -106,7 +107,9 @@ def between(
     goals = []
     for members in classes:
         if len(members) > 1:
-            rivals[members[0].name] = (members[0],)
+            best = members[0]
+            valued = any(best.estimates[p.key].value != p.mean for p in best.parameters)
+            rivals[best.name] = (best,) if valued else drawn(best, rng)
             for effect in members[1:]:
                 rivals.setdefault(effect.name, drawn(effect, rng))
             goals += [Goal(a.name, b.name) for a in members for b in members if a is not b]

@@ -13,6 +13,9 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.model.block import Block
 
+LEAD_S = 5.0
+"""Time to come to the reference pose from wherever the motors stand [s]."""
+
 APPROACH = np.radians(4.0)
 """From so far aside a pose is approached, on both motors [rad]."""
 
@@ -214,6 +217,8 @@ class _Clock:
         self._knots: list[int] = []
         self._ends: list[float] = []
         self._knot()
+        self._time_s = LEAD_S
+        self._knot()
 
     def travel(self, theta: Array) -> None:
         direct = straight(self._workspace, self._theta, theta)
@@ -272,14 +277,15 @@ class _Clock:
         if duration == 0.0:
             return
         start, way, begin = self._theta, target - self._theta, self._time_s
+        seen = number is not None and self._pace.in_motion
         for part in SEEN_IN_MOVES:
-            for back in (BEFORE_S / duration, 0.0):
+            for back in (BEFORE_S / duration, 0.0) if seen else (0.0,):
                 u = max(part - back, 0.0)
                 self._time_s = begin + u * duration
                 blend = u**3 * (10.0 + u * (6.0 * u - 15.0))
                 rate = 30.0 * u**2 * (1.0 - u) ** 2 / duration
                 at = self._sample(start + blend * way, rate * way)
-            if number is not None and self._pace.in_motion:
+            if seen and number is not None:
                 self._observed.append((at, number, True))
         self._time_s, self._theta = begin + duration, target
         self._knot()

@@ -1,0 +1,119 @@
+"""`wrist-stiffness plan`: the first experiment, or the next one between rivals."""
+
+from __future__ import annotations
+
+import argparse
+
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
+
+DESCRIPTION = """\
+Plan an experiment: which poses, approached from where, under which of your loads, how long. With
+--commissioning it is the first one on a wrist: it calibrates it, shows every effect that poses and
+loads can show, and keeps those apart that look alike. With --diagnosis it is the next one: it
+separates the effects that 'diagnose --json' could not tell apart. LOADS.yaml lists the loads that
+you can apply; nothing else is proposed.
+
+PLAN is a folder: plan.csv (a row for each measurement at rest), trajectory (a recording with the
+motors' motion as one message on /motor_trajectory), plan.png and summary.txt. Loads that hands put
+on are due at the times of the table. Drive near the first pose before you start."""
+
+EPILOG = """\
+examples:
+  wrist-stiffness plan --commissioning --loads loads.yaml --minutes 30 -o first_plan
+  wrist-stiffness plan --diagnosis found.json --loads loads.yaml -o next_plan
+  ros2 bag play first_plan/trajectory     # with /motor_trajectory remapped to your controller
+
+loads.yaml:
+  schema: 1
+  loads:
+    - {kind: weight, name: brass 100 g, mass_kg: 0.1, point_mm: [20, 0, -18], change_s: 15}
+
+Exit code 1: no experiment with these loads would settle any of the questions."""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `plan`."""
+    parser = commands.add_parser(
+        "plan",
+        help="plan the first or the next experiment",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--commissioning", action="store_true", help="the first experiment")
+    what.add_argument("--diagnosis", metavar="FILE", help="result of diagnose --json")
+    parser.add_argument("--loads", metavar="FILE", required=True, help="loads you can apply")
+    parser.add_argument("-o", "--output", metavar="PLAN", required=True, help="folder to make")
+    parser.add_argument(
+        "--minutes",
+        type=float,
+        help="duration (default with --diagnosis: as long as it takes, up to 60)",
+    )
+    parser.add_argument(
+        "--speed", type=float, default=30.0, metavar="DEG_S", help="fastest motor speed (30)"
+    )
+    parser.add_argument(
+        "--dwell",
+        type=float,
+        default=2.0,
+        metavar="S",
+        help="time for one measurement at rest, settling included (default: 2)",
+    )
+    parser.add_argument(
+        "--static", action="store_true", help="the pose sensor measures at rest only (a CMM)"
+    )
+    parser.add_argument(
+        "--noise",
+        nargs=2,
+        type=float,
+        default=[1.0, 1.0],
+        metavar=("UM", "MDEG"),
+        help="scatter of each component of a measured pose, with --commissioning (1 um, 1 mdeg)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="another one, another plan (0)")
+    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+    parser.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from pathlib import Path
+
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.workflows.plan import (
+        Options,
+        plan_between_rivals,
+        plan_commissioning,
+        write_plan,
+    )
+
+    if Path(arguments.output).exists():
+        raise InputError(f"{arguments.output} exists already and is not overwritten")
+    options = Options(
+        arguments.minutes,
+        arguments.speed,
+        arguments.dwell,
+        not arguments.static,
+        *arguments.noise,
+        arguments.seed,
+    )
+    model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
+    progress = Progress("plan")
+    if arguments.commissioning:
+        known, planned = plan_commissioning(model, arguments.loads, options, progress)
+    else:
+        known, planned = plan_between_rivals(
+            model, arguments.diagnosis, arguments.loads, options, progress
+        )
+    print(planned.text)
+    if arguments.json:
+        write_json(arguments.json, planned.as_values())
+    if planned.plan.timeline is None:
+        return EXIT_NO
+    write_plan(known, planned, arguments.output)
+    print(f"written: {arguments.output}")
+    return EXIT_DONE
