@@ -138,6 +138,33 @@ def test_a_signal_ends_the_cell_with_all_its_nodes(tmp_path, ending, code):
     assert [child for child in children if Path(f"/proc/{child}").exists()] == []
 
 
+def is_running(pid):
+    """Whether a process is there and no zombie; who adopts an orphan may never reap it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def test_a_killed_cell_leaves_no_node_behind_and_a_whole_recording(tmp_path):
+    path = tmp_path / "killed.mcap"
+    command = [sys.executable, "-m", "wrist_stiffness", "cell", "--record", str(path)]
+    end_s = time.monotonic() + DEADLINE_S
+    with subprocess.Popen(command) as process:
+        try:
+            while not list(tmp_path.glob(f".{path.name}.*")) and time.monotonic() < end_s:
+                assert process.poll() is None
+                os.sched_yield()
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        finally:
+            process.kill()
+    assert len(children) == 5
+    while any(map(is_running, children)):
+        assert time.monotonic() < end_s
+        os.sched_yield()
+    assert open_recording(path).damage == ""
+
+
 def test_the_cell_says_which_node_failed(tmp_path, capfd):
     (tmp_path / "taken").mkdir()
     with pytest.raises(InputError, match="node recorder ended with code 2"):

@@ -11,6 +11,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from wrist_stiffness.errors import WristError
+from wrist_stiffness.ros.parent import end_with_parent
 
 EXIT_BAD_INPUT = 2
 
@@ -30,6 +31,7 @@ def run(make_node: Callable[[], Node]) -> int:
     int
         0, or 2 if the node cannot start as asked; one line on stderr says why.
     """
+    end_with_parent()
     rclpy.init()
     executor = SingleThreadedExecutor()
     try:

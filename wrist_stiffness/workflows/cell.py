@@ -17,6 +17,7 @@ from typing import NoReturn
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.workflows.node_list import (
+    PARENT_PID,
     RECORDER_NODE,
     SIMULATOR_NODE,
     WRIST_NODES,
@@ -128,6 +129,7 @@ def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.P
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_DOMAIN_ID": str(1 + os.getpid() % DOMAINS),
         **os.environ,
+        PARENT_PID: str(os.getpid()),
     }
     running: dict[str, subprocess.Popen[bytes]] = {}
     # By itself SIGTERM would end this process without the `finally`, and leave the nodes behind.

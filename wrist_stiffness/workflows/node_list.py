@@ -8,6 +8,9 @@ from dataclasses import dataclass, field, replace
 
 ParameterValue = bool | int | float | str
 
+PARENT_PID = "WRIST_STIFFNESS_PARENT"
+"""Environment variable: the process with which a node shall end, however that ends."""
+
 
 @dataclass(frozen=True)
 class NodeEntry:
