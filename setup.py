@@ -58,6 +58,7 @@ setup(
         "plot": ["matplotlib>=3.8"],
         "fleet": ["distributed>=2024.5", "cloudpickle>=3"],
         "workbench": ["nicegui>=2", "plotly>=5"],
+        "bench": ["scikit-learn>=1.3"],
         "verify": ["acrod>=1.2", "rosbags>=0.10"],
         # colcon finds pytest through this extra and would run no test without it.
         "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100"],
