@@ -27,6 +27,9 @@ FALSE = 1.0
 
 L1_RATIO = 0.9
 
+STEPS = np.geomspace(1.0, 1e-2, 30)
+"""Penalties of the path over the largest that does anything."""
+
 
 def elastic_net(riddle: Riddle, words: Dictionary) -> Answer:
     """Choose words by stability selection and fit them by least squares."""
@@ -62,11 +65,12 @@ def _stability(design: Array, rest: Array, owner: np.ndarray, words: int, seed: 
     hits = np.zeros(words)
     for _ in range(HALVES):
         rows = rng.permutation(len(rest))[: len(rest) // 2]
+        largest = np.max(np.abs(design[rows].T @ rest[rows])) / len(rows) / L1_RATIO
         with warnings.catch_warnings():
             # The path is only read for its order of entry.
             warnings.simplefilter("ignore", ConvergenceWarning)
             _, path, _ = enet_path(
-                design[rows], rest[rows], l1_ratio=L1_RATIO, alphas=30, eps=1e-2, tol=1e-3
+                design[rows], rest[rows], l1_ratio=L1_RATIO, alphas=largest * STEPS, tol=1e-3
             )
         active = path != 0.0
         allowed = np.flatnonzero(active.sum(axis=0) <= max(most, 1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from bench_wrist import Array
 from dictionary import Dictionary
-from observe import Riddle, Session
+from observe import Riddle
 from scipy.stats import spearmanr
 from solvers import Answer
 from whitened import Whitened

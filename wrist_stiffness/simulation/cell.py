@@ -94,7 +94,8 @@ class CellSettings:
             raise InputError(f"truth {self.truth!r} is not one of {', '.join(TRUTHS)}")
         if self.truth == "exact" and not instrument(self.instrument).static:
             raise InputError(
-                f"exact truth needs an instrument that measures at rests, {self.instrument} does not"
+                f"exact truth needs an instrument that measures at rests: {self.instrument} measures "
+                "all the time"
             )
         PoseView(self.sees, self.lost_beams, np.random.default_rng(0))
 
