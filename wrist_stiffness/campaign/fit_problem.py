@@ -11,6 +11,7 @@ import numpy as np
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.free_effects import FreeEffect
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.campaign.shims import Shims
 from wrist_stiffness.diagnosis.observations import Observations
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -115,7 +116,7 @@ class FitProblem:
         return np.array([unknown.weight for unknown in self.unknowns])
 
     def effects(self, z: Array, session: int) -> tuple[Effect, ...]:
-        """Return the free effects as a session has them.
+        """Return the free effects as a session has them, gaps as shims leave them.
 
         Parameters
         ----------
@@ -129,9 +130,16 @@ class FitProblem:
             if unknown.session in (None, session):
                 value = unknown.mean + float(steps) * unknown.step
                 values[unknown.free][unknown.key] = min(max(value, unknown.lower), unknown.upper)
-        return tuple(
-            free.effect.with_values(own) for free, own in zip(self.free, values, strict=True)
-        )
+        found = [free.effect.with_values(own) for free, own in zip(self.free, values, strict=True)]
+        return self._shims.fitted(self._starts, found)
+
+    @cached_property
+    def _starts(self) -> tuple[Effect, ...]:
+        return tuple(free.effect for free in self.free)
+
+    @cached_property
+    def _shims(self) -> Shims:
+        return Shims.of(self.model, self._starts)
 
     def residual(self, z: Array) -> Array:
         """Return log(T_measured T_predicted^-1) of all units, (u, 6) at O in F [m, rad]."""

@@ -131,9 +131,11 @@ class Fit:
         sigma = np.sqrt(np.diag(self.covariance))
         correlation = np.abs(self.covariance / np.outer(sigma, sigma)) - np.eye(len(sigma))
         names = [f"{problem.free[u.free].effect.name} {u.key}" for u in problem.unknowns]
+        fitted = [problem.effects(self.z, number) for number in range(len(problem.sessions))]
         out = []
         for place, (unknown, z) in enumerate(zip(problem.unknowns, self.z, strict=True)):
-            value = unknown.mean + float(z) * unknown.step
+            effect = fitted[unknown.session or 0][unknown.free]
+            value = effect.estimates[unknown.key].value
             near = 1e-6 * unknown.step
             out.append(
                 Fitted(
@@ -142,7 +144,7 @@ class Fit:
                     None if unknown.session is None else problem.sessions[unknown.session].name,
                     value,
                     float(sigma[place]) * unknown.step,
-                    unknown.mean,
+                    value - float(z) * unknown.step,
                     unknown.step / unknown.weight,
                     min(value - unknown.lower, unknown.upper - value) < near,
                     tuple(names[i] for i in np.flatnonzero(correlation[place] > TOGETHER)),
