@@ -88,7 +88,8 @@ def pseudo_inverse(columns: Array) -> Array:
     (first, product), (_, second) = columns.T.dot(columns).tolist()
     determinant = first * second - product * product
     if determinant <= (DEPENDENT * max(first, second)) ** 2:
-        return np.linalg.pinv(columns)
+        return np.asarray(np.linalg.pinv(columns), dtype=float)
     inverse = np.array([[second, -product], [-product, first]])
     inverse /= determinant
-    return inverse.dot(columns.T)
+    result: Array = inverse.dot(columns.T)
+    return result

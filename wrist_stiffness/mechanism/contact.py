@@ -78,18 +78,15 @@ def settle(
         return np.zeros(len(gap)), np.zeros(len(gap), dtype=bool)
     closed = gap < 0.0 if guess is None else guess
     length_scale = max(max(gaps), -min(gaps))
-    softest = max(approach.diagonal().tolist())
-    if softest <= 0.0:
-        raise InputError(NOT_DEFINITE)
     least_opening = -RELATIVE_TOLERANCE * length_scale
-    least_force = least_opening / softest
     fewest, patience = len(gap) + 1, PATIENCE
     for _ in range(MAX_PIVOTS):
         force = held_force(approach, gap, closed)
         opening = gap + approach.dot(force)
         # What is held is closed but for rounding, and what is open has no force.
-        if min(force.tolist()) >= least_force and min(opening.tolist()) >= least_opening:
-            return np.maximum(force, 0.0), closed
+        if min(force.tolist()) >= 0.0 and min(opening.tolist()) >= least_opening:
+            return force, closed
+        least_force = least_opening / max(approach.diagonal().tolist())
         wrong = np.where(closed, force < least_force, opening < least_opening)
         count = int(np.count_nonzero(wrong))
         if count == 0:

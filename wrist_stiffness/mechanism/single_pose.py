@@ -47,11 +47,10 @@ _ROWS = np.ravel(np.add.outer(3 * np.array(_BODY), np.arange(3)))
 
 # Columns of T before the turn into the body: platform, slides of joint_2 to joint_4, link_3.  In
 # limb 1 they are I - Q', D', P', in limb 2 Q', -D', I - P', and without that identity past link_2.
-_SIGN = np.array([-1, -1, -1, -1, 1, 1, 1, 1, 1.0])
-_SIGNS = np.repeat([_SIGN, _SIGN, -_SIGN, -_SIGN, -_SIGN], 3, axis=0)
-# T over the dual vectors, with b and d to be put in.
-_DUAL_LAW = np.hstack([np.zeros((3, 3)), IDENTITY, np.zeros((3, 3))])
-_LIMB_1, _LIMB_2_BASE = slice(0, 6), slice(6, 12)
+# All but the identities is the dual basis times this law, with -b and d to be put in.
+_LAW = np.hstack([np.zeros((3, 3)), np.diag([-1.0, 1.0, 1.0]), np.zeros((3, 3))])
+_IN_LIMB_1, _IN_LIMB_2_BASE = np.eye(3, 9), np.eye(3, 9, 6)
+_LIMB_1, _LIMB_2_BASE, _PAST_LINK_2 = slice(0, 6), slice(6, 12), slice(12, 15)
 _MOTOR_1, _MOTOR_2 = slice(0, 3), slice(6, 9)
 
 
@@ -125,7 +124,7 @@ class SinglePoseKinematics:
             rows[0:3],
             rows[3:6],
             rows[9:12],
-            np.float64(determinant),
+            np.array(determinant),
             rows[18:].reshape(3, 3) / determinant,
             turns.swapaxes(1, 2),
         )
@@ -148,10 +147,10 @@ class SinglePoseStatics:
         self._gravity = gravity
         self._sectors = sectors = components.sectors
         m, n = len(sectors.gap), len(GROUPS)
-        # Six-vectors of the groups lie as (group, xyz, half), bodies' fields as (body, xyz).
-        flexibility, weight_screw = np.zeros((n, 3, 2, n, 3, 2)), np.zeros((n, 3, 2, 5, 3))
-        screw, weight_gap = np.zeros((m, n, 3, 2)), np.zeros((m, 5, 3))
-        total = np.zeros((5, 3, 2, 5, 3))
+        # Six-vectors of the groups lie as (half, group, xyz), bodies' fields as (body, xyz).
+        flexibility, weight_screw = np.zeros((2, n, 3, 2, n, 3)), np.zeros((2, n, 3, 5, 3))
+        screw, weight_gap = np.zeros((m, 2, n, 3)), np.zeros((m, 5, 3))
+        total = np.zeros((5, 2, 3, 5, 3))
         for group, names in enumerate(GROUPS):
             body = _BODY[group]
             carried = np.zeros((6, 3))
@@ -159,17 +158,17 @@ class SinglePoseStatics:
                 k = ELASTIC.index(name)
                 c, own = components.flexibility[k], sectors.component == k
                 here = carried + components.weight_platform_side[k]
-                flexibility[group, :, :, group] += _by_halves(c.reshape(6, 2, 3)).swapaxes(2, 3)
-                weight_screw[group, :, :, body] += _by_halves(c @ here)
-                screw[own, group] = sectors.screw[own].reshape(-1, 2, 3).swapaxes(1, 2)
+                flexibility[:, group, :, :, group] += c.reshape(2, 3, 2, 3)
+                weight_screw[:, group, :, body] += (c @ here).reshape(2, 3, 3)
+                screw[own, :, group] = sectors.screw[own].reshape(-1, 2, 3)
                 weight_gap[own, body] = sectors.weight_approach[own] + sectors.screw[own] @ here
                 carried = here + components.weight_motor_side[k]
-            total[body, :, :, body] = _by_halves(carried)
-        total[_PLATFORM, :, :, _PLATFORM] = _by_halves(components.platform_weight)
+            total[body, :, :, body] = carried.reshape(2, 3, 3)
+        total[_PLATFORM, :, :, _PLATFORM] = components.platform_weight.reshape(2, 3, 3)
         self._screw = screw.reshape(m, 6 * n)
         self._by_wrench = np.concatenate([flexibility.reshape(6 * n, 6 * n), self._screw])
         # A force along a slide has no moment.
-        self._by_force = np.ascontiguousarray(self._by_wrench[:, ::2])
+        self._by_force = np.ascontiguousarray(self._by_wrench[:, :15])
         by_field = (weight_screw.reshape(6 * n, 15), weight_gap.reshape(m, 15))
         self._by_field = np.concatenate([*by_field, total.reshape(30, 15)])
 
@@ -202,43 +201,36 @@ class SinglePoseStatics:
             If the flanges' flexibility is not positive definite.
         """
         turns = configuration.bodies.swapaxes(-1, -2).reshape(15, 3)
-        dual, sectors = configuration.dual, self._sectors
-        law = _DUAL_LAW.copy()
-        law[0, :3], law[2, 6:] = configuration.b, configuration.d
-        turned = turns.take(_ROWS, axis=0)
-        t = turned.dot(dual.T).dot(law)
-        t *= _SIGNS
-        direct = t[_LIMB_1, :3]
-        direct += turned[_LIMB_1]
-        direct = t[_LIMB_2_BASE, 6:]
-        direct += turned[_LIMB_2_BASE]
+        sectors = self._sectors
+        law = _LAW.copy()
+        law[0, :3], law[2, 6:] = -configuration.b, configuration.d
+        law = configuration.dual.T.dot(law)
+        turned, t = turns.take(_ROWS, axis=0), np.empty((15, 9))
+        turned[_LIMB_1].dot(_IN_LIMB_1 + law, out=t[_LIMB_1])
+        turned[_LIMB_2_BASE].dot(_IN_LIMB_2_BASE - law, out=t[_LIMB_2_BASE])
+        turned[_PAST_LINK_2].dot(-law, out=t[_PAST_LINK_2])
 
         own = self._by_field.dot(turns.dot(self._gravity))
-        weight = configuration.bodies @ own[-30:].reshape(5, 3, 2)
-        x = np.zeros((9, 2))
-        x[:3] = wrench.reshape(2, 3).T + weight[_PLATFORM]
-        x[6:] = weight[_LINK_3]
-        u = t.dot(x)
-        direct = u[_MOTOR_1]
-        direct += weight[_LINK_1]
-        direct = u[_MOTOR_2]
-        direct += weight[_LINK_2]
+        weight = own[-30:].reshape(5, 2, 3) @ turns.reshape(5, 3, 3)
+        x = np.zeros((2, 9))
+        x[:, :3] = wrench.reshape(2, 3) + weight[_PLATFORM]
+        x[:, 6:] = weight[_LINK_3]
+        u = x.dot(t.T)
+        carried = u[:, _MOTOR_1]
+        carried += weight[_LINK_1]
+        carried = u[:, _MOTOR_2]
+        carried += weight[_LINK_2]
         bent = self._by_wrench.dot(u.ravel())
         bent += own[:-30]
 
-        to_slides = t[:, 3:6]
-        slid = to_slides.T.dot(bent[:30:2])
-        gap = sectors.gap + bent[30:] + sectors.slide.dot(slid)
-        delta = bent[:30]
+        to_slides, delta, gap = t[:, 3:6], bent[:30], bent[30:]
+        gap += sectors.gap
+        gap += sectors.slide.dot(delta[:15].dot(to_slides))
         by_slide = self._by_force.dot(to_slides)
-        half = by_slide[30:] + 0.5 * sectors.slide.dot(to_slides.T.dot(by_slide[:30:2]))
-        approach = half.dot(sectors.slide.T)
-        approach += approach.T + sectors.approach
+        half = by_slide[30:] + sectors.slide.dot(0.5 * to_slides.T.dot(by_slide[:15]))
+        approach = half.dot(sectors.slide.T) + sectors.slide.dot(half.T)
+        approach += sectors.approach
         force, closed = settle(approach, gap, active)
-        delta += by_slide[:30].dot(force.dot(sectors.slide)) + force.dot(self._screw)
-        return t[:, :3].T.dot(delta.reshape(15, 2)).T.ravel(), force, closed
-
-
-def _by_halves(columns: Array) -> Array:
-    """Return six-vectors in the rows (6, ...) as (xyz, half, ...)."""
-    return columns.reshape(2, 3, *columns.shape[1:]).swapaxes(0, 1)
+        delta += by_slide[:30].dot(force.dot(sectors.slide))
+        delta += force.dot(self._screw)
+        return delta.reshape(2, 15).dot(t[:, :3]).ravel(), force, closed
