@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.marker_poses import LEAST_MARKERS, poses_from_markers
 from wrist_stiffness.campaign.signals import Signal, Stamps
-from wrist_stiffness.compensation.intake import BASE_FRAME, Frames
+from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
 from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
 from wrist_stiffness.errors import FrameError, InputError
@@ -141,32 +141,40 @@ def without_frame_motion(track: PoseTrack, frame: PoseTrack) -> PoseTrack:
     )
 
 
+def measured_components(poses: PoseSamples) -> tuple[Array, Array]:
+    """Return positions (n, 3) and quaternions (n, 4) with NaN for what was not measured.
+
+    A huge variance says so; so do numbers that are not finite.  A quaternion whose norm is not one
+    is no measurement at all, and an orientation that is measured in part only is left out.
+    """
+    huge = np.diagonal(poses.covariance, axis1=1, axis2=2) >= NOT_MEASURED
+    position, quaternion = poses.position.copy(), poses.quaternion.copy()
+    unturned = huge[:, 3:].any(axis=1)
+    # NaN has no norm near one either.
+    broken = ~(np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= UNIT_TOLERANCE) & ~unturned
+    position[huge[:, :3] | ~np.isfinite(position) | broken[:, None]] = np.nan
+    quaternion[unturned | broken] = np.nan
+    return position, quaternion
+
+
 def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
-    """Return poses in F; components with a huge variance and broken quaternions are NaN."""
-    turn, origin = _in_base(poses.frame_id, what, frames)
-    remarks = []
-    shift = poses.position.copy()
-    usable = np.abs(np.linalg.norm(poses.quaternion, axis=1) - 1.0) <= UNIT_TOLERANCE
-    variance = np.diagonal(poses.covariance, axis1=1, axis2=2)
-    huge = variance >= NOT_MEASURED
-    shift[huge[:, :3] | ~np.isfinite(shift)] = np.nan
-    partly = huge[:, 3:].any(axis=1)
-    if np.any(partly & ~huge[:, 3:].all(axis=1)):
-        remarks.append(f"{what}: orientations that are measured in part only are not used")
-    broken = ~usable & ~partly
-    shift[broken] = np.nan
-    usable &= ~partly
-    rotation = np.full((len(usable), 3, 3), np.nan)
-    rotation[usable] = turn @ Rotation.from_quat(poses.quaternion[usable]).as_matrix()
+    turn, origin = base_transform(poses.frame_id, what, frames)
+    shift, quaternion = measured_components(poses)
+    turned = np.isfinite(quaternion).all(axis=1)
+    rotation = np.full((len(shift), 3, 3), np.nan)
+    rotation[turned] = turn @ Rotation.from_quat(quaternion[turned]).as_matrix()
     if np.any(turn != np.eye(3)):  # NaN times zero would spread to the other components
         shift = shift @ turn.T
+    huge = np.diagonal(poses.covariance, axis1=1, axis2=2) >= NOT_MEASURED
     covariance = _stated(poses.covariance, ~huge)
     if covariance is not None:
-        turned = block_diagonal(turn)
-        covariance = turned @ covariance @ turned.T
-    return _in_time_order(
-        poses.time_ns, shift + origin, rotation, covariance, what, int(broken.sum()), remarks
-    )
+        axes = block_diagonal(turn)
+        covariance = axes @ covariance @ axes.T
+    remarks = []
+    if np.any(huge[:, 3:].any(axis=1) & ~huge[:, 3:].all(axis=1)):
+        remarks.append(f"{what}: orientations that are measured in part only are not used")
+    lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
+    return _in_time_order(poses.time_ns, shift + origin, rotation, covariance, what, lost, remarks)
 
 
 def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
@@ -183,7 +191,7 @@ def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
 def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) -> PoseTrack:
     """Return the poses of markers in F; NaN where too few were seen."""
     what = "measured markers"
-    turn, origin = _in_base(samples.frame_id, what, frames)
+    turn, origin = base_transform(samples.frame_id, what, frames)
     count = samples.position.shape[1]
     if count != len(nominal):
         raise InputError(
@@ -201,21 +209,25 @@ def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) ->
     return _in_time_order(samples.time_ns, shift, rotation, None, what, unseen, [])
 
 
-def _in_base(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tuple[Array, Array]:
-    """Return rotation and origin that take a sensor frame to `wrist_base`."""
+def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tuple[Array, Array]:
+    """Return rotation and origin that take the frame of all messages to `wrist_base`.
+
+    Raises
+    ------
+    FrameError
+        If it is neither `wrist_base` nor mapped to it, or they come in several frames.
+    """
     names = np.unique(frame_id).tolist()
-    mapped = {
-        name: (frame.rotation, frame.position)
-        for name, frame in frames.sensors.items()
-        if frame.parent == BASE_FRAME
-    }
-    known = {BASE_FRAME: (np.eye(3), np.zeros(3)), **mapped}
-    for name in names:
-        if name not in known:
-            raise FrameError(f"{what}: frame '{name}' is not known (known: {', '.join(known)})")
+    found = [frames.in_base(name, what) for name in names]
     if len(names) > 1:
         raise FrameError(f"{what}: more than one frame: {', '.join(names)}")
-    return known[names[0]]
+    return found[0]
+
+
+def last_of_equal(time_ns: Stamps) -> NDArray[np.intp]:
+    """Return the rows in the order of their stamps; of equal stamps only the last one received."""
+    _, reverse = np.unique(time_ns[::-1], return_index=True)
+    return len(time_ns) - 1 - reverse
 
 
 def _in_time_order(
@@ -227,9 +239,7 @@ def _in_time_order(
     lost: int,
     remarks: list[str],
 ) -> PoseTrack:
-    """Sort by stamps, of equal ones keep the last; count what was lost."""
-    _, order = np.unique(time_ns[::-1], return_index=True)
-    order = len(time_ns) - 1 - order
+    order = last_of_equal(time_ns)
     if lost:
         remarks.append(f"{what}: {lost} of {len(time_ns)} lost by the instrument")
     return PoseTrack(time_ns[order], shift[order], rotation[order], covariance, tuple(remarks))

@@ -115,8 +115,8 @@ def read_session(
     """
     recording = open_recording(path)
     samples = read_samples(recording, remaps=remaps, joints=joints)
-    _require_topics(recording, samples, remaps or {})
-    notes, unread = _notes(samples)
+    require_topics(recording, samples, remaps or {})
+    notes, unread = notes_of(samples)
     try:
         machine = machine_signals(samples, frames or Frames())
         markers = table.geometry.platform.readout_points
@@ -192,7 +192,8 @@ def rigid_rotation(table: Table, theta: Array) -> Array:
     return rotation
 
 
-def _require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, str]) -> None:
+def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, str]) -> None:
+    """Refuse a recording that lacks angles, loads or measured poses, and name what is there."""
     present = ", ".join(topic.name for topic in recording.topics) or "none"
     needed = {
         JOINT_STATES: len(samples.joints.time_ns),
@@ -269,7 +270,7 @@ def _period_s(time_ns: Stamps) -> float:
     return float(np.median(np.diff(time_ns))) / NANOSECONDS if len(time_ns) > 1 else 0.0
 
 
-def _notes(samples: Samples) -> tuple[dict[str, Any], list[str]]:
+def notes_of(samples: Samples) -> tuple[dict[str, Any], list[str]]:
     """Return the facts of all notes, later ones first choice, and what was no JSON."""
     notes: dict[str, Any] = {}
     unread = []

@@ -8,7 +8,18 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from wrist_stiffness import __version__
-from wrist_stiffness.cli import cell, compare, explain, plan, predict, replay, simulate, table
+from wrist_stiffness.cli import (
+    cell,
+    compare,
+    explain,
+    export,
+    import_,
+    plan,
+    predict,
+    replay,
+    simulate,
+    table,
+)
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -55,7 +66,18 @@ class CommandModule(Protocol):
         """Add this command's parser."""
 
 
-COMMANDS: tuple[CommandModule, ...] = (table, predict, explain, simulate, replay, compare, plan, cell)
+COMMANDS: tuple[CommandModule, ...] = (
+    table,
+    predict,
+    explain,
+    simulate,
+    replay,
+    import_,
+    export,
+    compare,
+    plan,
+    cell,
+)
 
 
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:

@@ -1,0 +1,199 @@
+"""The columns of a campaign's table, and their numbers to and from SI without losing a digit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import Context, Decimal, InvalidOperation
+
+from wrist_stiffness.errors import InputError
+
+TIME = "time_s"
+MOTORS = ("motor_1_deg", "motor_2_deg")
+LOAD = ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")
+POSITION = ("x_mm", "y_mm", "z_mm")
+QUATERNION = ("qx", "qy", "qz", "qw")
+MARKER = re.compile(r"p(\d+)([xyz])_mm")
+TEMPERATURE = re.compile(r"T_([a-z0-9_]+)_degC")
+COVARIATE = re.compile(r"[A-Za-z]\w*_\w+")
+
+UNIT_ONE = "_1"
+"""Ends the column of a covariate whose name has no unit; it is no part of the name."""
+
+EXACT = Context(prec=60)
+PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
+FACTORS = {"deg": PI / 180, "mm": Decimal("0.001")}
+SIGNIFICANT = (15, 16, 17)
+"""Digits tried; seventeen tell any double, and what somebody typed mostly has fewer."""
+
+NANOSECONDS = Decimal(1_000_000_000)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Which columns a table has.
+
+    Parameters
+    ----------
+    loads : bool
+        Whether it has the load.
+    pose : tuple of str
+        Columns of the platform's pose that are there.
+    markers : int
+        Number of markers; 0 for a table of poses.
+    temperatures, covariates : dict of str to str
+        Column by component; by name.
+    """
+
+    loads: bool
+    pose: tuple[str, ...]
+    markers: int
+    temperatures: dict[str, str]
+    covariates: dict[str, str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns in the order in which an export writes them."""
+        return (
+            TIME,
+            *MOTORS,
+            *(LOAD if self.loads else ()),
+            *self.pose,
+            *marker_columns(self.markers),
+            *self.temperatures.values(),
+            *self.covariates.values(),
+        )
+
+
+def marker_columns(count: int) -> tuple[str, ...]:
+    """Return the columns of so many markers, p1x_mm first."""
+    return tuple(f"p{i}{axis}_mm" for i in range(1, count + 1) for axis in "xyz")
+
+
+def columns_of(header: Sequence[str]) -> Columns:
+    """Sort the columns of a table by what they mean.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Names in any order.
+
+    Returns
+    -------
+    Columns
+        Columns that are neither the machine's nor the pose's are temperatures (`T_COMPONENT_degC`)
+        and covariates (`NAME_UNIT`).
+
+    Raises
+    ------
+    InputError
+        If a column is missing, named twice or has no unit, or nothing measured is there.
+    """
+    for name in header:
+        if list(header).count(name) > 1:
+            raise InputError(f"column {name or '(without a name)'} is there twice")
+    if missing := [name for name in (TIME, *MOTORS) if name not in header]:
+        raise InputError(f"column {', '.join(missing)} is missing (found: {', '.join(header)})")
+    loads = [name for name in LOAD if name in header]
+    if 0 < len(loads) < len(LOAD):
+        missing = [name for name in LOAD if name not in header]
+        raise InputError(f"column {', '.join(missing)} of the load is missing")
+    turned = [name for name in QUATERNION if name in header]
+    if 0 < len(turned) < len(QUATERNION):
+        missing = [name for name in QUATERNION if name not in header]
+        raise InputError(f"column {', '.join(missing)} of the quaternion is missing")
+    pose = tuple(name for name in (*POSITION, *QUATERNION) if name in header)
+    markers = _markers(header)
+    if pose and markers:
+        raise InputError(f"columns {pose[0]} and p1x_mm: a pose and markers exclude each other")
+    if not pose and not markers:
+        raise InputError(
+            f"nothing measured: none of {', '.join((*POSITION, *QUATERNION))} or p1x_mm ... "
+            f"among {', '.join(header)}"
+        )
+    known = {TIME, *MOTORS, *LOAD, *pose, *marker_columns(markers)}
+    temperatures, covariates = {}, {}
+    for name in header:
+        if name in known:
+            continue
+        if found := TEMPERATURE.fullmatch(name):
+            temperatures[found[1]] = name
+        elif COVARIATE.fullmatch(name):
+            covariates[covariate_of(name)] = name
+        else:
+            raise InputError(f"column {name!r} is not known and no NAME_UNIT of a covariate")
+    return Columns(bool(loads), pose, markers, temperatures, covariates)
+
+
+def covariate_of(column: str) -> str:
+    """Return the covariate's name: that of the column, less a unit of one."""
+    plain = column.removesuffix(UNIT_ONE)
+    return plain if "_" not in plain else column
+
+
+def column_of(covariate: str) -> str:
+    """Return the column of a covariate (inverse of `covariate_of`)."""
+    return covariate if "_" in covariate else covariate + UNIT_ONE
+
+
+def _markers(header: Sequence[str]) -> int:
+    numbers = [int(found[1]) for name in header if (found := MARKER.fullmatch(name))]
+    count = max(numbers, default=0)
+    if missing := [name for name in marker_columns(count) if name not in header]:
+        raise InputError(f"column {', '.join(missing[:6])} of the markers is missing")
+    return count
+
+
+def reader_of(column: str) -> Callable[[str], float]:
+    """Return the function from the text of a column to its number in SI, rounded once.
+
+    It raises ValueError where the text is no finite number.
+    """
+    factor = FACTORS.get(column.rpartition("_")[2])
+
+    def read(text: str) -> float:
+        try:
+            exact = Decimal(text.strip())
+        except InvalidOperation as error:
+            raise ValueError(f"{text!r} is no number") from error
+        if not exact.is_finite():
+            raise ValueError(f"{text!r} is not finite")
+        return float(exact if factor is None else EXACT.multiply(exact, factor))
+
+    return read
+
+
+def writer_of(column: str) -> Callable[[float], str]:
+    """Return the function from a number in SI to the shortest text that reads as it again."""
+    factor = FACTORS.get(column.rpartition("_")[2])
+
+    def write(value: float) -> str:
+        if factor is None:
+            return repr(value).removesuffix(".0")
+        exact = EXACT.divide(Decimal(value), factor)
+        for digits in SIGNIFICANT:
+            rounded = Context(prec=digits).plus(exact)
+            if float(EXACT.multiply(rounded, factor)) == value:
+                break
+        return repr(float(rounded)).removesuffix(".0") if digits < 16 else f"{rounded:g}"
+
+    return write
+
+
+def nanoseconds(text: str) -> int:
+    """Return the stamp of a time in seconds [ns]; ValueError where it has none exactly."""
+    try:
+        exact = EXACT.multiply(Decimal(text.strip()), NANOSECONDS)
+    except InvalidOperation as error:
+        raise ValueError(f"{text!r} is no number") from error
+    if not exact.is_finite() or exact != exact.to_integral_value():
+        raise ValueError(f"{text!r} is no whole number of nanoseconds")
+    return int(exact)
+
+
+def seconds(time_ns: int) -> str:
+    """Return a stamp [ns] as seconds, all digits and no more."""
+    whole, rest = divmod(abs(time_ns), 1_000_000_000)
+    decimals = f".{rest:09d}".rstrip("0") if rest else ""
+    return f"{'-' if time_ns < 0 else ''}{whole}{decimals}"

@@ -1,0 +1,209 @@
+"""A recording becomes a campaign's table: one measured pose, one row."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import compress
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.campaign.csv_columns import (
+    LOAD,
+    MOTORS,
+    POSITION,
+    QUATERNION,
+    TIME,
+    Columns,
+    column_of,
+    marker_columns,
+    seconds,
+    writer_of,
+)
+from wrist_stiffness.campaign.machine_signals import machine_signals
+from wrist_stiffness.campaign.pose_track import (
+    base_transform,
+    last_of_equal,
+    measured_components,
+)
+from wrist_stiffness.campaign.reading import notes_of, require_topics, rigid_rotation
+from wrist_stiffness.campaign.signals import Stamps
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording.samples import Samples
+
+ROWS_A_REPORT = 1000
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    rows : int
+        Measured poses in it.
+    remarks : tuple of str
+        What was left out of it.
+    """
+
+    path: Path
+    rows: int
+    remarks: tuple[str, ...]
+
+
+def export_csv(
+    recording: str | Path,
+    output: str | Path,
+    table: Table,
+    *,
+    remaps: Mapping[str, str] | None = None,
+    settings: StreamSettings | None = None,
+    overwrite: bool = False,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> Exported:
+    """Write the measured poses of a recording with the signals that belong to them as a table.
+
+    The numbers are those of the recording, in shortest form: importing the table gives them again
+    to the bit.  Nothing is taken for an outlier and no clock is put right.
+
+    Parameters
+    ----------
+    recording : path
+        rosbag2 folder with MCAP storage, or `.mcap` file.
+    output : path
+        CSV file.
+    table : Table
+        Of the wrist: turns loads that are measured on the platform into F.
+    remaps : mapping, optional
+        Actual by standard topic name.
+    settings : StreamSettings, optional
+        Joint names, sensor frames and age limit of loads.
+    overwrite : bool
+        Replace an existing file.
+    progress : callable
+        Told rows done and in all.
+
+    Returns
+    -------
+    Exported
+        Counts.
+
+    Raises
+    ------
+    InputError
+        If the output exists or cannot be written.
+    WristError
+        If the recording cannot be read, lacks a topic or has a frame that is not known.
+    """
+    settings = settings or StreamSettings()
+    output = Path(output)
+    if output.exists() and not overwrite and output.is_file():
+        raise InputError(f"{output} exists already and is not overwritten")
+    source = open_recording(recording)
+    joints = (settings.motors.motor_1, settings.motors.motor_2)
+    samples = read_samples(source, remaps=remaps, joints=joints)
+    require_topics(source, samples, remaps or {})
+    notes, _ = notes_of(samples)
+    machine = machine_signals(samples, settings.frames)
+    time_ns, measured, names, markers = _measured(samples, settings.frames)
+    usable, remarks = machine.usable(time_ns, settings.load_age_limit_s)
+    if not usable.any():
+        raise InputError(f"{source.path}: no measured pose can be used: {'; '.join(remarks)}")
+    time_ns, measured = time_ns[usable], measured[usable]
+    block = machine.at(time_ns)
+    load = block.load
+    if block.load_on_platform:
+        load = (block_diagonal(rigid_rotation(table, block.theta)) @ load[..., None])[..., 0]
+    columns = Columns(
+        True,
+        names,
+        markers,
+        {component: f"T_{component}_degC" for component in sorted(block.temperatures)},
+        {name: column_of(name) for name in sorted(block.covariates)},
+    )
+    values = {
+        **dict(zip(MOTORS, block.theta.T, strict=True)),
+        **dict(zip(LOAD, load.T, strict=True)),
+        **dict(zip(names or marker_columns(markers), measured.T, strict=True)),
+        **{columns.temperatures[name]: value for name, value in block.temperatures.items()},
+        **{columns.covariates[name]: value for name, value in block.covariates.items()},
+    }
+    zero_ns = notes.get("time_zero_ns", 0)
+    _write(
+        output, columns, time_ns - (zero_ns if isinstance(zero_ns, int) else 0), values, progress
+    )
+    if source.damage:
+        remarks = (f"the recording is damaged: {source.damage}", *remarks)
+    if len(samples.frame_poses.time_ns):
+        remarks = (*remarks, "the frame's poses have no columns: its motion stays in")
+    return Exported(output, len(time_ns), remarks)
+
+
+def _measured(samples: Samples, frames: Frames) -> tuple[Stamps, Array, tuple[str, ...], int]:
+    """Return stamps, what was measured in F (n, columns) with NaN, pose columns, marker count."""
+    if len(samples.poses.time_ns) == 0:
+        found = samples.markers
+        turn, origin = base_transform(found.frame_id, "measured markers", frames)
+        points = found.position
+        if not _is_identity(turn, origin):
+            points = points @ turn.T + origin
+        order = last_of_equal(found.time_ns)
+        values = points.reshape(len(points), -1)
+        return found.time_ns[order], values[order], (), points.shape[1]
+    poses = samples.poses
+    turn, origin = base_transform(poses.frame_id, "measured pose", frames)
+    position, quaternion = measured_components(poses)
+    if not _is_identity(turn, origin):
+        position = position @ turn.T + origin
+        turned = np.isfinite(quaternion).all(axis=1)
+        product = Rotation.from_matrix(turn) * Rotation.from_quat(quaternion[turned])
+        quaternion[turned] = product.as_quat(canonical=True)
+    values = np.hstack([position, quaternion])
+    # One blank component is a lost beam, a whole blank column an instrument that has none.
+    there = [bool(np.isfinite(column).any()) for column in values.T]
+    order = last_of_equal(poses.time_ns)
+    names = tuple(compress((*POSITION, *QUATERNION), there))
+    return poses.time_ns[order], values[:, there][order], names, 0
+
+
+def _is_identity(turn: Array, origin: Array) -> bool:
+    return bool(np.all(turn == np.eye(3)) and np.all(origin == 0.0))
+
+
+def _write(
+    output: Path,
+    columns: Columns,
+    time_ns: Stamps,
+    values: Mapping[str, Array],
+    progress: Callable[[int, int], None],
+) -> None:
+    names = columns.names[1:]
+    writers = [writer_of(name) for name in names]
+    table = np.stack([values[name] for name in names], axis=1)
+    try:
+        with replacing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:
+            lines = csv.writer(stream, lineterminator="\n")
+            lines.writerow((TIME, *names))
+            for done, (stamp, row) in enumerate(zip(time_ns.tolist(), table, strict=True)):
+                cells = [
+                    "" if value != value else write(value)
+                    for write, value in zip(writers, row.tolist(), strict=True)
+                ]
+                lines.writerow((seconds(stamp), *cells))
+                if done % ROWS_A_REPORT == 0:
+                    progress(done, len(table))
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written: {error.strerror}") from error
+    progress(len(table), len(table))

@@ -1,0 +1,283 @@
+"""A campaign's table becomes a recording: one row, one measured pose."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.campaign.csv_columns import (
+    LOAD,
+    MOTORS,
+    POSITION,
+    QUATERNION,
+    TIME,
+    Columns,
+    columns_of,
+    marker_columns,
+    nanoseconds,
+    reader_of,
+)
+from wrist_stiffness.campaign.marker_poses import LEAST_MARKERS
+from wrist_stiffness.compensation.intake import BASE_FRAME
+from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.recording import RecordingWriter, topics
+from wrist_stiffness.recording.messages import (
+    Float64,
+    Header,
+    JointState,
+    Message,
+    Point,
+    Pose,
+    PoseArray,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    String,
+    Temperature,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
+from wrist_stiffness.recording.samples import DEFAULT_JOINTS
+
+NAN = float("nan")
+HUGE = 1e6
+"""Variance of what was not measured [m^2, rad^2]."""
+
+TIME_ZERO_NS = 1_700_000_000_000_000_000
+"""Stamp of time zero where a table counts from its own start: a stamp of zero says 'no stamp'."""
+
+EPOCH_FROM_S = 1_000_000_000
+"""Times from here on (September 2001) are taken as stamps since 1970."""
+
+ROWS_A_REPORT = 1000
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was written.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    rows, measured : int
+        Rows of the table; those in which something was measured.
+    temperatures, covariates : tuple of str
+        Components and names that were found.
+    """
+
+    path: Path
+    rows: int
+    measured: int
+    temperatures: tuple[str, ...]
+    covariates: tuple[str, ...]
+
+
+def import_csv(
+    table: str | Path,
+    output: str | Path,
+    unloaded: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> Imported:
+    """Write a table of measured poses as a recording.
+
+    Parameters
+    ----------
+    table : path
+        CSV file; its columns are those of `campaign.csv_columns`.
+    output : path
+        rosbag2 folder, or file where it ends in `.mcap`.
+    unloaded : bool
+        The table has no load columns because nothing pulled at the platform.
+    overwrite : bool
+        Replace an existing recording.
+    progress : callable
+        Told rows done and in all.
+
+    Returns
+    -------
+    Imported
+        Counts.
+
+    Raises
+    ------
+    InputError
+        If a column is missing or unknown, or a cell cannot be used; with its row (the first line
+        of the file is row 1) and column.
+    RecordingError
+        If the recording exists or cannot be written; then nothing is written.
+    """
+    table = Path(table)
+    total, header = _survey(table)
+    try:
+        columns = _columns(header, unloaded)
+    except InputError as error:
+        raise InputError(f"{table}: {error}") from error
+    rows = measured = zero_ns = 0
+    with RecordingWriter(output, overwrite=overwrite) as writer:
+        for row in _rows(table, header, columns):
+            if rows == 0:
+                zero_ns = _zero(row.time_ns)
+                facts: dict[str, str | int] = {"table": table.name, "time_zero_ns": zero_ns}
+                if unloaded:
+                    facts["load_source"] = "constant"
+                note = String(json.dumps(facts, sort_keys=True))
+                writer.write(topics.RECORDING_NOTES, note, zero_ns + row.time_ns)
+            stamp_ns = zero_ns + row.time_ns
+            for topic, message in _messages(row, columns, stamp_ns):
+                writer.write(topic, message, stamp_ns)
+            rows += 1
+            measured += row.is_measured(columns)
+            if rows % ROWS_A_REPORT == 0:
+                progress(rows, total)
+        if rows == 0:
+            raise InputError(f"{table}: no rows below the column names")
+    progress(rows, rows)
+    return Imported(
+        Path(output), rows, measured, tuple(columns.temperatures), tuple(columns.covariates)
+    )
+
+
+@dataclass(frozen=True)
+class _Row:
+    """Time [ns] of its own clock, and SI values by column; NaN where a cell is blank."""
+
+    time_ns: int
+    values: dict[str, float]
+
+    def of(self, names: tuple[str, ...]) -> list[float]:
+        return [self.values.get(name, NAN) for name in names]
+
+    def is_measured(self, columns: Columns) -> bool:
+        """Tell whether a component of the pose is there, or three whole markers are."""
+        if columns.markers:
+            points = np.reshape(self.of(marker_columns(columns.markers)), (-1, 3))
+            return int(np.isfinite(points).all(axis=1).sum()) >= LEAST_MARKERS
+        return bool(np.isfinite(self.of(columns.pose)).any())
+
+
+def _survey(table: Path) -> tuple[int, list[str]]:
+    """Return the number of lines below the first, and the column names."""
+    try:
+        with table.open(newline="", encoding="utf-8-sig") as stream:
+            first = stream.readline()
+            total = sum(1 for _ in stream)
+    except OSError as error:
+        raise InputError(f"{table}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{table}: is no text in UTF-8") from error
+    header = [name.strip() for name in next(csv.reader([first]), [])]
+    if len(header) < 2 and ";" in first:
+        raise InputError(
+            f"{table}: columns are separated by ';': save it with commas, and points in numbers"
+        )
+    return total, header
+
+
+def _columns(header: list[str], unloaded: bool) -> Columns:
+    columns = columns_of(header)
+    if unloaded and columns.loads:
+        raise InputError("there are load columns, so it is not --unloaded")
+    if not unloaded and not columns.loads:
+        raise InputError(
+            f"load columns {', '.join(LOAD)} are missing; say --unloaded if nothing pulled at the "
+            "platform"
+        )
+    return columns
+
+
+def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
+    """Read the rows one by one and check them."""
+    readers = {name: reader_of(name) for name in header if name != TIME}
+    required = {*MOTORS, *(LOAD if columns.loads else ())}
+    before: tuple[int, str] | None = None
+    with table.open(newline="", encoding="utf-8-sig") as stream:
+        lines = csv.reader(stream)
+        next(lines)
+        for cells in lines:
+            place = f"{table}: row {lines.line_num}"
+            if not any(cell.strip() for cell in cells):
+                continue
+            if len(cells) != len(header):
+                raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns")
+            text = dict(zip(header, cells, strict=True))
+            try:
+                time_ns = nanoseconds(text[TIME])
+            except ValueError as error:
+                raise InputError(f"{place}, column {TIME}: {error}") from error
+            if before is not None and time_ns <= before[0]:
+                raise InputError(
+                    f"{place}, column {TIME}: {text[TIME]} is not later than {before[1]} of the "
+                    "row before"
+                )
+            before = time_ns, text[TIME]
+            values = {}
+            for name, read in readers.items():
+                if not text[name].strip():
+                    if name in required:
+                        raise InputError(f"{place}, column {name}: blank")
+                    continue
+                try:
+                    values[name] = read(text[name])
+                except ValueError as error:
+                    raise InputError(f"{place}, column {name}: {error}") from error
+            yield _checked(place, _Row(time_ns, values))
+
+
+def _checked(place: str, row: _Row) -> _Row:
+    """Refuse a quaternion that is none."""
+    quaternion = row.of(QUATERNION)
+    blank = [name for name in QUATERNION if name not in row.values]
+    if 0 < len(blank) < len(QUATERNION):
+        raise InputError(f"{place}, column {blank[0]}: blank in a quaternion")
+    norm = float(np.linalg.norm(quaternion))
+    if not blank and abs(norm - 1.0) > UNIT_TOLERANCE:
+        raise InputError(f"{place}, columns qx qy qz qw: norm {norm:.4g}, not 1")
+    return row
+
+
+def _zero(time_ns: int) -> int:
+    return 0 if time_ns >= EPOCH_FROM_S * 1_000_000_000 else TIME_ZERO_NS
+
+
+def _messages(row: _Row, columns: Columns, stamp_ns: int) -> Iterator[tuple[str, Message]]:
+    """Give the messages of a row; the load goes first, so that it has arrived with its angles."""
+    header = Header(stamp_ns, BASE_FRAME)
+    load = row.of(LOAD) if columns.loads else [0.0] * 6
+    wrench = Wrench(Vector3(*load[:3]), Vector3(*load[3:]))
+    yield topics.LOAD_ESTIMATE, WrenchStamped(header, wrench)
+    for component, name in columns.temperatures.items():
+        if name in row.values:
+            message = Temperature(Header(stamp_ns, component), row.values[name])
+            yield topics.TEMPERATURES, message
+    for covariate, name in columns.covariates.items():
+        if name in row.values:
+            yield topics.COVARIATES + covariate, Float64(row.values[name])
+    motors = Header(stamp_ns, "")
+    yield topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, tuple(row.of(MOTORS)))
+    if columns.markers:
+        points = np.reshape(row.of(marker_columns(columns.markers)), (-1, 3))
+        poses = tuple(Pose(Point(*point)) for point in points.tolist())
+        yield topics.PLATFORM_MARKERS, PoseArray(header, poses)
+    else:
+        yield topics.PLATFORM_POSE, PoseWithCovarianceStamped(header, _pose(row))
+
+
+def _pose(row: _Row) -> PoseWithCovariance:
+    """Return the pose of a row; what is blank has a huge variance, what is not an unknown one."""
+    position, quaternion = row.of(POSITION), row.of(QUATERNION)
+    turned = not np.isnan(quaternion).any()
+    known = np.append(np.isfinite(position), [turned] * 3)
+    pose = Pose(
+        Point(*np.where(known[:3], position, 0.0).tolist()),
+        Quaternion(*quaternion) if turned else Quaternion(),
+    )
+    return PoseWithCovariance(pose, tuple(np.diag(np.where(known, 0.0, HUGE)).ravel().tolist()))
