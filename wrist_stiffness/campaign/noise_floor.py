@@ -15,9 +15,10 @@ FEWEST_REPEATS = 6
 
 SOURCES = {
     "replicates": "dwells that repeat a pose and load from the same side",
-    "instrument": "what the instrument scatters within a dwell and the encoder hides; "
-    "no slow wander is in it, for want of repeated dwells",
-    "unpredictable": "what no smooth law of the conditions predicts, for want of anything better",
+    "instrument": "the instrument's scatter within a dwell and the hidden encoder count; no slow "
+    "wander is in it, for want of repeated dwells",
+    "unpredictable": "the part that no smooth law of the conditions predicts, for want of anything "
+    "better",
 }
 """Where a floor may come from, in words."""
 
@@ -90,7 +91,7 @@ def scatter_of_repeats(observations: Observations) -> tuple[Array, float]:
 
 
 def repeatability(observations: Observations) -> dict[str, float]:
-    """Root mean square scatter of repeated dwells by the key of the quantity; empty with too few."""
+    """Scatter (RMS) of repeated dwells by the key of the quantity; empty with too few."""
     variance, freedom = scatter_of_repeats(observations)
     if freedom < FEWEST_REPEATS:
         return {}

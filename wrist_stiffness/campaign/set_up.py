@@ -30,15 +30,17 @@ GROUPS = {
 PLAUSIBLE = np.concatenate(
     [np.repeat([1e-3, 3e-3, 1e-3, 3e-3], 3), np.full(2, 1e-3), np.repeat([0.05, 2e-3], 3)]
 )
-"""Sizes that would not surprise [m, rad, N, N m]: they only make the columns comparable."""
+"""Standard deviations of the priors [m, rad, N, N m]: directions that the units hardly tell
+apart stay small by them."""
 
 ROUNDS = 4
 
 REACH = 4.0
 """Robust standard deviations from which a unit no longer pulls the fit."""
 
-UNSEEN = 1e-7
-"""Directions that the units hardly show, as a share of the best seen, stay as they are."""
+INDEPENDENT = 50
+"""So many units of a session count against the priors: a model that is wrong is wrong alike at
+neighbours, and a tare must not stand in for it."""
 
 LOAD_STEP = np.repeat([1e-2, 1e-3], 3)
 """Change of the load that shows what a tare does [N, N m]."""
@@ -126,6 +128,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
     softness = _softness(model, session, theta)
     instrument, target = (np.eye(3), np.zeros(3)), (np.eye(3), np.zeros(3))
     zero, tare = np.zeros(2), np.zeros(6)
+    taken = np.zeros(len(PLAUSIBLE))
 
     def said() -> tuple[Array, Array]:
         """Rotation and shift of the platform as the instrument should see it."""
@@ -147,7 +150,9 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
         columns[:, 3:, 12:14] = mechanism.jacobian(home)
         columns[:, :, 14:] = softness
         step = np.zeros(len(PLAUSIBLE))
-        step[free] = PLAUSIBLE[free] * _solved(columns[:, :, free] * PLAUSIBLE[free], residual)
+        scale = PLAUSIBLE[free]
+        step[free] = scale * _solved(columns[:, :, free] * scale, residual, taken[free] / scale)
+        taken += step
         instrument = _composed(exp_twist(step[:6]), instrument)
         target = _composed(target, exp_twist(step[6:12]))
         zero, tare = zero + step[12:14], tare + step[14:]
@@ -179,22 +184,31 @@ def _softness(model: ErrorModel, session: UnitSession, theta: Array) -> Array:
     return np.nan_to_num(np.stack(columns, axis=-1))
 
 
-def _solved(columns: Array, residual: Array) -> Array:
-    """Least squares that lost beams do not pull, shortest where the units do not tell, (p,)."""
+def _solved(columns: Array, residual: Array, taken: Array) -> Array:
+    """Least squares that lost beams do not pull, with a prior of unit scatter, (p,).
+
+    Parameters
+    ----------
+    columns : (u, 6, p) float
+        Per standard deviation of the prior.
+    residual : (u, 6) float
+        NaN = not measured.
+    taken : (p,) float
+        How far the parameters are from their prior means already.
+    """
     known = np.isfinite(residual)
     rows = np.where(known[:, :, None], columns, 0.0)
     values = np.where(known, residual, 0.0)
-    weight, parameters = np.ones(len(values)), np.zeros(columns.shape[2])
+    parameters = np.zeros(columns.shape[2])
+    share = min(1.0, INDEPENDENT / len(values))
     for _ in range(ROUNDS):
         miss = np.where(known, values - rows @ parameters, np.nan)
         scale = robust_scale(miss)
-        distance = np.sqrt(np.nanmean(np.where(known, (miss / scale) ** 2, np.nan), axis=1))
-        weight = np.minimum(1.0, REACH / np.maximum(np.nan_to_num(distance), 1e-12))
+        square = np.sum(np.nan_to_num(miss / scale) ** 2, axis=1)
+        distance = np.sqrt(square / np.maximum(known.sum(axis=1), 1))
+        weight = share * np.minimum(1.0, REACH / np.maximum(distance, REACH))
         factor = np.sqrt(weight)[:, None] / scale
         white = (factor[:, :, None] * rows).reshape(-1, columns.shape[2])
-        gram = white.T @ white
-        size, vectors = np.linalg.eigh(gram)
-        seen = size > UNSEEN * size[-1]
-        moment = white.T @ (factor * values).reshape(-1)
-        parameters = vectors[:, seen] @ ((vectors[:, seen].T @ moment) / size[seen])
+        moment = white.T @ (factor * values).reshape(-1) - taken
+        parameters = np.linalg.solve(white.T @ white + np.eye(len(moment)), moment)
     return np.asarray(parameters)

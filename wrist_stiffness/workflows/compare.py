@@ -69,10 +69,9 @@ class Compared:
         """Return the answer for a terminal."""
         found = self.comparison
         out = [*found.verdict, "", *self._table()]
-        for model in found.models:
-            out += ["", f"{model.name}: on what the error depends"]
-            out += [f"  - {sentence}" for sentence in model.told.sentences]
         last = found.models[-1]
+        out += ["", f"{last.name}: on what the error depends"]
+        out += [f"  - {sentence}" for sentence in last.told.sentences]
         out += ["", f"{last.name}: worst poses", *self._worst_lines(last)]
         if self.notes:
             out += ["", *(f"note: {note}" for note in self.notes)]

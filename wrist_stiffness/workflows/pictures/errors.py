@@ -16,6 +16,8 @@ from wrist_stiffness.workflows.pictures.palette import FLOOR, colour
 CELL_DEG = 6.0
 """Side of a cell of the map."""
 
+LINES = {"--": "dashed", ":": "dotted", "-.": "dash-dotted"}
+
 MOST_SESSIONS = 6
 """Time lines of more sessions would be too small to read."""
 
@@ -46,9 +48,8 @@ class Bars:
 def draw_bars(every: Sequence[Bars]) -> Any:
     """Return a figure with one row of bars for each quantity."""
     rows = max(len(bars.names) for bars in every)
-    figure = new_figure(7.0, len(every) * (1.5 + 0.35 * rows))
+    figure = new_figure(6.5, len(every) * (1.1 + 0.4 * rows))
     plots = figure.subplots(len(every), 1, squeeze=False)[:, 0]
-    styles = ("--", ":", "-.")
     for plot, bars in zip(plots, every, strict=True):
         places = np.arange(len(bars.names))
         plot.barh(
@@ -67,20 +68,22 @@ def draw_bars(every: Sequence[Bars]) -> Any:
                 textcoords="offset points",
                 va="center",
             )
-        for style, (name, level) in zip(styles, bars.marks.items(), strict=False):
-            plot.axvline(level, color=FLOOR, linestyle=style, label=f"{name}: {level:.3g}")
+        told: list[str] = []
+        for style, (name, level) in zip(LINES, bars.marks.items(), strict=False):
+            plot.axvline(level, color=FLOOR, linestyle=style)
+            told.append(f"{name} ({LINES[style]}) {level:.3g}")
         plot.set_yticks(places, [_shortened(name) for name in bars.names])
         plot.invert_yaxis()
         plot.set_xlim(0.0, 1.18 * max([*bars.values, *bars.marks.values()]))
         plot.set_xlabel(f"{bars.label}, RMS")
-        plot.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        plot.set_title(", ".join(told), fontsize=9, loc="left")
     return figure
 
 
 def draw_map(
     border: Array, theta: Array, lengths: Sequence[tuple[str, Array]], titles: Sequence[str]
 ) -> Any:
-    """Return a figure of errors over the joint space: a row for a quantity, a column for a model.
+    """Return a figure of errors over the joint space: a row for a model, a column for a quantity.
 
     Parameters
     ----------
@@ -93,23 +96,31 @@ def draw_map(
     titles : sequence of str
         Names of the k models.
     """
-    figure = new_figure(0.9 + 3.4 * len(titles), 3.1 * len(lengths))
-    plots = figure.subplots(len(lengths), len(titles), squeeze=False, sharex=True, sharey=True)
+    figure = new_figure(0.5 + 4.2 * len(lengths), 3.6 * len(titles))
+    plots = figure.subplots(len(titles), len(lengths), squeeze=False, sharex=True, sharey=True)
     edges, cells = _cells(np.degrees(np.concatenate([theta, border])), np.degrees(theta))
-    for row, (label, values) in zip(plots, lengths, strict=True):
-        means = [_cell_rms(cells, each, tuple(len(e) - 1 for e in edges)) for each in values]
+    shape = tuple(len(edge) - 1 for edge in edges)
+    for column, (label, values) in zip(plots.T, lengths, strict=True):
+        means = [_cell_rms(cells, each, shape) for each in values]
         top = float(np.nanmax(means[0]))
-        for plot, mean, title in zip(row, means, titles, strict=True):
+        for plot, mean, title in zip(column, means, titles, strict=True):
             shown = plot.pcolormesh(*edges, mean.T, cmap="viridis", vmin=0.0, vmax=top)
             plot.plot(*np.degrees(border).T, color="black", linewidth=1.2)
             plot.plot(*np.degrees(theta).T, ".", color="white", markersize=0.8, rasterized=True)
             plot.set_facecolor("#e8e8e8")
             plot.set_aspect("equal")
-            plot.set_title(_shortened(title), fontsize=9)
-        row[0].set_ylabel("motor 2 angle θ₂ [deg]")
-        figure.colorbar(shown, ax=row.tolist(), label=f"{label}, RMS in a cell", extend="max")
-    for plot in plots[-1]:
-        plot.set_xlabel("motor 1 angle θ₁ [deg]")
+            plot.set_title(f"{_shortened(title)}: {label.split()[0]}", fontsize=9)
+        above = max(float(np.nanmax(mean)) for mean in means) > top
+        figure.colorbar(
+            shown,
+            ax=column.tolist(),
+            label=f"{label}, RMS in a cell",
+            extend="max" if above else "neither",
+            shrink=0.8,
+        )
+        column[-1].set_xlabel("motor 1 angle θ₁ [deg]")
+    for plot in plots[:, 0]:
+        plot.set_ylabel("motor 2 angle θ₂ [deg]")
     return figure
 
 
