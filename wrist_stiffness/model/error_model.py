@@ -174,6 +174,18 @@ class ErrorModel:
             for other in effect.varied
         )
 
+    @cached_property
+    def relative_error(self) -> float:
+        """Error of the table over the whole domain, relative to the size of s and of phi [-].
+
+        A spline errs most outside the operative workspace, of which alone the table's own statement
+        speaks, and a model may use the spline of a table that was made for the closed form.
+        """
+        errors = self.table.header.errors
+        if self.evaluation == "closed_form":
+            return float(errors["stated_relative"])
+        return float(errors["mesh_relative"] + max(errors["predicted"]["domain"].values()))
+
     def session(self) -> Session:
         """Return a fresh memory for a stream of samples."""
         return Session(self)
@@ -305,7 +317,7 @@ class ErrorModel:
         covariance = np.zeros((6, 6))
         covariance[3:, 3:] = jacobian.dot(jacobian.T)
         covariance *= step**2 / 12.0
-        each = self.table.header.errors["stated_relative"] ** 2 / 3.0
+        each = self.relative_error**2 / 3.0
         x, y, z, u, v, w = twist.tolist()
         shift, turn = each * (x * x + y * y + z * z), each * (u * u + v * v + w * w)
         covariance.ravel()[::7] += [shift, shift, shift, turn, turn, turn]
