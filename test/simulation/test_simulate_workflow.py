@@ -1,4 +1,8 @@
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -7,7 +11,7 @@ from wrist_stiffness.cli import simulate as command
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table_file import save_table
-from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording import open_recording, read_samples, topics
 from wrist_stiffness.simulation.catalogue import CATALOGUE
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.workflows.simulate import hide, simulate_recording
@@ -57,7 +61,93 @@ def test_command_writes_a_recording_and_its_result(wrist, tmp_path, capsys):
     assert "20 samples" in capsys.readouterr().out
     assert '"samples": 20' in (tmp_path / "run.json").read_text()
     assert main([*arguments, "--rate", "-3"], [command]) == 2
-    assert "rate_hz = -3" in capsys.readouterr().err
+    assert "rate of -3 Hz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("wish", "message"),
+    [
+        (["--seconds", "1e9"], "1e+09 s is not more than 0 and at most 86400 s"),
+        (["--seconds", "nan"], "nan s is not"),
+        (["--rate", "6000"], "6000 Hz is not more than 0 and at most 5000 Hz"),
+        (["--rate", "1", "--seconds", "0.5"], "less than one sample"),
+        (["--sees", "colours"], "'colours', which is not one of pose, points, pointing"),
+        (["--lost-beams", "0.9"], "0.9 is not in 0 to 0.5"),
+    ],
+    ids=lambda value: value[-1] if isinstance(value, list) else "",
+)
+def test_wishes_out_of_bounds_are_refused_with_the_limit(wish, message, tmp_path, capsys):
+    assert main(["simulate", "-o", str(tmp_path / "run"), *wish], [command]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["run", "run.mcap"])
+def test_terminated_command_leaves_nothing_behind(name, wrist, tmp_path):
+    save_table(wrist(), tmp_path / "table.npz")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    arguments = ["simulate", "-o", str(folder / name), "--table", str(tmp_path / "table.npz")]
+    arguments += ["--seconds", "3600", "--rate", "500"]
+    process = subprocess.Popen([sys.executable, "-m", "wrist_stiffness", *arguments])
+    try:
+        deadline = time.monotonic() + 60.0
+        while not list(folder.iterdir()) and time.monotonic() < deadline:
+            assert process.poll() is None
+            time.sleep(0.05)
+        assert list(folder.iterdir())
+        process.terminate()
+        assert process.wait(timeout=60.0) == 128 + signal.SIGTERM
+    finally:
+        process.kill()
+    assert not list(folder.iterdir())
+
+
+def test_rosbags_reads_what_was_simulated(wrist, tmp_path):
+    highlevel = pytest.importorskip("rosbags.highlevel")
+    typesys = pytest.importorskip("rosbags.typesys")
+    settings = CellSettings(rate_hz=20.0)
+    simulate_recording(tmp_path / "run", wrist(), settings, 3.0, 1)
+    samples = read_samples(open_recording(tmp_path / "run"))
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    with highlevel.AnyReader([tmp_path / "run"], default_typestore=store) as reader:
+        poses = [
+            reader.deserialize(raw, connection.msgtype)
+            for connection, _, raw in reader.messages()
+            if connection.topic == "/platform_pose_measured"
+        ]
+    assert len(poses) == 60
+    assert [p.pose.position.x for p in poses] == samples.poses.position[:, 0].tolist()
+
+
+def test_half_a_pose_says_by_its_variance_what_was_not_measured(wrist, tmp_path):
+    table = wrist()
+    for sees, known in (("points", slice(0, 3)), ("pointing", slice(3, 6))):
+        path = tmp_path / f"{sees}.mcap"
+        settings = CellSettings(rate_hz=20.0, sees=sees)
+        simulate_recording(path, table, settings, 2.0, 1)
+        messages = [m for _, _, m in open_recording(path).messages([topics.PLATFORM_POSE])]
+        assert len(messages) == 40
+        for message in messages:
+            variance = np.diag(np.reshape(message.pose.covariance, (6, 6)))
+            assert np.array_equal(variance == 0.0, np.isin(np.arange(6), np.r_[known]))
+
+
+def test_lost_beams_leave_gaps_and_a_cmm_measures_once_in_each_rest(wrist, tmp_path):
+    table = wrist()
+    lost = CellSettings(rate_hz=50.0, lost_beams=0.2)
+    simulate_recording(tmp_path / "lost.mcap", table, lost, 40.0, 1)
+    poses = read_samples(open_recording(tmp_path / "lost.mcap")).poses
+    # One tenth of 2000; six standard deviations of a binomial count are 80.
+    assert 120 < 2000 - len(poses.time_ns) < 280
+    cmm = CellSettings(rate_hz=50.0, instrument="cmm", program_seconds=40.0)
+    simulate_recording(tmp_path / "cmm.mcap", table, cmm, 40.0, 1)
+    samples = read_samples(open_recording(tmp_path / "cmm.mcap"))
+    seconds = (samples.poses.time_ns - samples.joints.time_ns[0]) * 1e-9
+    assert 5 < len(seconds) < 20
+    cell = VirtualCell(table, cmm, np.random.default_rng(0))
+    for before in (0.02, 1.0):
+        assert np.array_equal(cell.desired(seconds), cell.desired(seconds - before))
 
 
 def test_blind_recording_is_opened_by_its_seed_alone(wrist, tmp_path, capsys):

@@ -45,7 +45,21 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument(
         "--instrument",
         default="interferometer",
-        help="pose sensor: interferometer, tracker, cmm, ideal (default: interferometer)",
+        help="pose sensor: interferometer, tracker, cmm, ideal (default: interferometer); "
+        "a cmm measures once in each rest",
+    )
+    parser.add_argument(
+        "--sees",
+        default="pose",
+        help="what the pose sensor sees: pose, points (position alone) or pointing (rotation "
+        "alone) (default: pose)",
+    )
+    parser.add_argument(
+        "--lost-beams",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="of its samples, half of them missing and half wild; 0.02 is usual (default: 0)",
     )
     parser.add_argument(
         "--base", default="exact", help="exact, or wrong as real wrists are (default: exact)"
@@ -64,13 +78,20 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.simulation.cell import CellSettings
     from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.simulate import hide, hide_blind, simulate_recording
+    from wrist_stiffness.workflows.simulate import (
+        check_bounds,
+        hide,
+        hide_blind,
+        simulate_recording,
+    )
 
+    check_bounds(arguments.seconds, arguments.rate)
     table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
     settings = CellSettings(
         rate_hz=arguments.rate,
@@ -78,6 +99,8 @@ def _run(arguments: argparse.Namespace) -> int:
         program_seed=max(arguments.seed, 0),
         experiment=arguments.experiment,
         instrument=arguments.instrument,
+        sees=arguments.sees,
+        lost_beams=arguments.lost_beams,
         base=arguments.base,
         base_seed=max(arguments.seed, 0),
     )
@@ -89,15 +112,16 @@ def _run(arguments: argparse.Namespace) -> int:
         settings = hide_blind(arguments.blind, table, settings, arguments.seconds)
     elif arguments.effect is not None:
         settings = hide(arguments.effect, arguments.size, table, settings, arguments.seconds)
-    written = simulate_recording(
-        arguments.output,
-        table,
-        settings,
-        arguments.seconds,
-        arguments.seed,
-        Progress("samples"),
-        arguments.overwrite,
-    )
+    with cleaned_up_on_sigterm():
+        written = simulate_recording(
+            arguments.output,
+            table,
+            settings,
+            arguments.seconds,
+            arguments.seed,
+            Progress("samples"),
+            arguments.overwrite,
+        )
     if arguments.json:
         write_json(
             arguments.json,

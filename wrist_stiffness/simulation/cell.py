@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -90,12 +91,13 @@ class CellSettings:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"cell: {name} = {value} is not a positive number")
+        sensor = instrument(self.instrument)
         if self.truth not in TRUTHS:
             raise InputError(f"truth {self.truth!r} is not one of {', '.join(TRUTHS)}")
-        if self.truth == "exact" and not instrument(self.instrument).static:
+        if self.truth == "exact" and not sensor.static:
             raise InputError(
-                f"exact truth needs an instrument that measures at rests: {self.instrument} measures "
-                "all the time"
+                f"exact truth needs an instrument that measures at rests; {self.instrument} "
+                "measures all the time"
             )
         PoseView(self.sees, self.lost_beams, np.random.default_rng(0))
 
@@ -133,6 +135,13 @@ class CellSample:
     def __getitem__(self, place: int) -> CellSample:
         """Return one sample of a block."""
         return CellSample(*(getattr(self, field.name)[place] for field in fields(self)))
+
+    @staticmethod
+    def joined(blocks: Sequence[CellSample]) -> CellSample:
+        """Return blocks in a row as one."""
+        return CellSample(
+            *(np.concatenate([getattr(b, f.name) for b in blocks]) for f in fields(CellSample))
+        )
 
 
 def true_laws(table: Table, settings: CellSettings) -> list[Law]:

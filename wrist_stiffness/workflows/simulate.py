@@ -19,6 +19,8 @@ from wrist_stiffness.recording.messages import (
     Point,
     Pose,
     PoseStamped,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
     Quaternion,
     String,
     Temperature,
@@ -40,6 +42,12 @@ THERMOMETER_STEP_K = 0.1
 
 BLOCK = 500
 """Samples in memory at a time."""
+
+LONGEST_S, FASTEST_HZ = 24.0 * 3600.0, 5000.0
+"""A recording is no longer and has no more samples per second than that."""
+
+NOT_MEASURED = 1e6
+"""Variance of a part of the pose that the sensor does not see [m^2, rad^2]."""
 
 
 @dataclass(frozen=True)
@@ -97,12 +105,11 @@ def simulate_recording(
     Raises
     ------
     InputError
-        If the duration is not positive or the seed negative.
+        If duration or rate are out of bounds or the seed is negative.
     RecordingError
         If the recording exists or cannot be written.
     """
-    if not (np.isfinite(seconds) and seconds > 0.0):
-        raise InputError(f"simulate: {seconds} s is not a positive duration")
+    check_bounds(seconds, settings.rate_hz)
     if seed < 0:
         raise InputError(f"simulate: seed {seed} is negative")
     cell = VirtualCell(table, settings, np.random.default_rng(seed))
@@ -118,12 +125,32 @@ def simulate_recording(
             block = cell.run(time_s, sent)
             for i, t in enumerate(time_s):
                 stamp_ns = START_NS + round(t * 1e9)
-                _write_sample(writer, stamp_ns, sent[i], block[i])
+                _write_sample(writer, stamp_ns, sent[i], block[i], settings)
                 if (first + i) % thermometer == 0:
                     _write_temperatures(writer, stamp_ns, block[i])
             if progress is not None:
                 progress(int(number[-1]) + 1, total)
     return Simulated(Path(path), total, total / settings.rate_hz)
+
+
+def check_bounds(seconds: float, rate_hz: float) -> None:
+    """Refuse what would be no recording, or never end.
+
+    Raises
+    ------
+    InputError
+        With the limit.
+    """
+    if not 0.0 < seconds <= LONGEST_S:
+        raise InputError(
+            f"simulate: a duration of {seconds:g} s is not more than 0 and at most {LONGEST_S:g} s"
+        )
+    if not 0.0 < rate_hz <= FASTEST_HZ:
+        raise InputError(
+            f"simulate: a rate of {rate_hz:g} Hz is not more than 0 and at most {FASTEST_HZ:g} Hz"
+        )
+    if seconds * rate_hz < 1.0:
+        raise InputError(f"simulate: {seconds:g} s at {rate_hz:g} Hz are less than one sample")
 
 
 def hide(
@@ -186,21 +213,55 @@ def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
 
 
 def _write_sample(
-    writer: RecordingWriter, stamp_ns: int, command: np.ndarray, sample: CellSample
+    writer: RecordingWriter,
+    stamp_ns: int,
+    command: np.ndarray,
+    sample: CellSample,
+    settings: CellSettings,
 ) -> None:
     """Write one sample; the load goes first, so that it has arrived with its joint state."""
     header = Header(stamp_ns, BASE_FRAME)
     force, moment = sample.wrench[:3].tolist(), sample.wrench[3:].tolist()
-    quaternion = Rotation.from_matrix(sample.measured_rotation).as_quat(canonical=True)
-    pose = Pose(Point(*sample.measured_shift.tolist()), Quaternion(*quaternion.tolist()))
     motors = Header(stamp_ns, "")
     for topic, message in (
         (topics.LOAD_ESTIMATE, WrenchStamped(header, Wrench(Vector3(*force), Vector3(*moment)))),
         (topics.MOTOR_COMMANDS, JointState(motors, DEFAULT_JOINTS, tuple(command.tolist()))),
         (topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, tuple(sample.encoder.tolist()))),
-        (topics.PLATFORM_POSE, PoseStamped(header, pose)),
     ):
         writer.write(topic, message, stamp_ns)
+    pose = pose_message(header, sample, whole=settings.sees == "pose")
+    if pose is not None:
+        writer.write(topics.PLATFORM_POSE, pose, stamp_ns)
+
+
+def pose_message(
+    header: Header, sample: CellSample, whole: bool
+) -> PoseStamped | PoseWithCovarianceStamped | None:
+    """Return the measured pose, None where nothing was measured.
+
+    Parameters
+    ----------
+    header : Header
+        Of the message.
+    sample : CellSample
+        One sample.
+    whole : bool
+        Whether the sensor sees position and rotation; else a huge variance says which it does not.
+    """
+    moved, turned = (
+        bool(np.isfinite(part).all()) for part in (sample.measured_shift, sample.measured_rotation)
+    )
+    if not (moved or turned):
+        return None
+    place = sample.measured_shift if moved else np.zeros(3)
+    rotation = Rotation.from_matrix(sample.measured_rotation if turned else np.eye(3))
+    quaternion = rotation.as_quat(canonical=True)
+    pose = Pose(Point(*place.tolist()), Quaternion(*quaternion.tolist()))
+    if whole:
+        return PoseStamped(header, pose)
+    variance = NOT_MEASURED * ~np.repeat([moved, turned], 3)
+    covariance = tuple(np.diag(variance).ravel().tolist())
+    return PoseWithCovarianceStamped(header, PoseWithCovariance(pose, covariance))
 
 
 def _write_temperatures(writer: RecordingWriter, stamp_ns: int, sample: CellSample) -> None:
