@@ -38,6 +38,7 @@ from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
 from wrist_stiffness.recording.topics import (
     JOINT_STATES,
     LOAD_ESTIMATE,
+    MOTOR_COMMANDS,
     PLATFORM_MARKERS,
     PLATFORM_POSE,
 )
@@ -114,7 +115,7 @@ def read_session(
         If too few poses are left, or they are those of another wrist.
     """
     recording = open_recording(path)
-    samples = read_samples(recording, remaps=remaps, joints=joints)
+    samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(recording, samples, remaps or {})
     notes, unread = notes_of(samples)
     try:

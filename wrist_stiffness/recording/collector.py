@@ -94,18 +94,16 @@ def wrench_rows(batch: Batch) -> Rows:
 
 
 def pose_rows(prefix: str) -> Extract:
-    """Return the extraction of poses at an attribute path, with covariance or NaN."""
+    """Return the extraction of poses at an attribute path, with covariance where it has one."""
 
     def extract(batch: Batch) -> Rows:
-        covariance = batch.columns.get("pose.covariance")
-        count = batch.indices.size
-        return {
+        rows = {
             "position": _stack(batch, *_xyz(f"{prefix}.position")),
             "quaternion": _stack(batch, *_xyz(f"{prefix}.orientation"), f"{prefix}.orientation.w"),
-            "covariance": np.full((count, 6, 6), np.nan)
-            if covariance is None
-            else covariance.reshape(count, 6, 6),
         }
+        if "pose.covariance" in batch.columns:
+            rows["covariance"] = batch.columns["pose.covariance"].reshape(-1, 6, 6)
+        return rows
 
     return extract
 
@@ -200,7 +198,9 @@ class Collector:
 
     def rows(self) -> Rows:
         """Return all rows in the order of reception, an empty dict without any."""
-        return _joined(self.blocks) if self.blocks else {}
+        if len(self.blocks) > 1:
+            self.blocks = [_joined(self.blocks)]
+        return self.blocks[0] if self.blocks else {}
 
     def faults(self) -> list[Fault]:
         """Return what was wrong, one entry for each kind."""

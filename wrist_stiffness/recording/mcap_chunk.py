@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -140,18 +141,20 @@ def records_in(buffer: bytes, place: str) -> Iterator[tuple[int, int, int]]:
         yield opcode, start, position
 
 
-def messages_in(chunk: Chunk) -> list[StoredMessage]:
+def messages_in(chunk: Chunk, left_out: Collection[int] = ()) -> list[StoredMessage]:
     """Return the messages of a chunk in log-time order, ties in the order of the file.
 
     Parameters
     ----------
     chunk : Chunk
         Where to read.
+    left_out : Collection[int]
+        Channels whose messages are not wanted.
 
     Returns
     -------
     list[StoredMessage]
-        All messages.
+        Of all other channels.
 
     Raises
     ------
@@ -167,9 +170,11 @@ def messages_in(chunk: Chunk) -> list[StoredMessage]:
             if end - start < MESSAGE_HEAD.size:
                 raise RecordingError(f"{place}: message record of {end - start} bytes is too short")
             channel_id, _, log_time_ns, _ = MESSAGE_HEAD.unpack_from(buffer, start)
+            if channel_id in left_out:
+                continue
             payload = buffer[start + MESSAGE_HEAD.size : end]
             messages.append(StoredMessage(log_time_ns, channel_id, payload))
-    messages.sort(key=lambda message: message.log_time_ns)
+    messages.sort(key=itemgetter(0))
     if messages and messages[0].log_time_ns < chunk.start_ns:
         raise RecordingError(
             f"{place} holds log time {messages[0].log_time_ns} ns, "

@@ -131,6 +131,12 @@ class Recording:
                 return
             time_ns, order, position, stored = opened[0]
             channels = chunks[order][1].channels
+            if len(opened) == 1 and (not waiting or stored[-1].log_time_ns < waiting[-1][0]):
+                # No other chunk reaches into this one: the rest of it needs no comparing.
+                for log_time_ns, channel_id, payload in stored[position:]:
+                    yield RawMessage(channels[channel_id], log_time_ns, payload)
+                opened.clear()
+                continue
             yield RawMessage(channels[stored[position].channel_id], time_ns, stored[position][2])
             position += 1
             if position < len(stored):
@@ -175,23 +181,23 @@ class Recording:
     def _load(
         self, chunk: Chunk, index: McapIndex, topics: Collection[str] | None
     ) -> list[StoredMessage]:
+        known = index.channels
+        left_out = (
+            set()
+            if topics is None
+            else {number for number, channel in known.items() if channel.topic not in topics}
+        )
         try:
-            stored = messages_in(chunk)
+            stored = messages_in(chunk, left_out)
         except RecordingError as error:
             self._report(f"{error}, its messages are left out")
             return []
-        known = index.channels
         orphans = sum(message.channel_id not in known for message in stored)
         if orphans:
             self._report(
                 f"{chunk.path.name}: {orphans} messages at byte {chunk.offset} have no channel"
             )
-        return [
-            message
-            for message in stored
-            if message.channel_id in known
-            and (topics is None or known[message.channel_id].topic in topics)
-        ]
+        return [message for message in stored if message.channel_id in known] if orphans else stored
 
     def _report(self, flaw: str) -> None:
         if self._strict:

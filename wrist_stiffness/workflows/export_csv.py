@@ -40,6 +40,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
+from wrist_stiffness.recording.topics import MOTOR_COMMANDS
 
 ROWS_A_REPORT = 1000
 
@@ -113,7 +114,7 @@ def export_csv(
         raise InputError(f"{output} exists already and is not overwritten")
     source = open_recording(recording)
     joints = (settings.motors.motor_1, settings.motors.motor_2)
-    samples = read_samples(source, remaps=remaps, joints=joints)
+    samples = read_samples(source, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(source, samples, remaps or {})
     notes, _ = notes_of(samples)
     machine = machine_signals(samples, settings.frames)
