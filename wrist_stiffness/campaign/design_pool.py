@@ -219,7 +219,6 @@ def fixed_visits(settings: Sequence[Setting], pace: Pace, workspace: Workspace) 
 def arrange(
     settings: Sequence[Setting],
     fixed: Sequence[Visit],
-    cost_s: float,
     workspace: Workspace,
     pace: Pace,
     rng: np.random.Generator,
@@ -232,8 +231,6 @@ def arrange(
         Chosen; each is visited from both sides, at different times.
     fixed : sequence of Visit
         Of `fixed_visits`.
-    cost_s : float
-        Mean duration of a visit [s].
     workspace : Workspace
         Of the wrist.
     pace : Pace
@@ -251,13 +248,7 @@ def arrange(
     visits = [visits[i] for i in rng.permutation(len(visits))]
     for number, hold in enumerate(holds, start=1):
         visits.insert(number * len(visits) // (len(holds) + 1), hold)
-    every = max(1, int((REFERENCE_EVERY_S - HOLD_S) / cost_s))
-    ordered = [reference]
-    for number, visit in enumerate(visits, start=1):
-        ordered.append(visit)
-        if number % every == 0 and number < len(visits):
-            ordered.append(reference)
-    ordered.append(reference)
+    ordered = _with_returns(visits, reference, workspace, pace)
     measuring = run_through(ordered, workspace, pace, reference.theta).duration_s
     share = WARM_UP_SHARE * measuring
     return run_through(
@@ -267,6 +258,22 @@ def arrange(
         reference.theta,
         _warm_up(float(np.clip(share, WARM_UP_LEAST_S, WARM_UP_MOST_S)), workspace, pace, rng),
     )
+
+
+def _with_returns(
+    visits: Sequence[Visit], reference: Visit, workspace: Workspace, pace: Pace
+) -> list[Visit]:
+    """Return the visits with the reference at both ends and as often as needed in between."""
+    ordered = [reference]
+    since_s = 0.0
+    ends = run_through([reference, *visits], workspace, pace, reference.theta).ends
+    for visit, lasts_s in zip(visits, np.diff(ends), strict=True):
+        if since_s > 0.0 and since_s + lasts_s > REFERENCE_EVERY_S:
+            ordered.append(reference)
+            since_s = 0.0
+        ordered.append(visit)
+        since_s += float(lasts_s)
+    return [*ordered, reference]
 
 
 def _warm_up(seconds: float, workspace: Workspace, pace: Pace, rng: np.random.Generator) -> Array:

@@ -247,7 +247,6 @@ class _Pool:
         self.timeline = run_through(ordered, self._workspace, pace, reference)
         self._place = np.argsort(order)
         visit_s = np.diff(self.timeline.ends, prepend=0.0)
-        self._mean_s = float(visit_s[: len(visits)].mean())
         self.cost_s = self.by_setting(visit_s)
 
     def by_setting(self, of_visits: Array) -> Array:
@@ -266,7 +265,6 @@ class _Pool:
         return arrange(
             [self._settings[i] for i in chosen],
             self._fixed,
-            self._mean_s,
             self._workspace,
             self._pace,
             rng,

@@ -14,6 +14,9 @@ from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 MARKERS = "osD^vP*X<>"
 """Of the loads, none first."""
 
+ARROW_DEG = 6.0
+"""Longer than an approach, to stand out from under its marker."""
+
 
 def draw_plan(table: Table, timeline: Timeline, path: Path) -> None:
     """Draw the poses in the joint space and the time line.
@@ -44,7 +47,7 @@ def draw_plan(table: Table, timeline: Timeline, path: Path) -> None:
             for plot in (angles, loads):
                 plot.axvspan(
                     begin,
-                    begin + max(dwell.hold_s, 3.0) / 60.0,
+                    begin + max(dwell.hold_s, 0.005 * timeline.duration_s) / 60.0,
                     color=colour,
                     alpha=0.35,
                     linewidth=0.0,
@@ -74,13 +77,14 @@ def _draw_poses(figure: Any, plot: Any, table: Table, timeline: Timeline) -> Non
     border = np.degrees(table.workspace.operative_border)
     plot.plot(*border.T, color="black", linewidth=1.5, label="operative workspace")
     plot.quiver(
-        *(poses - 4.0 * sides).T,
-        *(4.0 * sides).T,
+        *(poses - ARROW_DEG * sides).T,
+        *(ARROW_DEG * sides).T,
         angles="xy",
         scale_units="xy",
         scale=1.0,
-        width=0.003,
-        color="0.65",
+        width=0.005,
+        headwidth=4.0,
+        color="0.6",
     )
     for number, name in enumerate(names):
         own = np.array([visit.load.name == name for visit in visits])
@@ -99,9 +103,10 @@ def _draw_poses(figure: Any, plot: Any, table: Table, timeline: Timeline) -> Non
             zorder=3,
             label=name or "no load",
         )
-    figure.colorbar(shown, ax=plot, label="order of the visits", shrink=0.75)
+    bar = figure.colorbar(shown, ax=plot, location="bottom", shrink=0.8)
+    bar.set_label("order of the visits")
     plot.set_aspect("equal")
     plot.set_xlabel("motor 1 angle θ₁ [deg]")
     plot.set_ylabel("motor 2 angle θ₂ [deg]")
     plot.set_title(f"{table.geometry.name}: poses, arrows = last approach", fontsize=9)
-    plot.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, -0.32), ncols=2)
+    plot.legend(fontsize=7, loc="upper right")

@@ -1,0 +1,337 @@
+"""How many extra poses tell twins apart: planned ones against random ones.
+
+A virtual cell hides an effect (laws of the simulation, not of the model) and is measured as in the
+paper: 25 poses, one load, one approach.  The effects that fit these measurements about as well as
+the true one are its class of twins.  `plan` chooses extra poses, each from both sides; where they do
+not suffice it plans once more.  The others are random poses, sides and loads out of the same list.
+Both are performed by the virtual cell.  A class is resolved from the
+number of extra poses on at which every wrong twin lies behind the true one by 25 in the Bayesian
+information criterion, noise aside, with everything refitted that a diagnosis refits.
+
+    python bench/plan_resolves.py [CASES] [FIRST_SEED]
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from wrist_stiffness.campaign.design_information import (
+    RESOLVED,
+    Goal,
+    Information,
+    Layout,
+    MeasurementNoise,
+    beyond_nuisances,
+    discrimination,
+    information,
+)
+from wrist_stiffness.campaign.design_pool import draw_settings
+from wrist_stiffness.campaign.design_question import (
+    SESSION,
+    WRIST,
+    between,
+    drawn,
+    effect_named,
+)
+from wrist_stiffness.campaign.design_signatures import Signature, signatures
+from wrist_stiffness.campaign.design_timeline import Pace, Timeline, Visit, run_through
+from wrist_stiffness.campaign.loads_file import Actuator, AppliedLoad, Weight
+from wrist_stiffness.campaign.planning import Conditions, plan
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, places
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import LoadSensor, Noise
+from wrist_stiffness.simulation.program import Program, Track
+from wrist_stiffness.simulation.residual import residual
+
+HIDDEN = (
+    "backlash",
+    "drive_compliance",
+    "mount_compliance",
+    "frame_compliance",
+    "platform_compliance",
+    "gravity",
+    "joint_clearance",
+    "flange_contact",
+    "bushing_hardening",
+    "joint_friction",
+    "creep",
+    "load_scale",
+    "load_misalignment",
+    "load_point",
+    "encoder_eccentricity",
+    "cable_wrench",
+)
+"""What poses and loads at rest can show."""
+
+VISIBLE = 6.0
+"""Discrimination from nothing that the hidden effect has in the paper's design."""
+
+DECISIVE = 6.0
+MOST_TWINS = 5
+EXTRA = 32
+"""Extra poses at most; one that is approached from both sides counts as two."""
+
+RATE_HZ = 5.0
+PACE = Pace(float(np.radians(30.0)), 2.0, in_motion=False)
+QUIET = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
+MODEL = load_model(shipped_file("config/palmieri2015_model.yaml"))
+TABLE = MODEL.table
+WORKSPACE = TABLE.workspace
+MDEG = float(np.radians(1e-3))
+NOISE = MeasurementNoise(np.repeat([1e-6, MDEG], 3), TABLE.geometry.limits.encoder_step)
+LOADS = (
+    Weight("weight", 0.1, np.array([0.02, 0.0, -0.018]), 15.0),
+    Actuator(
+        "gripper",
+        np.repeat([-1.0, -0.01], 3),
+        np.repeat([1.0, 0.01], 3),
+        np.array([0.0, 0.0, -0.018]),
+        True,
+        1.0,
+    ),
+)
+
+
+def paper_design() -> Timeline:
+    """Return 25 poses under 1 N downward, approached from one side; rests under load alone."""
+    lower, upper = WORKSPACE.rectangle
+    middle, half = (lower + upper) / 2.0, (upper - lower) / 2.0
+    axis = np.linspace(-1.0, 1.0, 5) * 0.5
+    zero = np.zeros(3)
+    load = AppliedLoad("1 N", np.array([0.0, 0.0, -1.0]), zero, zero, False, False, 1.0)
+    visits = [
+        Visit(middle + half * np.array([x, y]), np.ones(2), load, True) for x in axis for y in axis
+    ]
+    timeline = run_through(visits, WORKSPACE, PACE, np.zeros(2))
+    kept = np.abs(timeline.block.load[timeline.rows]).sum(axis=1) > 0.0
+    return replace(
+        timeline,
+        rows=timeline.rows[kept],
+        visit=timeline.visit[kept],
+        moving=timeline.moving[kept],
+    )
+
+
+def performed(timeline: Timeline, hidden: HiddenEffect | None) -> np.ndarray:
+    """Return residuals (n, 6) at the observed samples of a cell with noiseless sensors."""
+    times, angles, loads = (np.array(column) for column in zip(*timeline.knots, strict=True))
+    settings = CellSettings(
+        rate_hz=RATE_HZ,
+        instrument="ideal",
+        load_sensor=QUIET,
+        hidden=() if hidden is None else (hidden,),
+    )
+    cell = VirtualCell(TABLE, settings, np.random.default_rng(0))
+    still = Track(np.array([0.0, times[-1]]), np.zeros((2, 1)))
+    cell.program = Program(Track(times, angles), Track(times, loads), still, times[-1] + 1.0)
+    time_s = np.arange(0.0, times[-1], 1.0 / RATE_HZ)
+    found = residual(TABLE, cell.run(time_s, cell.desired(time_s)))
+    out = np.zeros((len(timeline.block), 6))
+    for row in timeline.rows:
+        until = timeline.block.time[row]
+        out[row] = found[(time_s >= until - 1.0) & (time_s <= until)].mean(axis=0)
+    return out
+
+
+def left_by(timeline: Timeline, hidden: HiddenEffect) -> np.ndarray:
+    """Return what the hidden effect leaves at the observed samples, (n, 6)."""
+    return performed(timeline, hidden) - performed(timeline, None)
+
+
+def told(timeline: Timeline, sets: list, truth: str, left: np.ndarray | None) -> Information:
+    """Return the Gram matrices with the simulation's effect in place of the model's."""
+    known = (*SESSION, *WRIST)
+    found = signatures(MODEL, timeline.block, [*((effect_named(n),) for n in known), *sets])
+    effects = [each for each in found[len(known) :] if not each.lacks]
+    if left is not None:
+        effects = [
+            replace(each, truths=left[..., None]) if each.name == truth else each
+            for each in effects
+        ]
+    return information(timeline, found[: len(known)], SESSION, effects, TABLE, NOISE)
+
+
+def behind(gram: np.ndarray, layout: Layout, truth: str, names: list[str]) -> np.ndarray:
+    """Return by how much each name lies behind the truth in the criterion, (..., b)."""
+    goals = [Goal(truth, name) for name in (truth, *names)]
+    squares = discrimination(gram, layout, goals) ** 2
+    return squares[..., 1:] - squares[..., :1]
+
+
+def fitted(known: Information, truth: str, signature: Signature) -> Effect | None:
+    """Return an effect with the values that fit the hidden one best, None if out of bounds."""
+    left = beyond_nuisances(known.total, known.layout)
+    columns, y = known.layout.columns[signature.name], known.layout.truths[truth]
+    inner = left[np.ix_(columns, columns)]
+    sizes = np.linalg.lstsq(inner + 1e-2 * np.eye(len(inner)), left[np.ix_(columns, y)])[0][:, 0]
+    effect, values = signature.effect, {}
+    linear = effect.stage != "sensor" and all(p.linear for p in effect.parameters)
+    for p, size in zip(effect.parameters, sizes, strict=True):
+        base = 0.0 if linear else effect.estimates[p.key].value
+        values[p.key] = base + float(size) * p.scale
+        if not p.lower <= values[p.key] <= p.upper:
+            return None
+    return effect.with_values(values)
+
+
+def resolved_from(poor: np.ndarray, extra: Information, truth: str, twins: list) -> float:
+    """Return the number of extra poses from which the class is resolved, infinite if never."""
+    grams = poor + np.cumsum(extra.grams, axis=0)
+    good = behind(grams, extra.layout, truth, twins).min(axis=1) >= RESOLVED**2
+    if not good[-1]:
+        return np.inf
+    bad = np.flatnonzero(~good)
+    return 1.0 + (bad[-1] + 1 if len(bad) else 0)
+
+
+def planned_visits(first: Effect, others: list, seed: int) -> list[Visit]:
+    """Return the visits of one plan after the other, none where nothing can be settled."""
+    visits: list[Visit] = []
+    while len(visits) < EXTRA:
+        rng = np.random.default_rng([seed, len(visits)])
+        question = between([[first, *others]], [], rng)
+        conditions = Conditions(LOADS, PACE, NOISE, None, seed + 1000 * len(visits))
+        found = plan(MODEL, question, conditions)
+        if not found.settings:
+            return visits
+        visits += [v for setting in found.settings for v in setting.visits(PACE.dwell_s)]
+    return visits[:EXTRA]
+
+
+def random_visits(seed: int) -> list[Visit]:
+    """Return random poses from a random side, under random loads of the list or none."""
+    rng = np.random.default_rng([seed, 1])
+    settings = draw_settings(WORKSPACE, LOADS, TABLE.geometry.gravity, rng)[:EXTRA]
+    return [setting.visits(PACE.dwell_s)[rng.integers(2)] for setting in settings]
+
+
+def one_case(seed: int, poor: Timeline, poor_model: list[Signature], sets: dict) -> dict | None:
+    """Return the numbers of extra poses of one case, None where it has no twins."""
+    rng = np.random.default_rng(seed)
+    choices = [place for place in places(CATALOGUE) if place[0] in HIDDEN]
+    # Every effect is as likely as any other, however many places it has.
+    name = HIDDEN[rng.integers(len(HIDDEN))]
+    own = [place for place in choices if place[0] == name]
+    effect, component, form = own[rng.integers(len(own))]
+    truth = f"{effect}@{component}"
+    hidden = HiddenEffect(effect, component, form, ALL[effect].plausible, seed)
+    nuisances = poor_model[: len(SESSION) + len(WRIST)]
+    rivals = poor_model[len(SESSION) + len(WRIST) :]
+    try:
+        for _ in range(3):
+            left = left_by(poor, hidden)
+            effects = [replace(r, truths=left[..., None]) if r.name == truth else r for r in rivals]
+            known = information(poor, nuisances, SESSION, effects, TABLE, NOISE)
+            size = float(discrimination(known.total, known.layout, [Goal(truth, "")])[0])
+            if 0.8 * VISIBLE < size < 1.25 * VISIBLE:
+                break
+            larger = hidden.magnitude * VISIBLE / max(size, 1e-3)
+            if larger > ALL[effect].limit:
+                return {"truth": truth, "skip": "too small at its limit"}
+            hidden = replace(hidden, magnitude=larger)
+    except InputError as error:
+        return {"truth": truth, "skip": str(error)[:60]}
+    names = [each.name for each in effects]
+    margins = dict(zip(names, behind(known.total, known.layout, truth, names), strict=True))
+    best = min(margins.values())
+    by_name = {each.name: each for each in effects}
+    members = sorted(
+        (
+            name
+            for name in names
+            if margins[name] - best <= DECISIVE
+            and (name == truth or fitted(known, truth, by_name[name]) is not None)
+        ),
+        key=margins.__getitem__,
+    )
+    if truth not in members:
+        return {
+            "truth": truth,
+            "skip": f"the paper's design prefers {min(margins, key=margins.get)}",
+        }
+    members = members[:MOST_TWINS]
+    if truth not in members:
+        members[-1] = truth
+    if len(members) < 2:
+        return {"truth": truth, "skip": "no twins"}
+    first = fitted(known, truth, by_name[members[0]])
+    twins = [name for name in members if name != truth]
+    classed = [sets[name] for name in members]
+    found: dict = {"truth": truth, "twins": twins}
+    if first is None:
+        first = effect_named(truth)
+    planned = planned_visits(first, [effect_named(n) for n in members[1:]], seed)
+    if not planned:
+        found["skip"] = f"the plan says that no experiment tells it from {', '.join(twins)}"
+        return found
+    paper = told(poor, classed, truth, left).total
+    for kind, visits in (("planned", planned), ("random", random_visits(seed))):
+        order = np.random.default_rng([seed, 2]).permutation(len(visits))
+        timeline = run_through([visits[i] for i in order], WORKSPACE, PACE, np.zeros(2))
+        extra = told(timeline, classed, truth, left_by(timeline, hidden))
+        extra = Information(extra.grams[np.argsort(order)], extra.layout)
+        found[kind] = resolved_from(paper, extra, truth, twins)
+        found[f"{kind}_minutes"] = found[kind] * timeline.duration_s / 60.0 / len(visits)
+    return found
+
+
+def main() -> None:
+    """Run cases and print what they took."""
+    warnings.simplefilter("ignore")
+    wanted = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    poor = paper_design()
+    rng = np.random.default_rng(99)
+    names = [f"{law.id}@{place}" for law in catalogue().values() for place in law.places]
+    sets = {n: drawn(effect_named(n), rng) for n in names if n not in (*SESSION, *WRIST)}
+    known = [(effect_named(name),) for name in (*SESSION, *WRIST)]
+    signs = signatures(MODEL, poor.block, [*known, *sets.values()])
+    poor_model = [each for each in signs if not each.lacks]
+    done, skipped = [], 0
+    while len(done) < wanted:
+        found = one_case(seed, poor, poor_model, sets)
+        if "skip" in found:
+            skipped += 1
+            print(f"{seed:4d} {found['truth']:32s} left out: {found['skip']}", flush=True)
+        else:
+            done.append(found)
+            print(
+                f"{seed:4d} {found['truth']:32s} planned {found['planned']:4.0f}  random "
+                f"{found['random']:4.0f} poses  against {', '.join(found['twins'])}",
+                flush=True,
+            )
+        seed += 1
+    pairs = np.array([(each["planned"], each["random"]) for each in done])
+    report(pairs, skipped)
+
+
+def report(pairs: np.ndarray, skipped: int) -> None:
+    """Print medians with bootstrap intervals; never resolved counts as more than all poses."""
+    most = float(EXTRA)
+    capped = np.where(np.isfinite(pairs), pairs, 2.0 * most)
+    rng = np.random.default_rng(0)
+    draws = capped[rng.integers(len(capped), size=(4000, len(capped)))]
+    ratio = np.median(capped[:, 0] / capped[:, 1])
+    low, high = np.quantile(np.median(draws[..., 0] / draws[..., 1], axis=1), [0.025, 0.975])
+    print(f"{len(pairs)} cases, {skipped} left out; up to {most:.0f} extra poses")
+    for name, column in (("planned", 0), ("random", 1)):
+        never = int(np.sum(~np.isfinite(pairs[:, column])))
+        print(f"{name:8s} median {np.median(capped[:, column]):4.0f} poses, never resolved {never}")
+    print(
+        f"planned / random poses, median over cases {ratio:.2f} (95 % {low:.2f} to {high:.2f}); "
+        f"medians' ratio {np.median(capped[:, 0]) / np.median(capped[:, 1]):.2f}; "
+        f"never resolved counted as {2.0 * most:.0f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
