@@ -56,7 +56,7 @@ def draw_bars(every: Sequence[Bars]) -> Any:
             places,
             bars.values,
             xerr=bars.uncertainties,
-            color=[colour(place) for place in places],
+            color=[colour(place) for place in range(len(places))],
             height=0.6,
             error_kw={"ecolor": "black", "capsize": 3},
         )
@@ -96,7 +96,7 @@ def draw_map(
     titles : sequence of str
         Names of the k models.
     """
-    figure = new_figure(0.5 + 4.2 * len(lengths), 3.6 * len(titles))
+    figure = new_figure(0.5 + 3.8 * len(lengths), 0.9 + 3.4 * len(titles))
     plots = figure.subplots(len(titles), len(lengths), squeeze=False, sharex=True, sharey=True)
     edges, cells = _cells(np.degrees(np.concatenate([theta, border])), np.degrees(theta))
     shape = tuple(len(edge) - 1 for edge in edges)
@@ -116,11 +116,12 @@ def draw_map(
             ax=column.tolist(),
             label=f"{label}, RMS in a cell",
             extend="max" if above else "neither",
-            shrink=0.8,
+            location="bottom",
+            shrink=0.9,
+            aspect=30,
         )
         column[-1].set_xlabel("motor 1 angle θ₁ [deg]")
-    for plot in plots[:, 0]:
-        plot.set_ylabel("motor 2 angle θ₂ [deg]")
+    figure.supylabel("motor 2 angle θ₂ [deg]", fontsize="medium")
     return figure
 
 

@@ -1,0 +1,256 @@
+"""The report of `diagnose`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.campaign.contrast_sentences import Statement, Told, tell
+from wrist_stiffness.campaign.noise_floor import noise_floor
+from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations, Quantity
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.workflows.pictures.dependence import draw_against
+from wrist_stiffness.workflows.pictures.errors import Bars, draw_bars
+from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.report.page import (
+    Bullets,
+    Page,
+    Part,
+    Section,
+    Table,
+    Text,
+    drawn,
+)
+from wrist_stiffness.workflows.report.parts import (
+    against,
+    number,
+    provenance_section,
+    typeset,
+    unit_of,
+)
+
+MOST_PICTURED = 4
+"""Conditions that are drawn."""
+
+COMPENSABLE = {
+    "yes": "yes, from what the recordings hold",
+    "needs_signal": "only with a signal that the recordings lack",
+    "no": "no",
+}
+
+HOW = (
+    "Registrations, encoder zeros, load tare and the tolerances of the wrist were fitted first; an "
+    "effect counts only for what it explains beyond them.",
+    "A part of the recordings was put aside before looking: another session where there is one, "
+    "else the end of the only one. Errors and gains are those on that part.",
+    "p is the chance that the best of all effects of the catalogue looks as good without any "
+    "effect. Stability is the share of resamples of the recordings in which the same finding "
+    "comes first.",
+    "Effects in one class cannot be told apart by these recordings; the first is only the best.",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What the pictures of a diagnosis need beside its result.
+
+    Parameters
+    ----------
+    observations : Observations
+        Residuals after the base was refitted, without any effect; covariates as
+        `observing.observe` names them.
+    told : Told
+        On what those residuals depend, of `contrast_sentences.tell`.
+    explained : (n, 6) float, optional
+        Residuals with the findings in the model, of the same units.
+    """
+
+    observations: Observations
+    told: Told
+    explained: Array | None = None
+
+
+def shown_by(
+    observations: Observations, rng: np.random.Generator, explained: Array | None = None
+) -> Shown:
+    """Return what the pictures need, with the sentences worked out.
+
+    Parameters
+    ----------
+    observations : Observations
+        Residuals after the base was refitted, without any effect.
+    rng : numpy.random.Generator
+        For what chance gives.
+    explained : (n, 6) float, optional
+        Residuals with the findings in the model, of the same units.
+    """
+    return Shown(observations, tell(observations, noise_floor(observations), rng), explained)
+
+
+def report_of_diagnosis(
+    result: Diagnosis,
+    shown: Shown,
+    recordings: Sequence[str],
+    notes: Sequence[str],
+    provenance: Provenance,
+) -> Page:
+    """Return the report of a diagnosis.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        What the statistics say.
+    shown : Shown
+        For the pictures and the sentences.
+    recordings : sequence of str
+        Names.
+    notes : sequence of str
+        What could not be used.
+    provenance : Provenance
+        Files and versions.
+    """
+    quantities = shown.observations.reported
+    sections = [
+        Section("Findings", tuple(_findings(result, quantities))),
+        Section("How much it brings", _fall(result, quantities)),
+        Section("Where it shows", _depends(shown)),
+        Section("What remains", _remains(result)),
+        Section("What these recordings cannot show", _not_excited(result)),
+        Section("What the refit took up first", _absorbed(result, notes)),
+        Section("How it was computed", (Bullets(HOW),)),
+        provenance_section(provenance),
+    ]
+    return Page(
+        "Which physical effect is missing?",
+        f"{', '.join(recordings)}: {shown.observations.n_units} dwells and moments in motion",
+        verdict_of(result),
+        tuple(sections),
+    )
+
+
+def verdict_of(result: Diagnosis) -> tuple[str, ...]:
+    """Return the answer in a few sentences."""
+    found = [_class_of(finding) for finding in result.findings]
+    if result.verdict == "none":
+        return ("Nothing is missing at this noise: no effect of the catalogue is in the data.",)
+    lines = []
+    if found:
+        lines.append(f"Missing in the model: {'; and '.join(found)}.")
+    if result.verdict == "unknown":
+        share = 100.0 * result.unexplained.energy_share
+        lines.append(
+            f"{share:.0f} % of the structure above the noise is explained by no known effect."
+        )
+        if result.unexplained.depends_on:
+            lines.append(f"It depends on {', '.join(result.unexplained.depends_on)}.")
+    return tuple(lines)
+
+
+def _class_of(finding: Finding) -> str:
+    names = [f"{effect} at {component}" for effect, component in finding.members]
+    return names[0] if len(names) == 1 else f"{names[0]} (or {', '.join(names[1:])})"
+
+
+def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]:
+    if not result.findings:
+        return [Text("No effect of the catalogue was found.")]
+    parts: list[Part] = []
+    for place, finding in enumerate(result.findings, 1):
+        parts.append(Text(f"{place}. {_class_of(finding)}. {typeset(finding.evidence)}."))
+        if finding.check:
+            parts.append(Text(f"To be sure: {finding.check}."))
+        parts.append(_numbers(finding, quantities))
+    return parts
+
+
+def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
+    rows = [
+        (name, f"{value:.4g} ± {error:.2g}") for name, (value, error) in finding.parameters.items()
+    ]
+    for q in quantities:
+        if q.key in finding.buys:
+            gain, error = finding.buys[q.key]
+            rows.append(
+                (
+                    f"error of {q.name} on the part put aside falls by",
+                    f"{gain:.3g} ± {error:.2g} {unit_of(q.unit)}",
+                )
+            )
+    rows += [
+        ("residual with it over without it", number(finding.heldout_rmse_ratio)),
+        ("information criterion (BIC) falls by", number(finding.delta_bic)),
+        ("p", f"{finding.p_value:.2g}"),
+        ("stability", f"{100.0 * finding.stability:.0f} %"),
+        ("can be compensated", COMPENSABLE.get(finding.compensable, finding.compensable)),
+    ]
+    return Table(f"Numbers of {finding.name}.", ("", "value"), tuple(rows))
+
+
+def _fall(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[Part, ...]:
+    bars = [
+        Bars(
+            f"{q.name} [{unit_of(q.unit)}]",
+            ["before", "with the findings"],
+            [result.before[q.key], result.after[q.key]],
+            [0.0, 0.0],
+            {"noise floor": result.noise_floor[q.key]},
+        )
+        for q in quantities
+    ]
+    caption = (
+        f"Error on the part that was put aside ({result.scope}), before and with the findings in "
+        "the model."
+    )
+    return (drawn(draw_bars(bars), caption),)
+
+
+def _depends(shown: Shown) -> tuple[Part, ...]:
+    parts: list[Part] = [Bullets(tuple(typeset(line) for line in shown.told.sentences))]
+    statements: list[Statement] = [each for each in shown.told.statements if each.changes]
+    if not statements:
+        return tuple(parts)
+    series = [("before", shown.observations)]
+    if shown.explained is not None:
+        series.append(("with the findings", shown.observations.with_values(shown.explained)))
+    pictures = [against(each, series) for each in statements[:MOST_PICTURED]]
+    parts.append(
+        drawn(
+            draw_against(pictures),
+            "What the refitted base leaves against the conditions that show it best: every dwell "
+            "and moment (pale), and means of equal numbers of them with standard errors.",
+        )
+    )
+    return tuple(parts)
+
+
+def _remains(result: Diagnosis) -> tuple[Part, ...]:
+    rest = result.unexplained
+    if not rest.evidence:
+        return (Text("Nothing beyond the noise."),)
+    text = f"{100.0 * rest.energy_share:.0f} % of the structure above the noise: {rest.evidence}."
+    parts: list[Part] = [Text(typeset(text))]
+    if rest.depends_on:
+        parts.append(
+            Text(f"Conditions that predict it, strongest first: {', '.join(rest.depends_on)}.")
+        )
+    return tuple(parts)
+
+
+def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
+    if not result.not_excited:
+        return (Text("Every effect of the catalogue would have shown."),)
+    needs: dict[str, list[str]] = {}
+    for each in result.not_excited:
+        needs.setdefault(each.needs, []).append(f"{each.effect} at {each.component}")
+    rows = tuple((", ".join(names), need) for need, names in needs.items())
+    return (Table("To be recorded if one of these is suspected.", ("effects", "needs"), rows),)
+
+
+def _absorbed(result: Diagnosis, notes: Sequence[str]) -> tuple[Part, ...]:
+    parts: list[Part] = [Bullets(tuple(typeset(line) for line in result.absorbed))]
+    lost = [f"{result.lost_units} units were left out as lost beams"] if result.lost_units else []
+    if lost or notes:
+        parts += [Text("To be kept in mind:"), Bullets((*lost, *notes))]
+    return tuple(parts)
