@@ -9,7 +9,13 @@ from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.compensation.trajectory import planned_point
-from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, UnreachablePoseError
+from wrist_stiffness.errors import (
+    InputError,
+    LoadRangeError,
+    SingularPoseError,
+    StaleLoadError,
+    UnreachablePoseError,
+)
 from wrist_stiffness.model.error_model import ErrorModel, Load
 
 NAMES = ("motor_1_joint", "motor_2_joint")
@@ -278,6 +284,34 @@ def test_towards_the_border_of_the_domain_the_correction_fades(model, objective)
     steps = np.abs(np.diff(deltas, axis=0)).max()
     spacing = np.degrees(path[1] - path[0])
     assert steps < 3.0 * np.abs(deltas).max() * spacing / 2.0
+
+
+def test_towards_a_singular_pose_the_correction_fades_and_beyond_it_there_is_none(model):
+    """The same wrist, whose geometry calls poses singular long before the border of the domain."""
+    table = model.table
+    header = replace(table.header, geometry=dict(table.header.geometry))
+    header.geometry["limits"] = {**header.geometry["limits"], "singularity": 0.6}
+    near = ErrorModel("near", replace(table, header=header), "closed_form")
+    free = StreamSettings(
+        contact=EVERY_LOAD.contact,
+        safety=replace(EVERY_LOAD.safety, slew=1e3, deadband_steps=0.0),
+    )
+    driver = corrector(near, settings=free)
+    driver.send(np.zeros(2))
+    deltas, faults = [], []
+    for share in np.linspace(0.0, 1.0, 100):
+        theta = share * np.array([1.1, -1.1])
+        command = driver.send(theta, seconds=0.1)
+        deltas.append(command.theta - theta)
+        faults.append(command.fault)
+    refused = [isinstance(fault, SingularPoseError) for fault in faults]
+    assert any(refused)
+    assert not refused[0]
+    deltas = np.abs(deltas).max(axis=1)
+    assert np.all(deltas[refused] == 0.0)
+    # It comes to the limit without a step: the last corrections are small, and no change is large.
+    assert deltas[np.argmax(refused) - 1] < 0.1 * deltas.max()
+    assert np.abs(np.diff(deltas)).max() < 0.2 * deltas.max()
 
 
 def test_a_clock_that_jumps_back_does_not_move_the_correction(model):

@@ -15,7 +15,10 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from wrist_stiffness.lookup.table_file import save_table
-from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.ros import wrist_node
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, nanoseconds, time_message
@@ -160,6 +163,41 @@ def test_doubled_and_late_joint_states_are_predicted_with_their_own_load(graph, 
     assert stamps(graph, PREDICTED) == order
     first, second, late = (message.pose.pose.position.x for message in graph.heard[PREDICTED])
     assert first == second != late
+
+
+def test_a_model_with_a_memory_refuses_late_joint_states(graph, model, tmp_path):
+    """What it remembers is of later; a doubled one is the same moment again."""
+    path = tmp_path / "loose.yaml"
+    width = {"width_mdeg": Estimate(20.0)}
+    save_model(model.with_effects(Effect(find_law("backlash"), "motor_1", width)), path)
+    node = graph.add(PoseErrorPredictor, model_file=str(path))
+    graph.listen(PoseWithCovarianceStamped, PREDICTED)
+    graph.connected(PREDICTED)
+    send_load(graph, node, SECOND)
+    for stamp in (SECOND + 12, SECOND + 12, SECOND + 5, SECOND + 13):
+        graph.joints("/joint_states", stamp)
+    wait_for(graph, PREDICTED, 3)
+    assert stamps(graph, PREDICTED) == [SECOND + 12, SECOND + 12, SECOND + 13]
+    _, values = graph.status(PREDICTOR, lambda status, values: values["last fault"])
+    assert "is before the last one" in values["last fault"]
+
+
+def test_doubled_and_late_commands_are_forwarded_and_move_nothing(graph, model_path):
+    node = graph.add(AngleCorrector, model_file=str(model_path), enabled_on_start=True)
+    graph.listen(JointState, CORRECTED)
+    graph.connected(CORRECTED)
+    send_load(graph, node, SECOND)
+    order = [SECOND, SECOND + 10, SECOND + 10, SECOND + 5, SECOND + 10]
+    sent = [SECOND, *(SECOND + (i - SECOND) * SECOND // 200 for i in order[1:])]
+    for count, stamp in enumerate(sent, start=1):
+        graph.joints("/motor_commands", stamp)
+        wait_for(graph, CORRECTED, count)
+    assert stamps(graph, CORRECTED) == sent
+    angles = [message.position.tolist() for message in graph.heard[CORRECTED]]
+    assert angles[0] == list(THETA)
+    assert angles[1] != angles[0]
+    # Neither the doubled one nor the late one is time that passes.
+    assert angles[2] == angles[1] == angles[3]
 
 
 def test_after_the_clock_jumped_back_predictions_go_on(graph, predictor):

@@ -1,5 +1,6 @@
 """Nodes as processes: started, stopped, and the whole cell recorded and replayed."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -8,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from sensor_msgs.msg import JointState
 
 from wrist_stiffness.cli import main as command_line
 from wrist_stiffness.errors import InputError
@@ -66,6 +68,33 @@ def test_a_killed_node_comes_back(graph):
                 graph.heard["/diagnostics"].clear()
                 status, _ = graph.status(node.name, lambda status, values: True)
                 assert status.level != status.ERROR
+            finally:
+                process.kill()
+
+
+def test_a_killed_corrector_comes_back_and_ramps_from_zero(graph):
+    """Nobody forwards while it is away; who comes back does not step to the full correction."""
+    node = NODES["angle_corrector"].having(
+        {"enabled_on_start": True, "deadband_steps": 0.0, "contact_policy": "gain"}
+    )
+    corrected, theta = "/motor_commands_corrected", [0.1, -0.2]
+    graph.listen(JointState, corrected)
+    for _ in range(2):
+        with subprocess.Popen(node.command()) as process:
+            try:
+                graph.heard["/diagnostics"].clear()
+                graph.heard[corrected].clear()
+                graph.status(node.name, lambda status, values: True)
+                stamps = itertools.count(10**9, 10**8)
+
+                def moved(stamps=stamps):
+                    stamp_ns = next(stamps)
+                    graph.load(stamp_ns)
+                    graph.joints("/motor_commands", stamp_ns, theta)
+                    return any(list(m.position) != theta for m in graph.heard[corrected])
+
+                graph.until(moved, "correction")
+                assert list(graph.heard[corrected][0].position) == theta
             finally:
                 process.kill()
 
