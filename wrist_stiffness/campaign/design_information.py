@@ -130,9 +130,10 @@ def whitened(
         size = np.where(moving, MOTION_NOISE, 1.0)
         covariance = np.diag((size[:, None] * noise.white).ravel() ** 2)
         # In motion every sample has a count of its own.
-        for group in (*([row] for row in rows[moving]), rows[~moving]):
+        groups = [np.array([row]) for row in np.flatnonzero(moving)]
+        for group in (*groups, np.flatnonzero(~moving)):
             shared = np.zeros((len(rows), 6, 2))
-            shared[np.isin(rows, group)] = jacobian[group]
+            shared[group] = jacobian[rows[group]]
             flat = shared.reshape(-1, 2)
             covariance += flat @ flat.T
         values = twists[timeline.rows[rows]].reshape(6 * len(rows), -1)
@@ -200,8 +201,11 @@ def information(
     Information
         Of every visit.
     """
-    blocks, prior = [each.columns for each in nuisances], []
-    groups, columns, truths = {}, {}, {}
+    blocks = [each.columns for each in nuisances]
+    prior: list[float] = []
+    groups: dict[str, NDArray[np.intp]] = {}
+    columns: dict[str, NDArray[np.intp]] = {}
+    truths: dict[str, NDArray[np.intp]] = {}
     for each in nuisances:
         count = each.columns.shape[2]
         groups[each.name] = np.arange(len(prior), len(prior) + count)
@@ -259,7 +263,7 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
     return np.sqrt(squares)
 
 
-def chance_right(discriminations: Array) -> Array:
+def chance_right(discriminations: Array | float) -> Array:
     """Return the probability that the data prefer the truth to its rival."""
     right: Array = norm.cdf(0.5 * np.asarray(discriminations))
     return right
@@ -271,7 +275,7 @@ def wrong_bound(discriminations: Array) -> Array:
 
 
 def calibrated(gram: Array, layout: Layout) -> Array:
-    """Return the mean gain over the prior of what is calibrated, in nats a parameter (D-optimality).
+    """Return the mean gain of what is calibrated over its prior, in nats (D-optimality).
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ def draw_settings(
     chosen = [
         None if i % 4 == 3 or not sources else sources[i % len(sources)] for i in range(count)
     ]
-    rng.shuffle(chosen)  # type: ignore[arg-type]
+    rng.shuffle(chosen)
     poses = _poses(workspace, count, reference, rng)
     settings = []
     for theta, source in zip(poses, chosen, strict=True):
@@ -276,8 +276,10 @@ def _with_returns(
     return [*ordered, reference]
 
 
-def _warm_up(seconds: float, workspace: Workspace, pace: Pace, rng: np.random.Generator) -> Array:
-    """Return poses to move through for a time, (n, 2) [rad]."""
+def _warm_up(
+    seconds: float, workspace: Workspace, pace: Pace, rng: np.random.Generator
+) -> list[Array]:
+    """Return poses (2,) to move through for a time [rad]."""
     reference = reference_pose(workspace)
     poses = _poses(workspace, 8, reference, rng)
     way, spent = [reference], 0.0
@@ -285,4 +287,4 @@ def _warm_up(seconds: float, workspace: Workspace, pace: Pace, rng: np.random.Ge
         target = poses[len(way) % len(poses)]
         spent += pace.move_s(way[-1], target)
         way.append(target)
-    return np.array(way[1:])
+    return way[1:]

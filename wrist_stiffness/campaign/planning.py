@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.campaign.design_choice import choose
 from wrist_stiffness.campaign.design_information import (
@@ -20,8 +21,8 @@ from wrist_stiffness.campaign.design_information import (
     MeasurementNoise,
     calibrated,
     discrimination,
-    information,
     improvement,
+    information,
     wrong_bound,
 )
 from wrist_stiffness.campaign.design_pool import (
@@ -235,7 +236,7 @@ class _Pool:
         self,
         settings: Sequence[Setting],
         fixed: Sequence[Visit],
-        order: Array,
+        order: NDArray[np.intp],
         pace: Pace,
         model: ErrorModel,
     ) -> None:

@@ -95,11 +95,12 @@ def _run(arguments: argparse.Namespace) -> int:
         raise InputError(f"{arguments.output} exists already and is not overwritten")
     options = Options(
         arguments.minutes,
-        arguments.speed,
-        arguments.dwell,
-        not arguments.static,
-        *arguments.noise,
-        arguments.seed,
+        speed_deg_per_s=arguments.speed,
+        dwell_s=arguments.dwell,
+        in_motion=not arguments.static,
+        noise_um=arguments.noise[0],
+        noise_mdeg=arguments.noise[1],
+        seed=arguments.seed,
     )
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
     progress = Progress("plan")
