@@ -18,10 +18,10 @@ Mask = NDArray[np.bool_]
 
 RATE_HZ = 10.0
 
-TRUTH = ("mechanism", "lookup", "simulation", "recording")
+TRUTH = ("mechanism", "lookup", "simulation")
 """Rooms of the package that make a riddle."""
 
-PROJECT = (*TRUTH, "model", "compensation", "diagnosis", "campaign")
+PROJECT = (*TRUTH, "recording", "model", "compensation", "diagnosis", "campaign")
 """Rooms that the project's own diagnosis is made of as well."""
 
 PACKAGE = Path(shipped_file("precomputed/palmieri2015.npz")).parents[1] / "wrist_stiffness"
