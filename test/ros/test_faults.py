@@ -183,12 +183,12 @@ def test_a_model_with_a_memory_refuses_late_joint_states(graph, model, tmp_path)
 
 
 def test_doubled_and_late_commands_are_forwarded_and_move_nothing(graph, model_path):
-    node = graph.add(AngleCorrector, model_file=str(model_path), enabled_on_start=True)
+    slow = {"slew_deg_s": 0.01, "deadband_steps": 0.0, "enabled_on_start": True}
+    node = graph.add(AngleCorrector, model_file=str(model_path), **slow)
     graph.listen(JointState, CORRECTED)
     graph.connected(CORRECTED)
     send_load(graph, node, SECOND)
-    order = [SECOND, SECOND + 10, SECOND + 10, SECOND + 5, SECOND + 10]
-    sent = [SECOND, *(SECOND + (i - SECOND) * SECOND // 200 for i in order[1:])]
+    sent = [SECOND + ms * SECOND // 1000 for ms in (0, 50, 50, 25, 75)]
     for count, stamp in enumerate(sent, start=1):
         graph.joints("/motor_commands", stamp)
         wait_for(graph, CORRECTED, count)
@@ -197,7 +197,7 @@ def test_doubled_and_late_commands_are_forwarded_and_move_nothing(graph, model_p
     assert angles[0] == list(THETA)
     assert angles[1] != angles[0]
     # Neither the doubled one nor the late one is time that passes.
-    assert angles[2] == angles[1] == angles[3]
+    assert angles[2] == angles[1] == angles[3] != angles[4]
 
 
 def test_after_the_clock_jumped_back_predictions_go_on(graph, predictor):
