@@ -6,6 +6,7 @@ fit repeats Gauss-Newton steps on the model itself, and only what is left is tak
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,13 +18,10 @@ from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fit_problem import FitProblem
 from wrist_stiffness.campaign.free_effects import FreeEffect, commissioning, free_all
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
-from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.model.block import Block
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.evaluation import situation_of
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.model.situation import Situation
 
 SHIM_UM = 1.5
 """Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
@@ -31,6 +29,9 @@ SHIM_UM = 1.5
 MOST_STEPS = 12
 ENOUGH = 3e-3
 """Relative fall of the sum of squares below which the fit has converged."""
+
+WIDE = 1e3
+"""Factor of the prior of what belongs to the base and is under suspicion."""
 
 SMALLEST_STEP = 1.0 / 16.0
 
@@ -42,51 +43,35 @@ MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
 
 @dataclass(frozen=True, eq=False)
 class BaseProblem(FitProblem):
-    """The fit of a base whose flange gaps are shimmed to its axes at home."""
+    """The fit of a base.
+
+    Parameters
+    ----------
+    whole : ErrorModel
+        The model with all effects that it had.
+    """
+
+    whole: ErrorModel
 
     @cached_property
-    def _models(self) -> tuple[SessionModel, ...]:
-        return tuple(SessionModel(self.model, each, ()) for each in self.sessions)
+    def _factor(self) -> Array:
+        stated = self.table.covariance
+        if stated is None:
+            stated = np.diag(4.0 * WANDER**2)
+        return np.linalg.inv(np.linalg.cholesky(stated + np.diag(WANDER**2)))
 
-    @cached_property
-    def _home(self) -> Situation:
-        zero = Block(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 6)), np.zeros((1, 2)))
-        return situation_of(self.model.with_effects(), zero, None)
-
-    def effects(self, z: Array, session: int) -> tuple[Effect, ...]:
-        """Return the free effects as a session has them, the gaps as shims leave them."""
-        found = super().effects(z, session)
-        at = self._home
-        opened = np.zeros(len(at.parts.sectors.gap))
-        for free, effect in zip(self.free, found, strict=True):
-            if effect.law.id == "axis_misalignment":
-                # The gaps of a calibrated model fit its axes already: only further turns count.
-                turned = {key: value - free.effect.si[key] for key, value in effect.si.items()}
-                added, _ = effect.law.advance(at, effect.component, turned, None)
-                opened += at.carried(added)[1][0]
-        return tuple(self._shimmed(effect, opened) for effect in found)
-
-    def _shimmed(self, effect: Effect, opened: Array) -> Effect:
-        if effect.law.id != "flange_contact":
-            return effect
-        own = self._home.parts.sectors.component == ELASTIC.index(effect.component)
-        if not own.any():
-            return effect
-        (parameter,) = effect.parameters
-        gap = effect.estimates[parameter.key].value - 1e6 * float(opened[own].mean())
-        return effect.with_values(
-            {parameter.key: float(np.clip(gap, parameter.lower, parameter.upper))}
-        )
-
-    def _residuals(self, number: int, additions: list[tuple[Effect, ...]]) -> list[Array]:
-        session = self.sessions[number]
-        trials = [(*self.model.effects, *added) for added in additions]
-        return [session.residual(each) for each in self._models[number].predicted(trials)]
+    def whiten(self, values: Array) -> Array:
+        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
+        columns = values if values.ndim == 3 else values[:, :, None]
+        measured = self.table.measured[:, :, None]
+        white = self._factor @ np.where(measured, np.nan_to_num(columns), 0.0)
+        flat: Array = white.reshape(-1, columns.shape[2])
+        return flat if values.ndim == 3 else flat[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
 class BaseFit:
-    """The base at its best.
+    """The base at its best, with further effects where some were fitted along.
 
     Parameters
     ----------
@@ -94,22 +79,61 @@ class BaseFit:
         What was free.
     z : (p,) float
         Steps from the prior means.
-    observed : Observed
-        Table of what the fitted base leaves.
+    residual : (u, 6) float
+        What is left, log(T_measured T_predicted^-1) at O in F [m, rad].
     columns : (u, 6, p) float
         Change of what is left by a step of each unknown, about `z` [m, rad].
+    extras : tuple of str
+        Names of the further effects.
+    cost : float
+        Weighted sum of squares with the priors' part, in units of the noise.
     """
 
     problem: BaseProblem
     z: Array
-    observed: Observed
+    residual: Array
     columns: Array
+    extras: tuple[str, ...]
+    cost: float
 
-    def models(self, session: int) -> SessionModel:
+    @property
+    def prior_std(self) -> Array:
+        """Standard deviations of the priors of the base in steps, (p,); infinite for none."""
+        weight = self.problem.weights
+        names = [self.problem.free[u.free].effect.name for u in self.problem.unknowns]
+        widened = np.array([name in self.extras for name in names])
+        std = np.where(weight == 1.0, 1.0, np.inf)
+        return np.where(widened, np.where(self.of_base, 1.0 / WIDE, np.inf), std)
+
+    @property
+    def of_base(self) -> Array:
+        """Which unknowns belong to the base, (p,) bool."""
+        usual = {each.effect.name for each in free_base(self.problem.whole)[0]}
+        free = self.problem.free
+        return np.array([free[u.free].effect.name in usual for u in self.problem.unknowns])
+
+    def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
+        """Return the fitted effects of one session, also those that were held."""
+        own = self.problem.effects(self.z, session)
+        usual = {each.effect.name for each in free_base(self.problem.whole)[0]}
+        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in usual]
+        return (*self.problem.model.effects, *kept)
+
+    def model(self, session: int, with_extras: bool = True) -> SessionModel:
         """Return the fitted model of one session, on its units."""
         problem = self.problem
-        effects = (*problem.model.effects, *problem.effects(self.z, session))
+        effects = self.effects(session, with_extras)
         return SessionModel(problem.model, problem.sessions[session], effects)
+
+    def whiten(self, values: Array) -> Array:
+        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
+        return self.problem.whiten(values)
+
+    def without_extras(self) -> Observed:
+        """Return the table of what the base alone leaves where it was fitted with the extras."""
+        models = [self.model(n, with_extras=False) for n in range(len(self.problem.sessions))]
+        predicted = np.concatenate([each.predicted([each.effects])[0] for each in models])
+        return tabulate(self.problem.model, self.problem.sessions, predicted)
 
 
 def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
@@ -128,7 +152,12 @@ def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, 
     return tuple(shimmed), held
 
 
-def fit_base(model: ErrorModel, sessions: tuple[UnitSession, ...]) -> BaseFit:
+def fit_base(
+    model: ErrorModel,
+    sessions: tuple[UnitSession, ...],
+    extras: Sequence[Effect] = (),
+    start: BaseFit | None = None,
+) -> BaseFit:
     """Fit registrations, zeros, tare and tolerances, within their priors.
 
     Parameters
@@ -137,24 +166,40 @@ def fit_base(model: ErrorModel, sessions: tuple[UnitSession, ...]) -> BaseFit:
         Its effects are starts, or held.
     sessions : tuple of UnitSession
         In the order of time.
+    extras : sequence of Effect, optional
+        Effects fitted along, without priors, from the values that they have.  One that belongs to
+        the base loses its prior.
+    start : BaseFit, optional
+        Where the base begins.
     """
     free, held = free_base(model)
-    problem = BaseProblem(model.with_effects(*held), sessions, free)
-    whiten = _whitener(problem)
-    z = np.zeros(len(problem.unknowns))
+    added = {effect.name: effect for effect in extras}
+    usual = {each.effect.name for each in free}
+    widened = [
+        replace(f, scale={k: WIDE * v for k, v in f.scale.items()}) if f.effect.name in added else f
+        for f in free
+    ]
+    more = [
+        FreeEffect(effect, dict.fromkeys(_moving(effect), np.inf))
+        for name, effect in added.items()
+        if name not in usual
+    ]
+    problem = BaseProblem(model.with_effects(*held), sessions, (*widened, *more), model)
+    z = _start(problem, start)
     lower, upper = problem.bounds
+    weights = problem.weights
     residual = problem.residual(z)
     for _ in range(MOST_STEPS):
         columns = problem.columns(z)
-        left = whiten(residual)
-        scale = _robust_variance(left)
-        step = _step(whiten(columns), left, z * problem.weights, problem.weights, scale)
-        before = _cost(left, z, problem.weights, scale)
+        left = problem.whiten(residual)
+        scale = 1.0 if extras else _robust_variance(left)
+        step = _step(problem.whiten(columns), left, z * weights, weights, scale)
+        before = _cost(left, z, weights, scale)
         size = 1.0
         while True:
             trial = np.clip(z + size * step, lower, upper)
             tried = problem.residual(trial)
-            after = _cost(whiten(tried), trial, problem.weights, scale)
+            after = _cost(problem.whiten(tried), trial, weights, scale)
             if after < before or size <= SMALLEST_STEP:
                 break
             size /= 2.0
@@ -163,32 +208,30 @@ def fit_base(model: ErrorModel, sessions: tuple[UnitSession, ...]) -> BaseFit:
         z, residual = trial, tried
         if before - after < ENOUGH * before:
             break
-    predicted = np.concatenate([each.predicted([each.effects])[0] for each in _at(problem, z)])
-    return BaseFit(problem, z, tabulate(model, sessions, predicted), problem.columns(z))
+    cost = _cost(problem.whiten(residual), z, weights, 1.0)
+    return BaseFit(problem, z, residual, problem.columns(z), tuple(added), cost)
 
 
-def _at(problem: BaseProblem, z: Array) -> list[SessionModel]:
-    return [
-        SessionModel(problem.model, session, (*problem.model.effects, *problem.effects(z, number)))
-        for number, session in enumerate(problem.sessions)
-    ]
+def _moving(effect: Effect) -> list[str]:
+    """Return the parameters of an effect that a fit may move: all but those that do nothing."""
+    return [p.key for p in effect.parameters]
 
 
-def _whitener(problem: BaseProblem):
-    """Return the function that brings (u, 6) or (u, 6, p) to unit scatter; NaN become zero."""
-    stated = problem.table.covariance
-    if stated is None:
-        stated = np.diag(4.0 * WANDER**2)
-    factor = np.linalg.inv(np.linalg.cholesky(stated + np.diag(WANDER**2)))
-    measured = problem.table.measured
-
-    def whiten(values: Array) -> Array:
-        columns = values if values.ndim == 3 else values[:, :, None]
-        white = factor @ np.where(measured[:, :, None], np.nan_to_num(columns), 0.0)
-        flat = white.reshape(-1, columns.shape[2])
-        return flat if values.ndim == 3 else flat[:, 0]
-
-    return whiten
+def _start(problem: BaseProblem, start: BaseFit | None) -> Array:
+    """Return where the unknowns begin: where another fit left them."""
+    if start is None:
+        return np.zeros(len(problem.unknowns))
+    old = {
+        (start.problem.free[u.free].effect.name, u.key, u.session): u.mean + z * u.step
+        for u, z in zip(start.problem.unknowns, start.z, strict=True)
+    }
+    names = [problem.free[u.free].effect.name for u in problem.unknowns]
+    return np.array(
+        [
+            (old.get((name, u.key, u.session), u.mean) - u.mean) / u.step
+            for name, u in zip(names, problem.unknowns, strict=True)
+        ]
+    )
 
 
 def _robust_variance(white: Array) -> float:

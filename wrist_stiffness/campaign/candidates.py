@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.recipes import Column, Recipe, Shape, effect_at, recipe
+from wrist_stiffness.campaign.recipes import Recipe, Shape, Values, effect_at, recipe
+from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.registry import catalogue
@@ -20,6 +21,11 @@ SET_UP = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias")
 """Refitted in every session before any search; there is nothing to find."""
 
 Progress = Callable[[int, int], None]
+Trial = tuple[Law, str, Values]
+
+
+def silent(done: int, total: int) -> None:
+    """Show no progress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +42,25 @@ class WristCandidate:
         How it became columns.
     known : dict of shape to (u, 6, k) arrays
         Columns on the grid [m, rad].
+    exact : callable, optional
+        shape -> columns, where they are known between the points of the grid.
     """
 
     law: Law
     place: str
     recipe: Recipe
     known: Mapping[Shape, Array]
+    exact: Callable[[Shape], Array] | None = None
 
     @property
     def name(self) -> str:
         """`law@place`."""
         return f"{self.law.id}@{self.place}"
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """Every point of the grid."""
+        return _points(self.recipe)
 
     def effect(self, found: Mapping[str, float], shape: Shape) -> Effect:
         """Return the effect with which a fit may begin.
@@ -60,11 +74,18 @@ class WristCandidate:
         """
         return effect_at(self.law, self.place, self.recipe.start(found, shape))
 
+    def effect_of(self, values: Mapping[str, float]) -> Effect:
+        """Return the effect with these values, each brought within its bounds."""
+        return effect_at(self.law, self.place, values)
+
     def columns(self, units: Observations, shape: Shape) -> Array:
         """Return the columns at a shape, linear between the points of the grid, (u, 6, k)."""
-        return self._between(shape)[units.rows]
+        return self.at(shape)[units.rows]
 
-    def _between(self, shape: Shape) -> Array:
+    def at(self, shape: Shape) -> Array:
+        """Return the columns of all units at a shape, (u, 6, k)."""
+        if self.exact:
+            return self.exact(shape)
         if shape in self.known:
             return self.known[shape]
         corners, weights = [], []
@@ -103,80 +124,132 @@ def compensable(law: Law, place: str) -> str:
     return "needs_signal" if law.signals else "yes"
 
 
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where columns are taken: the base of each session on its units.
+
+    Parameters
+    ----------
+    models : tuple of SessionModel
+        With the effects of the base.
+    used : tuple of (u,) bool
+        Units of each session that are in the table.
+    """
+
+    models: tuple[SessionModel, ...]
+    used: tuple[Mask, ...]
+
+    @property
+    def signals(self) -> frozenset[str]:
+        """Components with a thermometer in every session."""
+        names = [set(each.session.block.temperatures) for each in self.models]
+        return frozenset(set.intersection(*names))
+
+    def changes(self, trials: Sequence[Trial], progress: Progress = silent) -> Array:
+        """Return the change of the predictions by each trial, (t, u, 6) [m, rad].
+
+        Parameters
+        ----------
+        trials : sequence of (Law, str, dict)
+            A law at a place with values of its parameters; an effect that the base has already
+            gets these values on top of its own.
+        progress : callable, optional
+            Told (done, total).
+        """
+        blocks = []
+        for number, (model, rows) in enumerate(zip(self.models, self.used, strict=True)):
+            sets = [_with(model.effects, *trial) for trial in trials]
+            found = np.stack(model.changes(sets)) if sets else np.empty((0, len(rows), 6))
+            blocks.append(np.nan_to_num(found[:, rows]))
+            progress(number + 1, len(self.models))
+        return np.concatenate(blocks, axis=1)
+
+    def mean(self, signal: Callable[[SessionModel], Array]) -> Array:
+        """Return a signal of each unit of the table, (u, ...)."""
+        return np.concatenate(
+            [signal(m)[rows] for m, rows in zip(self.models, self.used, strict=True)]
+        )
+
+
 def wrist_candidates(
-    models: tuple[SessionModel, ...],
-    used: tuple[np.ndarray, ...],
-    present: Mapping[str, Effect],
-    progress: Progress,
+    point: Point,
+    absent: Collection[str],
+    near: Mapping[str, Mapping[str, float]],
+    progress: Progress = silent,
 ) -> tuple[WristCandidate, ...]:
     """Evaluate the whole catalogue about a point.
 
     Parameters
     ----------
-    models : tuple of SessionModel
-        The base of each session on its units.
-    used : tuple of (u,) bool
-        Units of each session that are in the table.
-    present : dict of str to Effect
-        Effects of the model itself that are no part of the refitted base, by name: a second one of
-        the same name cannot be added.
+    point : Point
+        The base.
+    absent : collection of str
+        Effects that cannot be candidates: the model has them, and they are no part of the base.
+    near : dict of str to dict
+        Values of some effects, by name, about which their columns are wanted.
     progress : callable
         Told (done, total).
     """
-    signals = frozenset(
-        name
-        for name in models[0].session.block.temperatures
-        if all(name in each.session.block.temperatures for each in models)
-    )
     plans = [
-        (law, place, recipe(law, place, signals))
+        (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
         for law in catalogue().values()
         if law.id not in SET_UP
         for place in law.places
-        if f"{law.id}@{place}" not in present
+        if f"{law.id}@{place}" not in absent
     ]
+    trials: dict[tuple[object, ...], int] = {}
+    listed: list[Trial] = []
+
+    def index(law: Law, place: str, values: Values) -> int:
+        key = (law.id, place, *sorted(values.items()))
+        if key not in trials:
+            trials[key] = len(listed)
+            listed.append((law, place, values))
+        return trials[key]
+
+    for law, place, own in plans:
+        for column in (c for shape in _points(own) for c in own.columns(shape)):
+            if law.id != WAVE:
+                index(law, place, column.trial)
+                if column.origin:
+                    index(law, place, column.origin)
+    changes = point.changes(listed, progress)
     found = []
-    for number, (law, place, own) in enumerate(plans):
-        known = _on_grid(models, used, law, place, own)
-        if known is not None:
-            found.append(WristCandidate(law, place, own, known))
-        progress(number + 1, len(plans))
+    for law, place, own in plans:
+        if law.id == WAVE:
+            found.append(WristCandidate(law, place, own, {}, _wave(point, place)))
+            continue
+        known = {}
+        for shape in _points(own):
+            stack = []
+            for column in own.columns(shape):
+                change = changes[index(law, place, column.trial)]
+                if column.origin:
+                    change = change - changes[index(law, place, column.origin)]
+                stack.append(change / column.size)
+            known[shape] = np.stack(stack, axis=-1)
+        found.append(WristCandidate(law, place, own, known))
     return tuple(found)
 
 
-def _on_grid(
-    models: tuple[SessionModel, ...],
-    used: tuple[np.ndarray, ...],
-    law: Law,
-    place: str,
-    own: Recipe,
-) -> dict[Shape, Array] | None:
-    """Return the columns at every point of the grid, None where a signal is missing."""
-    shapes = list(product(*(parameter.grid for parameter in own.shape)))
-    columns = [own.columns(shape) for shape in shapes]
-    blocks = []
-    for model, rows in zip(models, used, strict=True):
-        wanted = [effects for each in columns for c in each for effects in _ends(model, law, place, c)]
-        changes = iter(model.changes(wanted))
-        block = [
-            np.stack([(next(changes) - next(changes)) / c.size for c in each], axis=-1)
-            for each in columns
-        ]
-        blocks.append([np.nan_to_num(each[rows]) for each in block])
-    return {
-        shape: np.concatenate([block[number] for block in blocks])
-        for number, shape in enumerate(shapes)
-    }
+WAVE = "transmission_error"
+"""Its columns are those of a turned motor times a wave: exact at every order."""
 
 
-def _ends(
-    model: SessionModel, law: Law, place: str, column: Column
-) -> tuple[Effects, Effects]:
-    """Return the effects at the trial and at the origin of a column."""
-    return (
-        _with(model.effects, law, place, column.trial),
-        _with(model.effects, law, place, column.origin) if column.origin else model.effects,
-    )
+def _wave(point: Point, place: str) -> Callable[[Shape], Array]:
+    turn = point.changes([(catalogue()["encoder_offset"], place, {"offset_mdeg": 1.0})])[0]
+    angle = point.mean(lambda model: model.still.theta[:, MOTORS.index(place)])
+
+    def columns(shape: Shape) -> Array:
+        phase = shape[0] * angle
+        wave = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+        return turn[:, :, None] * wave[:, None, :]
+
+    return columns
+
+
+def _points(own: Recipe) -> list[Shape]:
+    return list(product(*(parameter.grid for parameter in own.shape)))
 
 
 def _with(effects: Effects, law: Law, place: str, values: Mapping[str, float]) -> Effects:

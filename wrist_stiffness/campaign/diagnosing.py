@@ -1,23 +1,36 @@
-"""Which physical effect is missing in a model of this wrist?"""
+"""Which physical effect is missing in a model of this wrist?
+
+The statistics are linear, the wrist is not: so the point about which its effects become columns is
+sought first, by fits of the leading candidates with their own laws, the base along with them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.campaign.base_fit import BaseFit, fit_base
-from wrist_stiffness.campaign.candidates import WristCandidate, wrist_candidates
+from wrist_stiffness.campaign.base_fit import BaseFit, fit_base, free_base
+from wrist_stiffness.campaign.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import Observed, as_units
+from wrist_stiffness.campaign.observing import Observed, UnitSession, as_units
+from wrist_stiffness.campaign.screening import MOST_FITTED, Fitted, Screen
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
 Progress = Callable[[int, int], None]
+
+MOST_EXTRAS = 3
+"""Effects with which the point is sought."""
+
+LEADING = 0.3
+"""Candidates that explain this share of what the best explains are fitted too."""
+
+WORTH = 30.0
+"""Fall of the sum of squares, in units of the noise, that is worth moving the point for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +45,14 @@ class WristDiagnosis:
         Table of what the refitted base leaves.
     effects : tuple of Effect
         Best member of each finding, with the values found: where a fit may begin.
+    base : BaseFit
+        The refitted base.
     """
 
     diagnosis: Diagnosis
     observed: Observed
     effects: tuple[Effect, ...]
+    base: BaseFit
 
 
 def silent(done: int, total: int) -> None:
@@ -68,60 +84,100 @@ def diagnose_sessions(
     """
     if not sessions:
         raise InputError("no session to diagnose")
-    base = fit_base(model, tuple(as_units(model, session) for session in sessions))
-    models = tuple(base.models(number) for number in range(len(sessions)))
-    free = {each.effect.name for each in base.problem.free}
-    present = {e.name: e for e in model.effects if e.name not in free}
-    candidates = wrist_candidates(models, _used(base), present, progress)
+    units = tuple(as_units(model, session) for session in sessions)
+    base, near = seek_point(model, units, progress)
+    candidates = wrist_candidates(
+        _point(base, with_extras=False), _absent(model, base), near, progress
+    )
+    observed = base.without_extras()
     result = diagnose(
-        _table(base),
+        _table(base, observed),
         tuple(each.candidate() for each in candidates),
         _nuisances(base),
         rng,
         settings,
     )
     known = {each.name: each for each in candidates}
-    effects = tuple(_started(known[finding.name], finding.parameters) for finding in result.findings)
-    return WristDiagnosis(result, base.observed, effects)
+    effects = tuple(_started(known[each.name], each.parameters) for each in result.findings)
+    return WristDiagnosis(result, observed, effects, base)
 
 
-def _started(
-    candidate: WristCandidate, parameters: dict[str, tuple[float, float]]
-) -> Effect:
-    shape = [parameters[each.name][0] for each in candidate.recipe.shape]
-    found = {name: value for name, (value, _) in parameters.items()}
-    return candidate.effect(found, tuple(shape))
+def seek_point(
+    model: ErrorModel, units: tuple[UnitSession, ...], progress: Progress
+) -> tuple[BaseFit, dict[str, Mapping[str, float]]]:
+    """Return the base fitted along with whatever effects make a difference, and their values."""
+    base = fit_base(model, units)
+    near: dict[str, Mapping[str, float]] = {}
+    extras: tuple[Effect, ...] = ()
+    while len(extras) < MOST_EXTRAS:
+        point = _point(base)
+        taken = {*_absent(model, base), *(each.name for each in extras)}
+        screen = Screen(base, point)
+        leaders = screen.leaders(wrist_candidates(point, taken, {}, progress))
+        chosen = [each for each in leaders if each[0] > max(WORTH, LEADING * leaders[0][0])]
+        fits = [screen.fitted(candidate, shape) for _, candidate, shape in chosen[:MOST_FITTED]]
+        if not fits:
+            break
+        best = max(fits, key=lambda each: each.gain)
+        trial = fit_base(model, units, (*extras, _effect(best)), base)
+        if base.cost - trial.cost < WORTH:
+            break
+        base, extras = trial, _fitted_extras(trial)
+    usual = {each.effect.name for each in free_base(model)[0]}
+    for each in extras:
+        if each.name not in usual:
+            near[each.name] = {key: own.value for key, own in each.estimates.items()}
+    return base, near
 
 
-def _used(base: BaseFit) -> tuple[Array, ...]:
-    return tuple(
-        np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1)
-        for each in base.problem.sessions
+def _effect(fitted: Fitted) -> Effect:
+    return fitted.candidate.effect_of(fitted.values)
+
+
+def _fitted_extras(base: BaseFit) -> tuple[Effect, ...]:
+    return tuple(each for each in base.effects(0) if each.name in base.extras)
+
+
+def _point(base: BaseFit, with_extras: bool = True) -> Point:
+    sessions = base.problem.sessions
+    used = tuple(
+        np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1) for each in sessions
     )
+    return Point(tuple(base.model(n, with_extras) for n in range(len(sessions))), used)
 
 
-def _of_wrist(base: BaseFit) -> Array:
-    return np.array([unknown.session is None for unknown in base.problem.unknowns])
+def _absent(model: ErrorModel, base: BaseFit) -> set[str]:
+    """Return effects that the model holds fast: a second one of the name cannot be added."""
+    return {effect.name for effect in base.problem.model.effects}
 
 
-def _table(base: BaseFit) -> Observations:
+def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
+    shape = tuple(parameters[each.name][0] for each in candidate.recipe.shape)
+    return candidate.effect({name: value for name, (value, _) in parameters.items()}, shape)
+
+
+def _table(base: BaseFit, observed: Observed) -> Observations:
     """Return what is left with the wrist's tolerances at their prior means again, to first order.
 
     So the priors of the statistics, which lie about zero, are the priors of the wrist.
     """
-    observations = base.observed.observations
-    own = _of_wrist(base)
-    return observations.with_values(observations.values - base.columns[:, :, own] @ base.z[own])
+    own = np.isfinite(base.prior_std) & _of_wrist(base) & base.of_base
+    values = observed.observations.values - base.columns[:, :, own] @ base.z[own]
+    return observed.observations.with_values(values)
+
+
+def _of_wrist(base: BaseFit) -> np.ndarray:
+    return np.array([unknown.session is None for unknown in base.problem.unknowns])
 
 
 def _nuisances(base: BaseFit) -> tuple[Nuisance, ...]:
     """Return the refitted base as columns; registrations, zeros and tare are free anew."""
-    unknowns = base.problem.unknowns
     groups: dict[tuple[str, bool], dict[str, list[int]]] = {}
-    for place, unknown in enumerate(unknowns):
-        name = base.problem.free[unknown.free].effect.name
-        group = groups.setdefault((name, unknown.session is not None), {})
-        group.setdefault(unknown.key, []).append(place)
+    for place, unknown in enumerate(base.problem.unknowns):
+        if base.of_base[place]:
+            name = base.problem.free[unknown.free].effect.name
+            group = groups.setdefault((name, unknown.session is not None), {})
+            group.setdefault(unknown.key, []).append(place)
     return tuple(
         _nuisance(base, name, per_session, list(keys.values()))
         for (name, per_session), keys in groups.items()
@@ -129,7 +185,7 @@ def _nuisances(base: BaseFit) -> tuple[Nuisance, ...]:
 
 
 def _nuisance(base: BaseFit, name: str, per_session: bool, places: list[list[int]]) -> Nuisance:
-    # Columns of the residual fall where a prediction rises.  Each session has its own rows.
+    # What is left falls where a prediction rises.  Each session has its own rows.
     columns = -np.stack([base.columns[:, :, each].sum(axis=2) for each in places], axis=-1)
-    prior = None if per_session else (1.0,) * columns.shape[2]
+    prior = None if per_session else tuple(base.prior_std[[each[0] for each in places]].tolist())
     return Nuisance(name, lambda units: columns[units.rows], prior, per_session)

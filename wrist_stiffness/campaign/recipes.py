@@ -19,6 +19,8 @@ from wrist_stiffness.model.parameters import Estimate, Parameter
 Shape = tuple[float, ...]
 Values = dict[str, float]
 
+Maker = Callable[[Law, str, frozenset[str], Mapping[str, float]], "Recipe"]
+
 SMALL = 0.1
 """Share of a parameter's prior scale at which a column is the tangent."""
 
@@ -64,11 +66,14 @@ class Recipe:
         shape -> its columns.
     start : callable
         (factors, shape) -> values of the law's parameters with which a fit may begin.
+    idle : tuple of str
+        Parameters that do nothing here.
     """
 
     shape: tuple[ShapeParameter, ...]
     columns: Callable[[Shape], tuple[Column, ...]]
     start: Callable[[Mapping[str, float], Shape], Values]
+    idle: tuple[str, ...] = ()
 
 
 def factor(parameter: Parameter) -> Factor:
@@ -76,7 +81,9 @@ def factor(parameter: Parameter) -> Factor:
     return Factor(parameter.key, parameter.lower, parameter.upper, parameter.scale)
 
 
-def recipe(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+def recipe(
+    law: Law, place: str, signals: frozenset[str], near: Mapping[str, float] | None = None
+) -> Recipe:
     """Return how a law becomes columns.
 
     Parameters
@@ -87,17 +94,18 @@ def recipe(law: Law, place: str, signals: frozenset[str]) -> Recipe:
         Component.
     signals : frozenset of str
         Components with a thermometer.
+    near : dict of str to float, optional
+        Values of the law's parameters about which the columns are wanted.
     """
-    own = SPECIAL.get(law.id)
-    return own(law, place, signals) if own else plain(law, place, signals)
+    return SPECIAL.get(law.id, plain)(law, place, signals, near or {})
 
 
-def plain(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+def plain(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
     """Differences in the linear parameters, grids in those of `GRIDS`, the tangent in the rest."""
     parameters = law.parameters(place)
     gridded = [p for p in parameters if p.key in GRIDS and not _idle(p.key, place, signals)]
     other = [p for p in parameters if p.key not in GRIDS]
-    shape = tuple(ShapeParameter(p.key, _grid(p.key, signals)) for p in gridded)
+    shape = tuple(ShapeParameter(p.key, _inserted(GRIDS[p.key], near.get(p.key))) for p in gridded)
     fixed = {p.key: 0.0 for p in parameters if p.key in GRIDS and p not in gridded}
 
     def still(at: Shape) -> Values:
@@ -108,14 +116,16 @@ def plain(law: Law, place: str, signals: frozenset[str]) -> Recipe:
         }
 
     def columns(at: Shape) -> tuple[Column, ...]:
-        return tuple(
-            Column(factor(p), still(at) | {p.key: SMALL * p.scale}, SMALL * p.scale) for p in other
-        )
+        return tuple(Column(factor(p), still(at) | {p.key: size(p)}, size(p)) for p in other)
+
+    def size(parameter: Parameter) -> float:
+        value = near.get(parameter.key, 0.0)
+        return value if abs(value) > SMALL * parameter.scale else SMALL * parameter.scale
 
     def start(found: Mapping[str, float], at: Shape) -> Values:
         return still(at) | {p.key: found[p.key] for p in other}
 
-    return Recipe(tuple(s for s in shape if len(s.grid) > 1), columns, start)
+    return Recipe(shape, columns, start, tuple(fixed))
 
 
 def _idle(key: str, place: str, signals: frozenset[str]) -> bool:
@@ -123,30 +133,30 @@ def _idle(key: str, place: str, signals: frozenset[str]) -> bool:
     return key in ("lag_s", "motor_share_percent") and place in signals
 
 
-def _grid(key: str, signals: frozenset[str]) -> tuple[float, ...]:
-    return GRIDS[key]
+def _inserted(grid: tuple[float, ...], value: float | None) -> tuple[float, ...]:
+    """Return a grid with one more value in it."""
+    return grid if value is None else tuple(sorted({*grid, value}))
 
 
-def at_width(key: str, width: float) -> Callable[[Law, str, frozenset[str]], Recipe]:
+def at_width(key: str, width: float) -> Maker:
     """Return the recipe of a law with one parameter that is nearly linear, at a usual size."""
 
-    def make(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+    def make(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
         (parameter,) = law.parameters(place)
-        column = Column(factor(parameter), {key: width}, width)
+        size = near.get(key, 0.0) or width
+        column = Column(factor(parameter), {key: size}, size)
         return Recipe((), lambda at: (column,), lambda found, at: {key: found[key]})
 
     return make
 
 
-def shares(
-    key: str, grids: Mapping[str, tuple[float, ...]], fixed: Mapping[str, float]
-) -> Callable[[Law, str, frozenset[str]], Recipe]:
+def shares(key: str, grids: Mapping[str, tuple[float, ...]], fixed: Mapping[str, float]) -> Maker:
     """Return the recipe of a law that is linear in nothing: shapes of `grids`, times a share.
 
     The share counts in units of `key`, so that it reads as that parameter.
     """
 
-    def make(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+    def make(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
         own = {p.key: p for p in law.parameters(place)}
         names = tuple(grids)
 
@@ -158,7 +168,10 @@ def shares(
             values = {**fixed, **dict(zip(names, at, strict=True))}
             return values | {key: found[key]}
 
-        shape = tuple(ShapeParameter(f"at_{name}", grid) for name, grid in grids.items())
+        shape = tuple(
+            ShapeParameter(f"at_{name}", _inserted(grid, near.get(name)))
+            for name, grid in grids.items()
+        )
         return Recipe(shape, columns, start)
 
     return make
@@ -167,7 +180,7 @@ def shares(
 MASS_G, ARM_MM = 10.0, 10.0
 
 
-def weight(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+def weight(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
     """A mass and its first moment, and the tilt of the base."""
     own = {p.key: p for p in law.parameters(place)}
     zero = dict.fromkeys(own, 0.0)
@@ -175,9 +188,7 @@ def weight(law: Law, place: str, signals: frozenset[str]) -> Recipe:
     columns = [Column(factor(own["mass_g"]), heavy, MASS_G)]
     for axis in "xyz":
         moment = Factor(f"moment_{axis}_gmm", plausible=30.0 * 20.0)
-        columns.append(
-            Column(moment, heavy | {f"{axis}_mm": ARM_MM}, MASS_G * ARM_MM, heavy)
-        )
+        columns.append(Column(moment, heavy | {f"{axis}_mm": ARM_MM}, MASS_G * ARM_MM, heavy))
     for key in own.keys() - {"mass_g", "x_mm", "y_mm", "z_mm"}:
         columns.append(Column(factor(own[key]), zero | {key: 100.0}, 100.0))
 
@@ -196,7 +207,7 @@ def weight(law: Law, place: str, signals: frozenset[str]) -> Recipe:
 PLATE_MM = -12.0
 
 
-def moving_mass(law: Law, place: str, signals: frozenset[str]) -> Recipe:
+def moving_mass(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
     """A moving mass at the plate, the change of its place, and a round inertia."""
     own = {p.key: p for p in law.parameters(place)}
     at_plate = {"mass_g": 50.0, "x_mm": 0.0, "y_mm": 0.0, "z_mm": PLATE_MM, "inertia_gmm2": 0.0}
@@ -234,7 +245,7 @@ def _clipped(parameter: Parameter, value: float) -> float:
 
 GAPS_UM = (-60.0, -20.0, -7.0, -2.0, -0.5, 0.5, 2.0, 7.0, 20.0, 60.0)
 
-SPECIAL: dict[str, Callable[[Law, str, frozenset[str]], Recipe]] = {
+SPECIAL: dict[str, Maker] = {
     "gravity": weight,
     "inertia": moving_mass,
     "backlash": at_width("width_mdeg", 20.0),
