@@ -61,8 +61,9 @@ def solve_contacts(
         A [m/N].
     gap : (n, m) float
         Openings without contact forces [m].
-    guess : (m,) bool or Held or None
-        Sectors in contact of a sample before, or all that is known of a problem with the same A.
+    guess : (m,) or (n, m) bool or Held or None
+        Sectors in contact of a sample before or of each sample, or all that is known of a problem
+        with the same A.
 
     Returns
     -------
@@ -81,7 +82,9 @@ def solve_contacts(
     if isinstance(guess, Held):
         force, closed[:] = -(guess.stiffness @ gap[..., None])[..., 0], guess.active
     else:
-        if n > STRIDE * FEW:
+        if guess is not None and guess.ndim == 2:
+            closed[:] = guess
+        elif n > STRIDE * FEW:
             coarse = solve_contacts(approach[::STRIDE], gap[::STRIDE], guess)[1]
             closed[:] = np.repeat(coarse, STRIDE, axis=0)[:n]
         elif guess is not None:

@@ -80,20 +80,21 @@ class Play:
 
     def _newton(self, x: Array, wall: float, tolerance: float) -> Array:
         x, rows, left = x.copy(), np.arange(len(x)), self
+        active = None
         for _ in range(MAX_STEPS):
-            energy, gradient, active = left._state(x[rows], wall)
+            energy, gradient, active = left._state(x[rows], wall, active)
             bound = tolerance * (1.0 + np.abs(left.force).max(axis=1))
             moving = np.abs(gradient).max(axis=1) > bound
             if not moving.any():
                 break
             rows, left = rows[moving], left.take(moving)
-            energy, gradient = energy[moving], gradient[moving]
-            hessian = left._hessian(x[rows], wall, active[moving])
+            energy, gradient, active = energy[moving], gradient[moving], active[moving]
+            hessian = left._hessian(x[rows], wall, active)
             step = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
             slope = np.einsum("ni,ni->n", gradient, step)
             size = np.ones(len(rows))
             for _ in range(MAX_HALVINGS):
-                tried = left._state(x[rows] + size[:, None] * step, wall)[0]
+                tried = left._state(x[rows] + size[:, None] * step, wall, active)[0]
                 # Rounding of the energy is no reason to stay.
                 short = tried > energy + ARMIJO * size * slope + 1e-14 * np.abs(energy)
                 if not short.any():
@@ -121,10 +122,12 @@ class Play:
         direction = np.divide(ends, size, out=np.zeros_like(ends), where=size > 0.0)
         return (moved * direction).reshape(-1, 4)
 
-    def _state(self, x: Array, stiffness: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def _state(
+        self, x: Array, stiffness: float, guess: NDArray[np.bool_] | None
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return energy (n,), its gradient (n, 4) and the touching sectors at displacements x."""
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
-        flange, active = solve_contacts(self.approach, gap, None)
+        flange, active = solve_contacts(self.approach, gap, guess)
         size, into, direction = self._at_walls(x)
         wall = self._centring * x.reshape(-1, 2, 2) + stiffness * into[..., None] * direction
         pressed = 0.5 * (self._centring * size**2 + stiffness * into**2).sum(axis=1)
