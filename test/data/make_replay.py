@@ -6,7 +6,7 @@
 Before that, look at what changed; MODEL and NAME are `config/palmieri2015_model.yaml` and `plain`,
 or `test/data/replay/effects.yaml` and `effects`:
 
-    wrist-stiffness replay test/data/replay/recording.mcap --model MODEL -o /tmp/out.mcap \\
+    wrist-stiffness replay test/data/replay/recording.mcap --model MODEL -o out.mcap \\
         --parameters test/data/replay/parameters.yaml --against test/data/replay/NAME.mcap
 """
 
