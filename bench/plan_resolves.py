@@ -337,7 +337,8 @@ def report(pairs: np.ndarray, skipped: int) -> None:
     for name, column in (("planned", 0), ("random", 1)):
         never = int(np.sum(~np.isfinite(pairs[:, column])))
         print(
-            f"{name:8s} median {np.median(capped[:, column]):4.0f} measurements, never resolved {never}"
+            f"{name:8s} median {np.median(capped[:, column]):4.0f} measurements, "
+            f"never resolved {never}"
         )
     print(
         f"planned / random, median over cases {ratio:.2f} (95 % {low:.2f} to {high:.2f}); "

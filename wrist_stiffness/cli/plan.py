@@ -91,7 +91,10 @@ def _run(arguments: argparse.Namespace) -> int:
         write_plan,
     )
 
-    if Path(arguments.output).exists():
+    output = Path(arguments.output)
+    if not output.resolve().parent.is_dir():
+        raise InputError(f"{output} cannot be written: its folder does not exist")
+    if output.exists():
         raise InputError(f"{arguments.output} exists already and is not overwritten")
     options = Options(
         arguments.minutes,

@@ -1,0 +1,235 @@
+"""Gram matrices and discriminations against dense least squares; signatures against the model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from wrist_stiffness.campaign.design_information import (
+    CHARGE,
+    FREE,
+    MOTION_NOISE,
+    Goal,
+    MeasurementNoise,
+    calibrated,
+    discrimination,
+    improvement,
+    information,
+)
+from wrist_stiffness.campaign.design_question import (
+    SESSION,
+    between,
+    commissioning,
+    effect_named,
+)
+from wrist_stiffness.campaign.design_signatures import plausible, signatures
+from wrist_stiffness.campaign.design_timeline import Pace, Visit, run_through
+from wrist_stiffness.campaign.loads_file import NO_LOAD, AppliedLoad
+from wrist_stiffness.campaign.planning import equal_sizes
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+
+LOAD = AppliedLoad(
+    "push", np.array([0.3, 0.2, -1.0]), np.array([0.004, 0.0, 0.002]), np.zeros(3), True, True, 1.0
+)
+NUISANCES = ("measurement_frame@pose_sensor", "load_bias@load_sensor")
+EFFECTS = {
+    "backlash@motor_1": {"width_mdeg": 20.0},
+    "drive_compliance@motor_1": {"compliance_mdeg_per_Nm": 500.0},
+    "mount_compliance@motor_1": {},
+}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+@pytest.fixture(scope="module")
+def timeline(model):
+    rng = np.random.default_rng(1)
+    visits = [
+        Visit(
+            np.radians(rng.uniform(-30.0, 30.0, 2)),
+            rng.choice([-1.0, 1.0], 2),
+            NO_LOAD if number % 3 == 0 else LOAD,
+            number % 2 == 0,
+            hold_s=60.0 if number == 4 else 2.0,
+        )
+        for number in range(9)
+    ]
+    pace = Pace(np.radians(30.0), 2.0, True)
+    return run_through(visits, model.table.workspace, pace, np.zeros(2))
+
+
+@pytest.fixture(scope="module")
+def evaluated(model, timeline):
+    rng = np.random.default_rng(0)
+    nuisances = [(effect_named(name),) for name in NUISANCES]
+    effects = []
+    for name, values in EFFECTS.items():
+        effect = effect_named(name).with_values(values)
+        effects.append((effect,) if values else (plausible(effect, rng), plausible(effect, rng)))
+    found = signatures(model, timeline.block, [*nuisances, *effects])
+    return found[: len(nuisances)], found[len(nuisances) :]
+
+
+NOISE = MeasurementNoise(np.array([1.0, 2.0, 1.5, 20.0, 15.0, 30.0]) * 1e-6, 2.6e-4)
+
+
+@pytest.fixture(scope="module")
+def known(model, timeline, evaluated):
+    return information(timeline, *(evaluated[0], SESSION, evaluated[1]), model.table, NOISE)
+
+
+def dense(model, timeline, nuisances, truth, rival):
+    """Return d by stacking everything and solving with the whole covariance at once."""
+    table, rows = model.table, timeline.rows
+    blocks = []
+    for visit in range(timeline.visit.max() + 1):
+        own = np.flatnonzero(timeline.visit == visit)
+        size = 6 * len(own)
+        block = np.zeros((size, size))
+        for i, a in enumerate(own):
+            for j, b in enumerate(own):
+                at = [timeline.block.theta[rows[k]] for k in (a, b)]
+                jacobians = [table.mechanism.jacobian(table.mechanism.forward(t)) for t in at]
+                shared = a == b or not (timeline.moving[a] or timeline.moving[b])
+                part = np.zeros((6, 6))
+                part[3:, 3:] = shared * NOISE.encoder_step**2 / 12 * jacobians[0] @ jacobians[1].T
+                if a == b:
+                    scale = MOTION_NOISE if timeline.moving[a] else 1.0
+                    part += np.diag((scale * NOISE.white) ** 2)
+                block[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] = part
+        blocks.append(block)
+    order = np.concatenate(
+        [np.flatnonzero(timeline.visit == visit) for visit in range(timeline.visit.max() + 1)]
+    )
+    root = np.linalg.cholesky(np.linalg.inv(block_diag(*blocks))).T
+
+    def stacked(values):
+        return root @ values[rows[order]].reshape(6 * len(order), -1)
+
+    y = stacked(truth)
+    columns = [stacked(each.columns) for each in nuisances]
+    ridge = [
+        np.full(c.shape[1], 1 / FREE if "frame" in n.name else 1.0)
+        for c, n in zip(columns, nuisances, strict=True)
+    ]
+    if rival is not None:
+        columns.append(stacked(rival.columns))
+        ridge.append(np.full(columns[-1].shape[1], 1 / FREE))
+    design = np.hstack(columns)
+    augmented = np.vstack([design, np.diag(np.concatenate(ridge))])
+    target = np.vstack([y, np.zeros((design.shape[1], y.shape[1]))])
+    left = target - augmented @ np.linalg.lstsq(augmented, target, rcond=None)[0]
+    return np.sum(left**2, axis=0)
+
+
+@pytest.mark.parametrize(("truth", "rival"), [(0, None), (1, 2), (2, 1), (2, 0), (0, 1)])
+def test_discrimination_is_the_distance_of_dense_least_squares(
+    model, timeline, evaluated, known, truth, rival
+):
+    nuisances, effects = evaluated
+    apart = dense(
+        model, timeline, nuisances, effects[truth].truths, None if rival is None else effects[rival]
+    )
+    goal = Goal(effects[truth].name, "" if rival is None else effects[rival].name)
+    if rival is not None:
+        own = dense(model, timeline, nuisances, effects[truth].truths, None)
+        charge = CHARGE * (effects[rival].columns.shape[2] - effects[truth].columns.shape[2])
+        apart = np.clip(apart + charge, 0.0, own)
+    found = discrimination(known.total, known.layout, [goal])[0]
+    assert found == pytest.approx(np.sqrt(apart.mean()), rel=1e-5, abs=1e-4)
+
+
+def test_visits_add_up_and_scales_move_truths_alone(known, evaluated):
+    assert np.allclose(known.total, known.grams.sum(axis=0))
+    goals = [Goal("backlash@motor_1", ""), Goal("drive_compliance@motor_1", "")]
+    before = discrimination(known.total, known.layout, goals)
+    scaled = known.scaled({"backlash@motor_1": 3.0})
+    after = discrimination(scaled.total, known.layout, goals)
+    assert np.allclose(after, before * [3.0, 1.0])
+    factors = equal_sizes(known, [[goal.truth for goal in goals]])
+    equal = discrimination(known.scaled(factors).total, known.layout, goals)
+    assert equal == pytest.approx([before[0], before[0]])
+
+
+def test_more_measurements_never_harm(known):
+    goals = [Goal(a, b) for a in EFFECTS for b in ("", *EFFECTS) if a != b]
+    part, whole = known.grams[:5].sum(axis=0), known.total
+    assert np.all(
+        discrimination(whole, known.layout, goals)
+        >= discrimination(part, known.layout, goals) - 1e-9
+    )
+    assert calibrated(whole, known.layout) > calibrated(part, known.layout) > 0.0
+    gains = [improvement(gram, known.layout) for gram in (part, whole)]
+    assert all(gains[1][name] >= gains[0][name] >= 1.0 for name in NUISANCES)
+
+
+def test_columns_of_a_linear_law_make_up_its_truth(model, timeline):
+    """At values of which the tangent knows nothing, evaluated by the model itself."""
+    values = {"x_um_per_N": 2.0, "turn_y_mdeg_per_Nm": 150.0}
+    effect = effect_named("platform_compliance@platform").with_values(values)
+    (found,) = signatures(model, timeline.block, [(effect,)])
+    direct = (
+        model.with_effects(effect).batch(timeline.block).measured
+        - model.batch(timeline.block).measured
+    )
+    assert np.allclose(found.truths[..., 0], direct, atol=1e-12)
+
+
+def test_columns_are_the_derivative_by_one_plausible_size(model, timeline):
+    effect = effect_named("load_scale@load_sensor").with_values({"scale_percent": 2.0})
+    (found,) = signatures(model, timeline.block, [(effect,)])
+    twists = [
+        model.with_effects(effect.with_values({"scale_percent": 2.0 + step}))
+        .batch(timeline.block)
+        .measured
+        for step in (-0.01, 0.01)
+    ]
+    slope = (twists[1] - twists[0]) / 0.02 * 3.0
+    assert np.allclose(found.columns[..., 0], slope, atol=0.01 * np.abs(slope).max())
+
+
+def test_an_effect_that_the_model_has_is_asked_at_other_values(model, timeline):
+    effect = effect_named("backlash@motor_1").with_values({"width_mdeg": 10.0})
+    larger = effect.with_values({"width_mdeg": 30.0})
+    (found,) = signatures(model.with_effects(effect), timeline.block, [(larger,)])
+    twists = [model.with_effects(e).batch(timeline.block).measured for e in (effect, larger)]
+    assert np.allclose(found.truths[..., 0], twists[1] - twists[0], atol=1e-12)
+
+
+def test_an_effect_without_its_signal_is_named_and_left_out(model, timeline):
+    effect = effect_named("thermal_softening@joint_2")
+    (found,) = signatures(model, timeline.block, [(plausible(effect, np.random.default_rng(0)),)])
+    assert found.lacks.startswith("temperature of")
+
+
+def test_a_path_out_of_range_is_refused(model, timeline):
+    far = replace(timeline.block, load=10.0 * timeline.block.load)
+    with pytest.raises(InputError, match="lie outside the table's domain or load range"):
+        signatures(model, far, [(effect_named("backlash@motor_1"),)])
+
+
+def test_questions_leave_rivals_out_of_the_nuisances():
+    rng = np.random.default_rng(0)
+    soft = effect_named("bushing_stiffness@joint_3")
+    other = effect_named("backlash@motor_2").with_values({"width_mdeg": 8.0})
+    asked = between([[soft, effect_named("joint_clearance@joint_3")], [other]], [], rng)
+    names = {effect.name for effect in asked.nuisances}
+    assert soft.name not in names
+    assert other.name in names
+    assert other.name in asked.free
+    whole = commissioning(rng)
+    assert not {e.name for e in whole.nuisances} & {sets[0].name for sets in whole.effects}
+
+
+def test_plausible_values_are_within_bounds_and_not_nothing():
+    for seed in range(30):
+        effect = plausible(effect_named("creep@joint_1"), np.random.default_rng(seed))
+        for parameter in effect.parameters:
+            value = effect.estimates[parameter.key].value
+            assert parameter.lower < value <= parameter.upper
