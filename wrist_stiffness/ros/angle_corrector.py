@@ -94,10 +94,8 @@ class AngleCorrector(WristNode):
     def make_inputs(self) -> list[Subscription]:
         """Listen to commands."""
         return [
-            self.create_subscription(JointState, "/motor_commands", self._on_command, COMMAND_QOS),
-            self.create_subscription(
-                JointTrajectory, "/motor_trajectory", self._on_trajectory, COMMAND_QOS
-            ),
+            self.hear(JointState, "/motor_commands", self._on_command, COMMAND_QOS),
+            self.hear(JointTrajectory, "/motor_trajectory", self._on_trajectory, COMMAND_QOS),
         ]
 
     def _on_command(self, message: JointState) -> None:

@@ -55,9 +55,14 @@ def pose_message(position: Array, quaternion: Array) -> Pose:
 def error_message(stamp_ns: int, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
     """Return a pose error in `wrist_base` from a twist (6,) and its covariance (6, 6)."""
     message = PoseWithCovarianceStamped()
-    message.header.stamp = time_message(stamp_ns)
-    message.header.frame_id = BASE_FRAME
-    message.pose.pose = pose_message(*pose_of_twist(twist))
+    header, pose = message.header, message.pose.pose
+    # Filled in place: new parts would be made, checked and copied for each sample.
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, NANOSECONDS)
+    header.frame_id = BASE_FRAME
+    place, turn = pose_of_twist(twist)
+    to, by = pose.position, pose.orientation
+    to.x, to.y, to.z = place.tolist()
+    by.x, by.y, by.z, by.w = turn.tolist()
     message.pose.covariance = covariance.ravel()
     return message
 

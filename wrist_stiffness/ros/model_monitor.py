@@ -85,15 +85,11 @@ class ModelMonitor(WristNode):
         if self.get_parameter("pose_type").value == POSE_TYPES[1]:
             pose = (PoseWithCovarianceStamped, self._on_pose_with_covariance)
         return [
-            self.create_subscription(JointState, "/joint_states", self._on_joints, SENSOR_QOS),
+            self.hear(JointState, "/joint_states", self._on_joints, SENSOR_QOS),
             # The frame before the platform: it is taken out of the pose of the same stamp.
-            self.create_subscription(
-                PoseStamped, "/frame_pose_measured", self._on_frame_pose, SENSOR_QOS
-            ),
-            self.create_subscription(pose[0], "/platform_pose_measured", pose[1], SENSOR_QOS),
-            self.create_subscription(
-                PoseArray, "/platform_markers_measured", self._on_markers, SENSOR_QOS
-            ),
+            self.hear(PoseStamped, "/frame_pose_measured", self._on_frame_pose, SENSOR_QOS),
+            self.hear(pose[0], "/platform_pose_measured", pose[1], SENSOR_QOS),
+            self.hear(PoseArray, "/platform_markers_measured", self._on_markers, SENSOR_QOS),
         ]
 
     def _on_joints(self, message: JointState) -> None:

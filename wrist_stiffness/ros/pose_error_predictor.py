@@ -83,9 +83,7 @@ class PoseErrorPredictor(WristNode):
 
     def make_inputs(self) -> list[Subscription]:
         """Listen to the motors."""
-        return [
-            self.create_subscription(JointState, "/joint_states", self._on_joint_state, SENSOR_QOS)
-        ]
+        return [self.hear(JointState, "/joint_states", self._on_joint_state, SENSOR_QOS)]
 
     def _on_joint_state(self, message: JointState) -> None:
         self.waiting.put(message)
@@ -107,9 +105,11 @@ class PoseErrorPredictor(WristNode):
             return
         error_out = error_message(stamp_ns, prediction.twist, prediction.covariance)
         self._error.publish(error_out)
-        shift = error_out.pose.pose.position
-        self._s_um.publish(Float64(data=hypot(shift.x, shift.y, shift.z) * MICROMETRES))
-        self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
+        if self._s_um.get_subscription_count():
+            shift = error_out.pose.pose.position
+            self._s_um.publish(Float64(data=hypot(shift.x, shift.y, shift.z) * MICROMETRES))
+        if self._phi_mdeg.get_subscription_count():
+            self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
         self.health.good()
         self._warnings = prediction.warnings
         self._draw(stamp_ns, prediction)
@@ -119,6 +119,8 @@ class PoseErrorPredictor(WristNode):
         # A stamp before the last one drawn says that the clock jumped back.
         since_s = (stamp_ns - self._drawn_ns) / NANOSECONDS
         if rate_hz == 0.0 or 0.0 <= since_s < 1.0 / rate_hz:
+            return
+        if not self._markers.get_subscription_count():
             return
         self._drawn_ns = stamp_ns
         exaggeration = self.get_parameter("marker_exaggeration").value

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from wrist_stiffness.errors import WristError
+from wrist_stiffness.ros.executor import StreamExecutor
 from wrist_stiffness.ros.parent import end_with_parent
 
 EXIT_BAD_INPUT = 2
@@ -33,9 +35,12 @@ def run(make_node: Callable[[], Node]) -> int:
     """
     end_with_parent()
     rclpy.init()
-    executor = SingleThreadedExecutor()
+    executor = StreamExecutor()
     try:
         executor.add_node(make_node())
+        # What a node starts with stays: the collector need not go through it again and again.
+        gc.collect()
+        gc.freeze()
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from threading import Thread
@@ -16,6 +16,8 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
@@ -32,6 +34,7 @@ from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.conversions import nanoseconds, three
+from wrist_stiffness.ros.executor import DataGroup
 from wrist_stiffness.ros.health import Health
 from wrist_stiffness.ros.parameters import declare, model_path, values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
@@ -81,6 +84,7 @@ class WristNode(LifecycleNode):
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
         self.create_service(Trigger, "~/tare", self._on_tare)
+        self._data_group = DataGroup()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", RELIABLE_QOS)
         # Not the node's clock: a simulated one may stand still.
         self.create_timer(
@@ -124,12 +128,10 @@ class WristNode(LifecycleNode):
         """Begin to listen; the load first, so that it is taken before a joint state that waits."""
         covariates = self.get_parameter("covariates").value.split()
         self._inputs = [
-            self.create_subscription(WrenchStamped, "/load_estimate", self._on_load, SENSOR_QOS),
-            self.create_subscription(
-                Temperature, "/temperatures", self._on_temperature, SENSOR_QOS
-            ),
+            self.hear(WrenchStamped, "/load_estimate", self._on_load, SENSOR_QOS),
+            self.hear(Temperature, "/temperatures", self._on_temperature, SENSOR_QOS),
             *(
-                self.create_subscription(
+                self.hear(
                     Float64, f"/covariates/{name}", partial(self._on_covariate, name), SENSOR_QOS
                 )
                 for name in covariates
@@ -144,9 +146,17 @@ class WristNode(LifecycleNode):
             self.destroy_subscription(subscription)
         return super().on_deactivate(state)
 
-    def make_inputs(self) -> list[Any]:
-        """Return the node's subscriptions beside the load's."""
+    def make_inputs(self) -> list[Subscription]:
+        """Return the node's subscriptions beside the load's, what is to be taken first first."""
         raise NotImplementedError
+
+    def hear(
+        self, message_type: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile
+    ) -> Subscription:
+        """Subscribe to a part of the node's stream."""
+        return self.create_subscription(
+            message_type, topic, callback, qos, callback_group=self._data_group
+        )
 
     # Inputs that all nodes have
 
