@@ -23,7 +23,7 @@ from wrist_stiffness.campaign.clocks import ClockOffset, clock_offset
 from wrist_stiffness.campaign.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.pose_track import PoseTrack, pose_track
-from wrist_stiffness.campaign.registration import median_misfit
+from wrist_stiffness.campaign.registration import agreement
 from wrist_stiffness.campaign.signals import Signal, Stamps
 from wrist_stiffness.campaign.spikes import spikes
 from wrist_stiffness.compensation.intake import Frames
@@ -71,7 +71,7 @@ LEAST_SPIKE_STEPS = 4.0
 """In encoder steps: in motion the measured rotation leaves the encoders' by counts."""
 
 OTHER_GEOMETRY = float(np.radians(5.0))
-"""Median angle between measured and rigid rotation that no registration and no effect explains."""
+"""Median angle between measured and rigid rotation that no effect explains."""
 
 
 def read_session(
@@ -154,7 +154,7 @@ def _session(
             f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
         )
         block, shift, rotation = block.take(reachable), shift[reachable], rotation[reachable]
-    rigid = table.mechanism.forward(block.theta).platform
+    rigid = rigid_rotation(table, block.theta)
     _require_same_wrist(rotation, rigid)
     lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
     if lost.any():
@@ -229,14 +229,22 @@ def _require_same_wrist(rotation: Array, rigid: Array) -> None:
     known = np.isfinite(rotation).all(axis=(1, 2))
     if known.sum() < LEAST_POSES:
         return
-    angle = median_misfit(rotation[known], rigid[known])
-    if angle > OTHER_GEOMETRY:
+    found = agreement(rotation[known], rigid[known])
+    if found.misfit <= OTHER_GEOMETRY:
+        return
+    limit = f"limit {np.degrees(OTHER_GEOMETRY):g} deg"
+    if found.misfit_turned > OTHER_GEOMETRY:
         raise InputError(
-            f"the measured rotations are not those of this wrist: half of them are more than "
-            f"{np.degrees(angle):.1f} deg (limit {np.degrees(OTHER_GEOMETRY):g} deg) from what the "
-            "motor angles say, however the instrument stands; check the table, the joints' names, "
-            "order and signs"
+            "the measured rotations are not those of this wrist: half of them are more than "
+            f"{np.degrees(found.misfit_turned):.1f} deg ({limit}) from what the motor angles say, "
+            "however the instrument stands; check the table, and the joints' names, order and signs"
         )
+    raise InputError(
+        "the measured rotations are not about the axes of wrist_base: half of them are more than "
+        f"{np.degrees(found.misfit):.1f} deg ({limit}) from what the motor angles say, unless the "
+        f"instrument is turned by {np.degrees(found.turn):.0f} deg; map its frame, or check the "
+        "joints' names, order and signs"
+    )
 
 
 def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOffset | None:
@@ -246,8 +254,8 @@ def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOff
     reachable = table.mechanism.reachable(theta)
     if not known.any() or not reachable.any():
         return None
-    rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_rotvec()
-    measured = Rotation.from_matrix(track.rotation[known]).as_rotvec()
+    rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_quat()
+    measured = Rotation.from_matrix(track.rotation[known]).as_quat()
     return clock_offset(track.time_ns[known], measured, Signal(time_ns[reachable], rigid))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -9,14 +11,32 @@ from wrist_stiffness.mechanism.components import Array
 
 POSES_USED = 1000
 
-ROUNDS = 20
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well measured rotations follow the rigid ones, the target turned on the platform as fits.
+
+    Parameters
+    ----------
+    misfit : float
+        Median angle that is left with the instrument as it stands [rad].
+    misfit_turned : float
+        The same with the instrument turned as fits best [rad].
+    turn : float
+        Angle of that turn [rad].
+    """
+
+    misfit: float
+    misfit_turned: float
+    turn: float
 
 
-def median_misfit(measured: Array, rigid: Array) -> float:
-    """Return the median angle between rotations that is left after the best registration.
+def agreement(measured: Array, rigid: Array) -> Agreement:
+    """Compare measured with rigid rotations.
 
-    The registration is a turn of the instrument in F and one of the target on the platform; either
-    is the mean of what the other leaves.
+    With a turn X of the instrument in F and one Y of the target on the platform, measured is
+    X rigid Y.  So the rotations from the mean of one side are those of the other, turned by X
+    alone.
 
     Parameters
     ----------
@@ -25,13 +45,18 @@ def median_misfit(measured: Array, rigid: Array) -> float:
 
     Returns
     -------
-    float
-        [rad].
+    Agreement
+        Of a thousand of them.
     """
     used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
     seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
-    instrument = target = Rotation.identity()
-    for _ in range(ROUNDS):
-        instrument = (seen * (said * target).inv()).mean()
-        target = ((instrument * said).inv() * seen).mean()
-    return float(np.median((seen * (instrument * said * target).inv()).magnitude()))
+    seen, said = seen * seen.mean().inv(), said * said.mean().inv()
+    left, _, right = np.linalg.svd(seen.as_rotvec().T @ said.as_rotvec())
+    left[:, 2] *= np.linalg.det(left @ right)
+    turn = Rotation.from_matrix(left @ right)
+    turned = turn * said * turn.inv()
+    return Agreement(
+        float(np.median((seen * said.inv()).magnitude())),
+        float(np.median((seen * turned.inv()).magnitude())),
+        float(turn.magnitude()),
+    )

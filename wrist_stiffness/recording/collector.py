@@ -211,6 +211,7 @@ class Collector:
             for name in self.finite:
                 values = rows[name].reshape(log_times.size, -1)
                 found[f"{name} not finite"] = log_times[~np.isfinite(values).all(axis=1)]
+        if rows and self.message_type is not String:
             # One temperature topic serves several components, each with stamps of its own.
             groups = np.unique(rows["frame_id"]) if self.message_type is Temperature else [None]
             steps = [self._steps(rows, group) for group in groups]

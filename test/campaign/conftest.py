@@ -1,0 +1,129 @@
+"""A small recording of a known wrist in known motion, built in code and changed by each test."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.recording import RecordingWriter
+from wrist_stiffness.recording.messages import (
+    Float64,
+    Header,
+    JointState,
+    Point,
+    Pose,
+    PoseArray,
+    PoseStamped,
+    Quaternion,
+    String,
+    Temperature,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
+from wrist_stiffness.shipped import shipped_file
+
+START_NS = 1_700_000_000_000_000_000
+MILLISECOND = 1_000_000
+MOTORS = ("motor_1_joint", "motor_2_joint")
+
+
+def pose_of(rotation, shift):
+    quaternion = Rotation.from_matrix(rotation).as_quat().tolist()
+    return Pose(Point(*np.asarray(shift).tolist()), Quaternion(*quaternion))
+
+
+@dataclass
+class Campaign:
+    """Eight seconds: joint states every 10 ms, loads every 10 ms, poses 5 ms after each of them.
+
+    Motor 1 swings by 20 deg in 4 s, motor 2 by 15 deg in 2.7 s; 1 N and more pulls down.
+    """
+
+    mechanism: object
+    count: int = 800
+    frame_id: str = "wrist_base"
+    entries: list = field(default_factory=list)
+
+    def theta(self, time_ns):
+        """Motor angles (n, 2) at stamps [rad]."""
+        t = 1e-9 * (np.asarray(time_ns) - START_NS)
+        swing = np.stack([20 * np.sin(2 * np.pi * t / 4), 15 * np.sin(2 * np.pi * t / 2.7)], -1)
+        return np.radians(swing)
+
+    def rigid(self, time_ns):
+        """Rotation U -> F (n, 3, 3) at stamps."""
+        return self.mechanism.forward(self.theta(time_ns)).platform
+
+    @property
+    def joint_ns(self):
+        return START_NS + 10 * MILLISECOND * np.arange(self.count)
+
+    @property
+    def pose_ns(self):
+        return self.joint_ns[:-1] + 5 * MILLISECOND
+
+    def add(self, topic, stamp_ns, message):
+        self.entries.append((topic, int(stamp_ns), message))
+
+    def with_joints(self, names=MOTORS, **others):
+        for stamp, angles in zip(self.joint_ns, self.theta(self.joint_ns), strict=True):
+            state = JointState(Header(int(stamp), ""), names, tuple(angles.tolist()), **others)
+            self.add("/joint_states", stamp, state)
+        return self
+
+    def with_loads(self, frame_id="wrist_base", force=lambda i: (0.0, 0.0, -1.0 - 0.01 * i)):
+        for i, stamp in enumerate(self.joint_ns):
+            wrench = Wrench(Vector3(*force(i)), Vector3())
+            self.add("/load_estimate", stamp, WrenchStamped(Header(int(stamp), frame_id), wrench))
+        return self
+
+    def with_poses(self, shift=None, rotation=None, stamps=None, late_ns=0):
+        """Poses of the rigid wrist unless they are given; stamped late where asked."""
+        stamps = self.pose_ns if stamps is None else stamps
+        rotation = self.rigid(stamps) if rotation is None else rotation
+        shift = np.zeros((len(stamps), 3)) if shift is None else shift
+        for stamp, turned, moved in zip(stamps, rotation, shift, strict=True):
+            header = Header(int(stamp) + late_ns, self.frame_id)
+            message = PoseStamped(header, pose_of(turned, moved))
+            self.add("/platform_pose_measured", stamp, message)
+        return self
+
+    def with_markers(self, points):
+        for stamp, places in zip(self.pose_ns, points, strict=True):
+            poses = tuple(Pose(Point(*place)) for place in places.tolist())
+            header = Header(int(stamp), self.frame_id)
+            self.add("/platform_markers_measured", stamp, PoseArray(header, poses))
+        return self
+
+    def with_temperature(self, component, stamp_ns, value):
+        self.add("/temperatures", stamp_ns, Temperature(Header(int(stamp_ns), component), value))
+        return self
+
+    def with_covariate(self, name, stamp_ns, value):
+        self.add(f"/covariates/{name}", stamp_ns, Float64(value))
+        return self
+
+    def with_note(self, text):
+        self.add("/recording_notes", START_NS, String(text))
+        return self
+
+    def written(self, path: Path) -> Path:
+        with RecordingWriter(path) as writer:
+            for topic, stamp, message in sorted(self.entries, key=lambda entry: entry[1]):
+                writer.write(topic, message, stamp)
+        return path
+
+
+@pytest.fixture(scope="session")
+def table():
+    return load_table(shipped_file("precomputed/palmieri2015.npz"))
+
+
+@pytest.fixture
+def campaign(table):
+    """An empty one; a test adds what it needs."""
+    return Campaign(table.mechanism)

@@ -1,0 +1,183 @@
+"""Bad recordings: a clear error, or a result that says what it could not use."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.reading import LEAST_POSES, read_session
+from wrist_stiffness.errors import InputError, RecordingError
+from wrist_stiffness.recording.messages import PoseStamped
+
+SECOND = 1_000_000_000
+MILLISECOND = 1_000_000
+
+
+@pytest.fixture
+def complete(campaign):
+    return campaign.with_joints().with_loads().with_poses()
+
+
+@pytest.mark.parametrize(
+    ("absent", "named"),
+    [
+        ("/platform_pose_measured", "/platform_pose_measured or /platform_markers_measured"),
+        ("/load_estimate", "/load_estimate"),
+        ("/joint_states", "/joint_states"),
+    ],
+)
+def test_an_absent_topic_is_named_with_those_that_are_there(
+    tmp_path, complete, table, absent, named
+):
+    complete.entries = [entry for entry in complete.entries if entry[0] != absent]
+    with pytest.raises(RecordingError, match=f"nothing on {named}") as caught:
+        read_session(complete.written(tmp_path / "bag"), table)
+    for topic in {"/joint_states", "/load_estimate", "/platform_pose_measured"} - {absent}:
+        assert topic in str(caught.value)
+
+
+def test_another_clock_is_found_taken_out_and_reported(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses(late_ns=1_730_000_000)
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    offset, sigma = session.clock_offset_s
+    assert abs(offset - 1.73) < max(3.0 * sigma, 1e-4)
+    assert any("+1.730 s" in remark and "taken out" in remark for remark in session.remarks)
+    # 0.1 ms at 30 deg/s.
+    np.testing.assert_allclose(session.rotation, campaign.rigid(campaign.pose_ns), atol=1e-12)
+    np.testing.assert_allclose(session.block.time, campaign.pose_ns / SECOND, atol=1e-4)
+
+
+def test_a_small_lag_is_reported_and_left_to_the_effect_time_delay(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses(late_ns=50 * MILLISECOND)
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    offset, sigma = session.clock_offset_s
+    assert abs(offset - 0.05) < max(3.0 * sigma, 1e-4)
+    # The last five poses are stamped behind the last joint state, but within reach of it.
+    used = len(session)
+    expected = campaign.pose_ns[:used] / SECOND + 0.05
+    np.testing.assert_allclose(session.block.time, expected, atol=1e-6)
+
+
+def test_a_registration_is_no_clock_offset(tmp_path, campaign, table):
+    turn = Rotation.from_euler("xyz", [0.2, -0.2, 0.2], degrees=True).as_matrix()
+    campaign.with_joints().with_loads()
+    campaign.with_poses(rotation=turn @ campaign.rigid(campaign.pose_ns) @ turn.T)
+    offset, _ = read_session(campaign.written(tmp_path / "bag"), table).clock_offset_s
+    assert abs(offset) < 1e-3
+
+
+def test_without_motion_the_clocks_cannot_be_compared(tmp_path, campaign, table):
+    campaign.theta = lambda time_ns: np.zeros((*np.shape(time_ns), 2))
+    campaign.with_joints().with_loads().with_poses()
+    assert read_session(campaign.written(tmp_path / "bag"), table).clock_offset_s is None
+
+
+def test_clocks_that_do_not_overlap_are_an_error_with_both_ranges(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses(late_ns=-1_000_000 * SECOND)
+    reason = (
+        r"joint states are stamped 1700000000\.000 to 1700000007\.990 s, "
+        r"measured poses 1699000000\.005 to 1699000007\.985 s"
+    )
+    with pytest.raises(RecordingError, match=reason):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_too_few_poses_are_refused_with_the_limit(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses(stamps=campaign.pose_ns[: LEAST_POSES - 1])
+    with pytest.raises(InputError, match=f"4 of 4 .* at least {LEAST_POSES} are needed"):
+        read_session(campaign.written(tmp_path / "few"), table)
+
+
+def test_just_enough_poses_are_read(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses(stamps=campaign.pose_ns[:LEAST_POSES])
+    assert len(read_session(campaign.written(tmp_path / "bag"), table)) == LEAST_POSES
+
+
+def test_a_load_that_never_changes_is_said(tmp_path, campaign, table):
+    campaign.with_joints().with_loads(force=lambda i: (0.0, 0.0, -1.0)).with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert any("the load never changes" in remark for remark in session.remarks)
+
+
+def test_swapped_motors_are_refused(tmp_path, campaign, table):
+    """They look nearly like an instrument that is turned by a quarter."""
+    campaign.with_joints(("motor_2_joint", "motor_1_joint")).with_loads().with_poses()
+    with pytest.raises(InputError, match="not about the axes of wrist_base.*limit 5 deg.*order"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_poses_of_another_wrist_are_refused(tmp_path, campaign, table):
+    campaign.with_joints().with_loads()
+    stretched = Rotation.from_matrix(campaign.rigid(campaign.pose_ns)).as_rotvec()
+    campaign.with_poses(rotation=Rotation.from_rotvec(2.0 * stretched).as_matrix())
+    with pytest.raises(InputError, match="not those of this wrist.*limit 5 deg"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_an_instrument_in_another_frame_is_refused_with_its_turn(tmp_path, campaign, table):
+    instrument = Rotation.from_euler("xyz", [0.0, 60.0, 0.0], degrees=True).as_matrix()
+    campaign.with_joints().with_loads()
+    campaign.with_poses(rotation=instrument @ campaign.rigid(campaign.pose_ns))
+    with pytest.raises(InputError, match="turned by 60 deg; map its frame"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_a_target_that_sits_anyhow_is_read(tmp_path, campaign, table):
+    instrument = Rotation.from_euler("xyz", [1.0, 2.0, -1.0], degrees=True).as_matrix()
+    target = Rotation.from_euler("xyz", [-40.0, 5.0, 90.0], degrees=True).as_matrix()
+    campaign.with_joints().with_loads()
+    campaign.with_poses(rotation=instrument @ campaign.rigid(campaign.pose_ns) @ target)
+    assert len(read_session(campaign.written(tmp_path / "bag"), table)) == 799
+
+
+def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, table):
+    rng = np.random.default_rng(5)
+    shift = 5e-6 * rng.standard_normal((799, 3))
+    shift[400:] += 3e-4
+    lost = np.array([50, 200, 201, 600])
+    shift[lost] += 2e-3
+    campaign.with_joints().with_loads().with_poses(shift)
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    np.testing.assert_array_equal(np.flatnonzero(~session.measured.any(axis=1)), lost)
+    assert "4 of 799 measured poses are spikes: left out" in session.remarks
+
+
+def test_dropouts_are_counted(tmp_path, campaign, complete, table):
+    nothing = np.full(3, np.nan)
+    rotation = campaign.rigid(campaign.pose_ns)
+    shift = np.zeros((799, 3))
+    campaign.entries = []
+    campaign.with_joints().with_loads().with_poses(shift, rotation)
+    poses = [i for i, entry in enumerate(campaign.entries) if isinstance(entry[2], PoseStamped)]
+    for i in poses[100:130]:
+        topic, stamp, message = campaign.entries[i]
+        pose = type(message.pose)(
+            type(message.pose.position)(*nothing.tolist()),
+            type(message.pose.orientation)(*[float("nan")] * 4),
+        )
+        campaign.entries[i] = (topic, stamp, PoseStamped(message.header, pose))
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert session.measured.all(axis=1).sum() == 769
+    assert "measured pose: 30 of 799 lost by the instrument" in session.remarks
+
+
+def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign, table):
+    theta = campaign.theta(campaign.joint_ns)
+    theta[300] = np.radians([0.0, 360.0])
+    campaign.theta = lambda time_ns: theta
+    campaign.with_joints()
+    del campaign.theta
+    campaign.with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert len(session) == 797
+    assert any("cannot reach" in remark for remark in session.remarks)
+
+
+def test_what_is_left_of_a_cut_recording_is_used_and_said(tmp_path, campaign, table):
+    campaign.count = 5000
+    campaign.with_joints().with_loads().with_poses()
+    path = campaign.written(tmp_path / "bag.mcap")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    session = read_session(path, table)
+    assert 1000 < len(session) < 4000
+    assert "the recording is damaged" in session.remarks[0]
