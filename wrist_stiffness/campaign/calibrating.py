@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
-from wrist_stiffness.campaign.fitting import Fit, Fitted, fit
+from wrist_stiffness.campaign.fitting import Fit, Fitted, fit, start_of
 from wrist_stiffness.campaign.free_effects import commissioning
 from wrist_stiffness.campaign.judging import Judged, judged, judged_by_itself
 from wrist_stiffness.campaign.measured_session import MeasuredSession
@@ -17,7 +17,6 @@ from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -107,7 +106,7 @@ def calibrate(
     problem = FitProblem(model.with_effects(*held), units, free)
     if hold_out:
         seen = judged(problem, progress)
-        found = fit(problem, start_of(problem, seen.fit), progress=progress)
+        found = fit(problem, start_of(problem, seen.fit.problem, seen.fit.z), progress=progress)
     else:
         found = fit(problem, progress=progress)
         seen = judged_by_itself(found)
@@ -129,26 +128,6 @@ def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:
             raise InputError(f"{session.name}: note {CALIBRATED!r} is {names!r}, no list of names")
         said.append(set(names))
     return tuple(sorted(set.intersection(*said))) if said else ()
-
-
-def start_of(problem: FitProblem, earlier: Fit) -> Array:
-    """Return where a problem starts from what an earlier fit with other sessions found, (p,)."""
-    names = [session.name for session in earlier.problem.sessions]
-    known = {
-        (earlier.problem.free[u.free].effect.name, u.key, _name(names, u.session)): z
-        for u, z in zip(earlier.problem.unknowns, earlier.z, strict=True)
-    }
-    own = [session.name for session in problem.sessions]
-    return np.array(
-        [
-            known.get((problem.free[u.free].effect.name, u.key, _name(own, u.session)), 0.0)
-            for u in problem.unknowns
-        ]
-    )
-
-
-def _name(names: Sequence[str], session: int | None) -> str | None:
-    return None if session is None else names[session]
 
 
 def as_it_stands(problem: FitProblem, seen: Judged) -> dict[str, float]:

@@ -7,12 +7,15 @@ squares.  Noise and lost beams depend on the fit, so they are found again at eac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.free_effects import FreeEffect
+from wrist_stiffness.campaign.shims import GAPS
 from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.outliers import lost_units
@@ -24,14 +27,15 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Estimate
 
-MOST_STEPS = 25
+MOST_STEPS = 40
 """Gauss-Newton steps."""
 
-NOISE_STEPS = 8
-"""Steps at which the noise is estimated anew; then it is kept, so that the steps converge."""
+NOISE_ROUNDS = 2
+"""Rounds of steps, the noise estimated at each: without its colour, and with it."""
 
-CLOSE = 0.05
-"""The fit has arrived when no parameter moves by more than this share of its uncertainty."""
+CLOSE, SMALL_FALL = 0.05, 0.1
+"""A round ends when no parameter moves by more than this share of its uncertainty, or the sum of
+squares falls by less than this, which no parameter can feel."""
 
 MOST_HALVINGS = 6
 
@@ -100,7 +104,7 @@ class Fit:
     used : (u,) bool
         Units that the fit saw.
     noise : NoiseModel
-        Scatter of the units.
+        Scatter of the units, with a misfit counted as more of it.
     misfit : float
         Sum of the squared white residuals over their degrees of freedom; 1 if only noise is left.
     lost : int
@@ -189,7 +193,8 @@ def fit(
     problem : FitProblem
         Model, sessions and what may move.
     start : (p,) float, optional
-        Where to begin, in steps; at the means of the priors if None.
+        Where to begin, in steps; if None, at the means of the priors, from where the fit is led in
+        stages.
     held_out : (u,) bool, optional
         Units of `problem.table` that the fit must not see.
     progress : callable
@@ -209,25 +214,57 @@ def fit(
     unseen = np.zeros(table.n_units, dtype=bool) if held_out is None else held_out
     if not len(weight):
         raise InputError("fit: no parameter is free")
-    if table.measured[~unseen].sum() < max(1, np.count_nonzero(weight < 1.0)):
-        raise InputError(f"fit: only {table.measured[~unseen].sum()} numbers were measured")
-    lower, upper = problem.bounds
+    if (measured := table.measured[~unseen].sum()) < max(1, np.count_nonzero(weight < 1.0)):
+        raise InputError(f"fit: only {measured} numbers were measured")
     z = np.zeros(len(weight)) if start is None else start
-    residual, arrived, step = problem.residual(z), False, 0
-    while True:
+    if start is None:
+        for stage in _stages(problem):
+            led = _settled(stage, start_of(stage, problem, z), unseen, 1, silent)
+            z = start_of(problem, stage, led.z)
+    return _settled(problem, z, unseen, NOISE_ROUNDS, progress)
+
+
+def _stages(problem: FitProblem) -> tuple[FitProblem, ...]:
+    """Return the problems that lead to a good start: set-up, then all but the flanges' gaps.
+
+    Flanges touch or do not, so the sum of squares has valleys apart from the deepest; with gaps
+    that follow the axes the way leads into the right one.
+    """
+
+    def only(kept: Callable[[FreeEffect], bool]) -> FitProblem:
+        free = tuple(each if kept(each) else replace(each, scale={}) for each in problem.free)
+        return replace(problem, free=free)
+
+    tried = [
+        only(lambda each: each.per_session),
+        only(lambda each: each.effect.law.id != GAPS),
+    ]
+    return tuple(each for each in tried if 0 < len(each.unknowns) < len(problem.unknowns))
+
+
+def _settled(
+    problem: FitProblem, z: Array, unseen: Mask, noise_rounds: int, progress: Progress
+) -> Fit:
+    """Take steps until they are done with the noise as it was found in the last round."""
+    table, weight = problem.table, problem.weights
+    residual, rounds = problem.residual(z), 0
+    noise: NoiseModel | None = None
+    for step in range(MOST_STEPS + 1):
         columns = problem.columns(z)
         lost = lost_units(table.with_values(residual), columns, Settings().outlier_limit)
         seen = table.with_values(np.where((lost | unseen)[:, None], np.nan, residual))
-        if step <= NOISE_STEPS:
+        if noise is None or rounds < noise_rounds:
             noise = estimate_noise(seen, columns, np.empty((*residual.shape, 0)))
+            if rounds == 0:
+                # Far from the end, what the fit has not yet reached would pass for wander.
+                noise = _without_colour(noise)
         linear = _Linear.of(seen, noise, columns, residual, weight, z)
         progress(step, MOST_STEPS)
-        if arrived or step == MOST_STEPS:
+        if rounds == noise_rounds or step == MOST_STEPS:
             break
         sigma = np.sqrt(np.diag(linear.covariance))
-        z, residual, taken = _descended(problem, seen, linear, z, residual)
-        arrived = bool((np.abs(taken) < CLOSE * sigma).all())
-        step += 1
+        z, residual, taken, fall = _descended(problem, seen, linear, z, residual)
+        rounds += fall < SMALL_FALL or bool((np.abs(taken) < CLOSE * sigma).all())
     progress(MOST_STEPS, MOST_STEPS)
     return Fit(
         problem,
@@ -235,11 +272,42 @@ def fit(
         linear.covariance,
         np.where(lost[:, None], np.nan, residual),
         ~unseen,
-        noise,
+        linear.noise,
         linear.misfit,
         int(lost.sum()),
-        arrived,
+        rounds == noise_rounds,
     )
+
+
+def _without_colour(noise: NoiseModel) -> NoiseModel:
+    white = 1.0 - noise.colour_share if noise.source == "given" else 1.0
+    return replace(noise, colour_share=0.0, scatter=white * noise.scatter)
+
+
+def start_of(problem: FitProblem, other: FitProblem, z: Array) -> Array:
+    """Return where a problem starts from a point of another one of the same model, (p,).
+
+    Parameters
+    ----------
+    problem, other : FitProblem
+        They may differ in sessions, which go by name, and in what is free.
+    z : (q,) float
+        Steps of the other's unknowns.
+    """
+    known = dict(zip(_names(other), z.tolist(), strict=True))
+    return np.array([known.get(name, 0.0) for name in _names(problem)])
+
+
+def _names(problem: FitProblem) -> list[tuple[str, str, str | None]]:
+    sessions = [session.name for session in problem.sessions]
+    return [
+        (
+            problem.free[unknown.free].effect.name,
+            unknown.key,
+            None if unknown.session is None else sessions[unknown.session],
+        )
+        for unknown in problem.unknowns
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,8 +364,18 @@ class _Linear:
 
 def _descended(
     problem: FitProblem, seen: Observations, linear: _Linear, z: Array, residual: Array
-) -> tuple[Array, Array, Array]:
-    """Take a step, halved until the sum of squares falls; return z, residual and the step."""
+) -> tuple[Array, Array, Array, float]:
+    """Take a step, halved until the sum of squares falls.
+
+    Returns
+    -------
+    (p,), (u, 6) float
+        Where it led, and what is left there.
+    (p,) float
+        The step.
+    float
+        By how much the sum of squares fell.
+    """
 
     def squares(z: Array, residual: Array) -> float:
         white = linear.noise.whiten(seen, residual[:, :, None])
@@ -308,7 +386,7 @@ def _descended(
     now = squares(z, residual)
     for _ in range(MOST_HALVINGS):
         tried = problem.residual(z + move)
-        if squares(z + move, tried) <= now:
-            return z + move, tried, move
+        if (after := squares(z + move, tried)) <= now:
+            return z + move, tried, move, now - after
         move = 0.5 * move
-    return z, residual, np.zeros_like(move)
+    return z, residual, np.zeros_like(move), 0.0
