@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
@@ -215,3 +215,21 @@ def test_a_temperature_reaches_the_model_and_a_missing_one_is_reported(graph, mo
     status, _ = graph.status(NAME, lambda status, values: "link_1: older" in status.message)
     assert status.level == status.WARN
     assert numbers(predictions(graph)[2])[:3] == cold.tolist()
+
+
+def test_frames_of_tf_static_are_used(graph, predictor, model):
+    """The messages of tf2 are not among the wheels from PyPI: what they hold is handed over."""
+    step = TransformStamped(child_frame_id="ft")
+    step.header.frame_id = "wrist_platform"
+    step.transform.rotation.x, step.transform.rotation.w = 1.0, 0.0
+    broken = TransformStamped(child_frame_id="none")
+    broken.transform.rotation.w = 0.5
+    predictor.on_transforms([broken, step])
+    assert predictor.health.faults == 1
+    graph.load(SECOND, (0, 0, 1.0, 0, 0, 0), "ft")
+    wait_for_load(graph, predictor, SECOND)
+    graph.joints("/joint_states", SECOND)
+    wait_for_predictions(graph, 1)
+    down = Load(np.array(DOWN), on_platform=True)
+    wanted = np.concatenate(pose_of_twist(model.predict(np.array(THETA), down).twist))
+    assert numbers(predictions(graph)[0]) == pytest.approx(wanted.tolist(), rel=1e-9, abs=1e-15)

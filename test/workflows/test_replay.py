@@ -17,8 +17,12 @@ from wrist_stiffness.recording.messages import (
     Float64,
     Header,
     JointState,
+    Quaternion,
     String,
     Temperature,
+    TFMessage,
+    Transform,
+    TransformStamped,
     Vector3,
     Wrench,
     WrenchStamped,
@@ -162,6 +166,29 @@ def test_recording_of_rosbags_with_foreign_names(tmp_path, capsys):
         for i in range(5)
     ]
     assert np.array_equal(shifts(tmp_path / "out"), np.array(wanted))
+
+
+def test_frames_of_tf_static_are_used_and_a_transform_that_is_none_is_counted(tmp_path):
+    """The sensor hangs at the platform over two steps, both turned by 90 deg about x."""
+    half = float(np.sqrt(0.5))
+    turn = Transform(Vector3(0.0, 0.0, 0.0), Quaternion(half, 0.0, 0.0, half))
+    steps = tuple(
+        TransformStamped(Header(0, parent), child, turn)
+        for parent, child in (("wrist_platform", "tool"), ("tool", "ft"))
+    )
+    broken = TransformStamped(Header(0, "a"), "b", Transform(Vector3(), Quaternion(w=2.0)))
+    timeline = [
+        (0, "/tf_static", TFMessage(steps)),
+        (0, "/tf_static", TFMessage((broken,))),
+        (1, "/load_estimate", load(MILLISECOND, (0.0, 0.0, 1.0), "ft")),
+        (1, "/joint_states", joints(MILLISECOND, (5.0, 10.0))),
+    ]
+    summary = replay(write(tmp_path / "in", timeline), MODEL, tmp_path / "out")
+    (reason,) = summary.refused
+    assert "static transform a -> b" in reason
+    down = Load(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]), on_platform=True)
+    wanted = load_model(MODEL).predict(np.radians((5.0, 10.0)), down).motion[1]
+    assert np.allclose(shifts(tmp_path / "out"), [wanted], rtol=0, atol=1e-13)
 
 
 # Of the bushing the temperature counts, of the platform the humidity.

@@ -136,9 +136,9 @@ class MonitorStream(Stream):
         WristError
             If the pose is not usable or no joint state, load or pose of the frame belongs to it.
         """
-        rotation, place = measured_pose(self.settings.frames, frame_id, position, quaternion)
+        rotation, place = measured_pose(self.loads.frames, frame_id, position, quaternion)
         if variance is not None:
-            turn, _ = self.settings.frames.in_base(frame_id, "measured pose")
+            turn, _ = self.loads.frames.in_base(frame_id, "measured pose")
             variance = np.ravel(np.reshape(variance, (2, 3)) @ (turn.T**2))
         return self._judge(stamp_ns, rotation, place, variance)
 
@@ -165,7 +165,7 @@ class MonitorStream(Stream):
             If too few are seen, or as `on_pose`.
         """
         nominal = self.running_model().model.table.geometry.platform.readout_points
-        pose = pose_of_markers(self.settings.frames, frame_id, points, nominal)
+        pose = pose_of_markers(self.loads.frames, frame_id, points, nominal)
         return self._judge(stamp_ns, *pose, None)
 
     def on_frame_pose(
@@ -177,7 +177,7 @@ class MonitorStream(Stream):
     ) -> None:
         """Keep a pose of the target on the frame (parameters and errors as those of `on_pose`)."""
         what = "measured frame pose"
-        pose = measured_pose(self.settings.frames, frame_id, position, quaternion, what)
+        pose = measured_pose(self.loads.frames, frame_id, position, quaternion, what)
         self.frame.add(stamp_ns, *pose)
 
     def _judge(

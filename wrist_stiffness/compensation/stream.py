@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wrist_stiffness.compensation.held_signals import HeldSignals
+from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_covariance import load_covariance
 from wrist_stiffness.compensation.load_history import LoadIntake
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.static_transforms import StaticTransform, sensor_frames
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
@@ -42,6 +44,7 @@ class Stream:
         self.temperatures = HeldSignals(settings.signal_age_limit_s)
         self.covariates = HeldSignals(settings.signal_age_limit_s)
         self._settings = settings
+        self._transforms: dict[str, StaticTransform] = {}
         self.model = model
 
     @property
@@ -63,10 +66,19 @@ class Stream:
     @settings.setter
     def settings(self, settings: StreamSettings) -> None:
         self._settings = settings
-        self.loads.frames = settings.frames
+        self._use_frames()
         self.loads.history.age_limit_s = settings.load_age_limit_s
         self.temperatures.age_limit_s = settings.signal_age_limit_s
         self.covariates.age_limit_s = settings.signal_age_limit_s
+
+    def on_static_transforms(self, transforms: Sequence[StaticTransform]) -> None:
+        """Learn frames that sensors may speak in; those of the settings go first."""
+        self._transforms |= {transform.child: transform for transform in transforms}
+        self._use_frames()
+
+    def _use_frames(self) -> None:
+        heard = sensor_frames(self._transforms.values())
+        self.loads.frames = Frames({**heard, **self._settings.frames.sensors})
 
     @property
     def dropped_signals(self) -> tuple[str, ...]:

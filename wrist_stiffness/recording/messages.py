@@ -220,6 +220,35 @@ class PoseArray(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Transform(Message):
+    """Translation [m] and rotation from a child frame to its parent."""
+
+    ros_type = "geometry_msgs/msg/Transform"
+    translation: Vector3 = line("Vector3 translation", Vector3())
+    rotation: Quaternion = line("Quaternion rotation", Quaternion())
+
+
+@dataclass(frozen=True, slots=True)
+class TransformStamped(Message):
+    """Where a child frame stands in the header's frame."""
+
+    ros_type = "geometry_msgs/msg/TransformStamped"
+    header: Header = line("std_msgs/Header header", Header())
+    child_frame_id: str = line("string child_frame_id", "")
+    transform: Transform = line("Transform transform", Transform())
+
+
+@dataclass(frozen=True, slots=True)
+class TFMessage(Message):
+    """Any number of transforms."""
+
+    ros_type = "tf2_msgs/msg/TFMessage"
+    transforms: tuple[TransformStamped, ...] = line(
+        "geometry_msgs/TransformStamped[] transforms", ()
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class JointTrajectoryPoint(Message):
     """State of the joints [rad, rad/s, rad/s², N m] at a time after the start [ns]."""
 
@@ -303,6 +332,9 @@ MESSAGE_TYPES: dict[str, type[Message]] = {
         PoseStamped,
         PoseWithCovarianceStamped,
         PoseArray,
+        Transform,
+        TransformStamped,
+        TFMessage,
         JointTrajectoryPoint,
         JointTrajectory,
         KeyValue,

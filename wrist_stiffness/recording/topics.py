@@ -16,6 +16,7 @@ FRAME_POSE = "/frame_pose_measured"
 MOTOR_COMMANDS = "/motor_commands"
 MOTOR_TRAJECTORY = "/motor_trajectory"
 RECORDING_NOTES = "/recording_notes"
+TF_STATIC = "/tf_static"
 
 STANDARD_TOPICS = (
     JOINT_STATES,
@@ -27,6 +28,7 @@ STANDARD_TOPICS = (
     MOTOR_COMMANDS,
     MOTOR_TRAJECTORY,
     RECORDING_NOTES,
+    TF_STATIC,
 )
 """Topics that are read; besides these, any topic below ``/covariates/``."""
 

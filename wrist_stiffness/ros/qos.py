@@ -14,6 +14,9 @@ RELIABLE_QOS = QoSProfile(depth=200)
 ALARM_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """A state: who comes later hears the newest, also where poses have stopped."""
 
+STATIC_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""As tf2 sends `/tf_static`: what was said before is heard, too."""
+
 RECORDING_QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """The recorder hears everybody."""
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import TransformStamped, WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -33,11 +33,12 @@ from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.ros import static_transforms
 from wrist_stiffness.ros.conversions import nanoseconds, three
 from wrist_stiffness.ros.executor import DataGroup
 from wrist_stiffness.ros.health import Health
 from wrist_stiffness.ros.parameters import declare, model_path, values_of
-from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS, STATIC_QOS
 
 REPORT_EVERY_S = 1.0
 
@@ -127,7 +128,13 @@ class WristNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to listen; the load first, so that it is taken before a joint state that waits."""
         covariates = self.get_parameter("covariates").value.split()
+        transforms = static_transforms.message_type()
         self._inputs = [
+            *(
+                []
+                if transforms is None
+                else [self.hear(transforms, "/tf_static", self._on_tf_static, STATIC_QOS)]
+            ),
             self.hear(WrenchStamped, "/load_estimate", self._on_load, SENSOR_QOS),
             self.hear(Temperature, "/temperatures", self._on_temperature, SENSOR_QOS),
             *(
@@ -172,6 +179,17 @@ class WristNode(LifecycleNode):
             self.warn(error)
         else:
             self.after_load()
+
+    def _on_tf_static(self, message: Any) -> None:
+        self.on_transforms(message.transforms)
+
+    def on_transforms(self, messages: Sequence[TransformStamped]) -> None:
+        """Learn sensor frames from static transforms; one that is none is left out."""
+        for message in messages:
+            try:
+                self.stream.on_static_transforms([static_transforms.converted(message)])
+            except WristError as error:
+                self.warn(error)
 
     def _on_temperature(self, message: Temperature) -> None:
         try:

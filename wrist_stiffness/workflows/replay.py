@@ -31,6 +31,7 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovarianceStamped,
     Quaternion,
     Temperature,
+    TFMessage,
     WrenchStamped,
 )
 from wrist_stiffness.recording.reader import Recording, open_recording
@@ -40,6 +41,7 @@ from wrist_stiffness.recording.topics import (
     LOAD_ESTIMATE,
     MOTOR_COMMANDS,
     TEMPERATURES,
+    TF_STATIC,
 )
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.workflows.parameter_file import node_settings
@@ -61,6 +63,7 @@ TYPES: dict[str, type[Message]] = {
     LOAD_ESTIMATE: WrenchStamped,
     MOTOR_COMMANDS: JointState,
     TEMPERATURES: Temperature,
+    TF_STATIC: TFMessage,
 }
 """Topics that are used, besides those below `/covariates/`."""
 

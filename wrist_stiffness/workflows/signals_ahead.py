@@ -1,12 +1,19 @@
-"""Loads, temperatures and covariates of a recording, heard before the samples they belong to."""
+"""Loads, frames and slow signals of a recording, heard before the samples they belong to."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from wrist_stiffness.compensation.static_transforms import static_transform
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.recording.messages import Float64, Message, Temperature, WrenchStamped
+from wrist_stiffness.recording.messages import (
+    Float64,
+    Message,
+    Temperature,
+    TFMessage,
+    WrenchStamped,
+)
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.topics import COVARIATES
 
@@ -22,7 +29,7 @@ class SignalsAhead:
     source : Recording
         Where the signals are.
     names : mapping
-        Standard by actual topic name: the load, the temperatures and covariates.
+        Standard by actual topic name: the load, static transforms, temperatures and covariates.
     streams : sequence of Stream
         All hear the same.
     refuse : callable
@@ -63,6 +70,16 @@ def _hear(stream: Stream, standard: str, log_time_ns: int, message: Message) -> 
             (force.x, force.y, force.z),
             (torque.x, torque.y, torque.z),
         )
+    elif isinstance(message, TFMessage):
+        for step in message.transforms:
+            place, turn = step.transform.translation, step.transform.rotation
+            found = static_transform(
+                step.header.frame_id,
+                step.child_frame_id,
+                (place.x, place.y, place.z),
+                (turn.x, turn.y, turn.z, turn.w),
+            )
+            stream.on_static_transforms([found])
     elif isinstance(message, Temperature):
         stream.temperatures.add(
             message.header.frame_id, message.header.stamp_ns, message.temperature
