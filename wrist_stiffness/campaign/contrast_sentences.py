@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.conditions import Condition, conditions
-from wrist_stiffness.campaign.dependence import Dependence, Dependences, dependences
+from wrist_stiffness.campaign.dependence import Dependence, Dependences, dependences, noise_energy
 from wrist_stiffness.campaign.noise_floor import NoiseFloor
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.observations import Labels
@@ -31,11 +31,14 @@ slower motion of the residual; slower ones against that motion, which takes far 
 SLOW = 0.3
 """A condition is slow if less than this share of its variance is faster than the wander."""
 
-FAST_BLOCKS = 40
+FAST_BLOCKS = 30
 """Parts of the recordings whose signs are turned by chance, for fast conditions."""
 
 SLOW_BLOCK_S, FEWEST_SLOW_BLOCKS = 70.0, 8
 """For slow conditions a part outlasts the wander; from fewer parts nothing could be sure."""
+
+LEAST_SHARE = 0.01
+"""A condition that takes less of the residual's square is not worth a sentence of its own."""
 
 SLOW_SHARE = 0.1
 """A slow condition that explains less of the residual is not told apart from wander."""
@@ -92,7 +95,7 @@ class Statement:
     p_value : float
         Chance, corrected for the number of conditions.
     share : float
-        Part of the residual's weighted square that goes with the condition.
+        Part of the residual's square, in variances of the noise, that goes with the condition.
     twins : tuple of str
         Conditions that these recordings cannot tell from it.
     """
@@ -153,6 +156,8 @@ class Told:
     ----------
     statements : tuple of Statement
         Strongest first.
+    minor : tuple of str
+        Topics that matter beyond chance, but so little that they are only named.
     silent : dict of str to float
         Topics on which nothing depends beyond chance, with their smallest chance.
     not_varied : tuple of str
@@ -163,6 +168,7 @@ class Told:
     """
 
     statements: tuple[Statement, ...]
+    minor: tuple[str, ...]
     silent: dict[str, float]
     not_varied: tuple[str, ...]
     too_short: tuple[str, ...]
@@ -171,6 +177,11 @@ class Told:
     def sentences(self) -> tuple[str, ...]:
         """All of it for a technician."""
         lines = [each.sentence for each in self.statements]
+        if self.minor:
+            lines.append(
+                f"Beyond chance, but with less than {100.0 * LEAST_SHARE:g} % of the error's "
+                f"square: {', '.join(self.minor)}."
+            )
         if self.silent:
             also = " else" if lines else ""
             lines.append(f"Nothing{also} depends beyond chance on {_listed(tuple(self.silent))}.")
@@ -190,6 +201,7 @@ class Told:
         """Return what programs read."""
         return {
             "depends_on": [each.as_values() for each in self.statements],
+            "hardly_depends_on": list(self.minor),
             "nothing_depends_on": dict(self.silent),
             "not_varied": list(self.not_varied),
             "too_short_for": list(self.too_short),
@@ -213,8 +225,8 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     sessions = observations.sessions
     constant = (sessions[:, None] == np.unique(sessions)).astype(float)
     trend = np.hstack([constant, _slow_motions(observations.times, sessions)])
-    weights = _weights(observations, floor)
-    total = float(np.nansum(weights * _beyond(constant, observations.values) ** 2))
+    variance = np.maximum(floor.variance, np.finfo(float).tiny)
+    total = noise_energy(observations.values, variance, constant)
     slow = np.array([_is_slow(each.columns, constant, trend) for each in asked], dtype=bool)
     span = _span(observations.times, sessions)
     slow_blocks = int(span / SLOW_BLOCK_S)
@@ -227,7 +239,7 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     def answer(chosen: Labels, base: Array, blocks: int) -> Dependences:
         columns = [asked[which].columns for which in chosen]
         labels = time_blocks(sessions, min(blocks, observations.n_units))
-        return dependences(observations.values, weights, base, columns, labels, rng)
+        return dependences(observations.values, variance, base, columns, labels, rng)
 
     statements: list[Statement] = []
     chances = np.full(len(asked), np.nan)
@@ -247,13 +259,17 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
             p_value = min(1.0, FAMILIES * each.p_value)
             twins = _twins(condition, asked, constant)
             statements.append(Statement(condition, changes, p_value, each.fall / total, twins))
-    told = {each.condition.topic for each in statements}
+    told = {each.condition.topic for each in statements if each.share >= LEAST_SHARE}
+    minor = {each.condition.topic for each in statements} - told
+    told |= minor
+    statements = [each for each in statements if each.share >= LEAST_SHARE]
     silent: dict[str, float] = {}
     for condition, p_value in zip(asked, chances.tolist(), strict=True):
         if condition.topic not in told and np.isfinite(p_value):
             silent[condition.topic] = min(p_value, silent.get(condition.topic, 1.0))
     return Told(
         tuple(sorted(statements, key=lambda each: -each.share)),
+        tuple(sorted(minor)),
         silent,
         not_varied,
         tuple(too_short),
@@ -297,14 +313,6 @@ def _beyond(base: Array, columns: Array) -> Array:
     """Columns without what least squares on the base explains; NaN count as nothing."""
     filled = np.nan_to_num(columns)
     return np.asarray(filled - base @ np.linalg.lstsq(base, filled, rcond=None)[0])
-
-
-def _weights(observations: Observations, floor: NoiseFloor) -> Array:
-    """Inverse variances of noise and of the misfit itself, (n, m)."""
-    known = observations.measured
-    excess = np.where(known, np.nan_to_num(observations.values) ** 2 - floor.variance, 0.0)
-    misfit = np.maximum(excess.sum(axis=0), 0.0) / np.maximum(known.sum(axis=0), 1)
-    return np.asarray(1.0 / np.maximum(floor.variance + misfit, np.finfo(float).tiny))
 
 
 def _changes(

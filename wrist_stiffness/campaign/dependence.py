@@ -30,6 +30,10 @@ ALIKE = 0.15
 and that uncertainly."""
 
 
+ROUNDING = 1e-12
+"""A column of which the base leaves less of the square lies inside the base."""
+
+
 @dataclass(frozen=True, eq=False)
 class Dependence:
     """What one condition does to the residual, beside the other conditions that entered.
@@ -45,7 +49,8 @@ class Dependence:
     p_value : float
         Chance that the largest of all conditions looks as strong without any dependence.
     fall : float
-        Weighted square that the condition takes away from the residual as it enters.
+        Square, in variances of the noise, that the condition takes away from the residual as it
+        enters.
     """
 
     which: int
@@ -73,7 +78,7 @@ class Dependences:
 
 def dependences(
     residual: Array,
-    weights: Array,
+    variance: Array,
     base: Array,
     conditions: Sequence[Array],
     blocks: Labels,
@@ -85,8 +90,8 @@ def dependences(
     ----------
     residual : (n, m) float
         One row per unit; NaN = not measured.
-    weights : (n, m) float
-        Inverse variances.
+    variance : (n, m) float
+        Of the noise.
     base : (n, p) float
         Columns that are nobody's finding: a constant in each session, a slow wander.
     conditions : sequence of (n, q) float
@@ -106,146 +111,149 @@ def dependences(
     InputError
         If the columns do not belong to the units.
     """
-    n = len(residual)
+    n, m = residual.shape
     if any(len(columns) != n for columns in conditions) or len(blocks) != n:
         raise InputError(f"conditions or blocks do not belong to {n} units")
     owner = np.repeat(np.arange(len(conditions)), [c.shape[1] for c in conditions])
-    every = np.hstack([np.empty((n, 0)), *conditions])
-    scale = np.sqrt(np.mean((every - every.mean(axis=0)) ** 2, axis=0))
-    every = every / np.where(scale > 0.0, scale, 1.0)
+    every, scale = _scaled(np.hstack([np.empty((n, 0)), *conditions]))
     signs = np.ones((REPEATS + 1, int(blocks.max()) + 1))
     signs[1:] = rng.choice([-1.0, 1.0], (REPEATS, signs.shape[1]))
-    weighted = _Weighted(residual, weights, base, every, blocks)
+    free = np.sum(_beyond(base, every) ** 2, axis=0)
+    free[free < ROUNDING * np.sum(every**2, axis=0)] = 0.0
     chosen: list[int] = []
     p_entry: list[float] = []
     falls: list[float] = []
     first = np.full(len(conditions), np.nan)
+    taken = base
+    energy = noise_energy(residual, variance, taken)
     while len(chosen) < min(MOST, len(conditions)):
-        inside = _columns_of(chosen, owner)
-        gains = weighted.gains(inside, owner, signs)
-        p_values = _corrected(gains)
+        new = (free > 0.0) & (np.sum(_beyond(taken, every) ** 2, axis=0) > ALIKE * free)
+        asked = np.array([new[owner == which].all() for which in range(len(conditions))])
+        fit = _Weighted(residual, variance, taken, every, blocks)
+        p_values, gains = np.full(len(conditions), np.nan), fit.gains(owner, signs)
+        p_values[asked], beyond_chance = _corrected(gains[:, asked])
         if not chosen:
             first = p_values
-        sure = np.flatnonzero(p_values <= CHANCE)
-        if len(sure) == 0:
+        sure = p_values[asked] <= CHANCE
+        if not sure.any():
             break
-        beyond_chance = gains[0, sure] - gains[1:, sure].mean(axis=0)
-        best = int(sure[np.argmax(beyond_chance)])
+        best = int(np.flatnonzero(asked)[np.argmax(np.where(sure, beyond_chance, -np.inf))])
         chosen.append(best)
         p_entry.append(float(p_values[best]))
-        falls.append(float(gains[0, best]))
-    columns = _columns_of(chosen, owner)
-    slopes, covariance = weighted.fit(columns)
+        taken = np.hstack([taken, every[:, owner == best]])
+        before, energy = energy, noise_energy(residual, variance, taken)
+        falls.append(before - energy)
+    columns = np.concatenate([np.flatnonzero(owner == which) for which in (*chosen, -1)])
+    fit = _Weighted(residual, variance, base, every[:, columns], blocks, taken)
+    slopes, covariance = fit.slopes()
     slopes = slopes / scale[columns][:, None]
-    spread = np.repeat(scale[columns], residual.shape[1])
+    spread = np.repeat(scale[columns], m)
     covariance = covariance / np.outer(spread, spread)
     entered = []
     for place, which in enumerate(chosen):
         own = np.flatnonzero(owner[columns] == which)
-        flat = (own[:, None] * residual.shape[1] + np.arange(residual.shape[1])).ravel()
-        entered.append(
-            Dependence(
-                which, slopes[own], covariance[np.ix_(flat, flat)], p_entry[place], falls[place]
-            )
-        )
+        flat = (own[:, None] * m + np.arange(m)).ravel()
+        own_covariance = covariance[np.ix_(flat, flat)]
+        entered.append(Dependence(which, slopes[own], own_covariance, p_entry[place], falls[place]))
     return Dependences(tuple(entered), first)
 
 
-def _columns_of(chosen: list[int], owner: Labels) -> list[int]:
-    """Places of the columns of these conditions, in their order."""
-    return [column for which in chosen for column in np.flatnonzero(owner == which).tolist()]
+def noise_energy(residual: Array, variance: Array, base: Array) -> float:
+    """Square of what a base leaves of the measured components, in variances of the noise."""
+    known = np.isfinite(residual)
+    left = np.where(known, _beyond(base, np.nan_to_num(residual)), 0.0)
+    return float(np.sum(left**2 / variance))
 
 
-def _corrected(gains: Array) -> Array:
-    """Return p-values corrected for the number of conditions, (k,); NaN for no condition at all.
+def _scaled(columns: Array) -> tuple[Array, Array]:
+    """Columns of unit deviation, and their deviations; a constant column stays."""
+    scale = np.sqrt(np.mean((columns - columns.mean(axis=0)) ** 2, axis=0))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    return columns / scale, scale
+
+
+def _corrected(gains: Array) -> tuple[Array, Array]:
+    """Return p-values corrected for the number of conditions, and the gains beyond chance, (k,).
 
     Parameters
     ----------
     gains : (repeats + 1, k) float
         Squares explained; the first row with the signs as they are.
     """
-    alive = np.isfinite(gains[0])
-    p_values = np.full(gains.shape[1], np.nan)
-    if alive.any():
-        # In units of what chance explains, so that wide and narrow conditions compete fairly.
-        chance = gains[1:, alive].mean(axis=0)
-        relative = gains[:, alive] / np.where(chance > 0.0, chance, np.inf)
-        largest = relative[1:].max(axis=1)
-        beaten = np.count_nonzero(largest[:, None] >= relative[0] * (1.0 - 1e-12), axis=0)
-        p_values[alive] = (1.0 + beaten) / (1.0 + len(largest))
-    return p_values
+    if gains.shape[1] == 0:
+        return np.empty(0), np.empty(0)
+    # In units of what chance explains, so that wide and narrow conditions compete fairly.
+    chance = gains[1:].mean(axis=0)
+    relative = gains / np.where(chance > 0.0, chance, np.inf)
+    largest = relative[1:].max(axis=1)
+    beaten = np.count_nonzero(largest[:, None] >= relative[0] * (1.0 - 1e-12), axis=0)
+    return (1.0 + beaten) / (1.0 + len(largest)), gains[0] - chance
 
 
 class _Weighted:
-    """Weighted least squares of every component on columns beyond the base.
+    """Weighted least squares of every component on columns beyond a base.
 
     Parameters
     ----------
-    residual, weights, base, blocks
+    residual, variance, base, blocks
         As for `dependences`.
     every : (n, k) float
-        All columns of all conditions.
+        Columns that are asked.
+    known : (n, p) float, optional
+        What the residual is known to depend on; by default the base.  What it leaves beyond the
+        noise counts as noise.
     """
 
     def __init__(
-        self, residual: Array, weights: Array, base: Array, every: Array, blocks: Labels
+        self,
+        residual: Array,
+        variance: Array,
+        base: Array,
+        every: Array,
+        blocks: Labels,
+        known: Array | None = None,
     ) -> None:
         self._blocks = blocks
         self._n_blocks = int(blocks.max()) + 1
-        self._columns, self._values, self._size = [], [], []
+        self._columns, self._values = [], []
+        measured = np.isfinite(residual)
+        values = np.where(measured, residual, 0.0)
+        left = np.where(measured, _beyond(base if known is None else known, values), 0.0)
+        excess = np.sum(left**2 - variance * measured, axis=0) / np.maximum(measured.sum(axis=0), 1)
+        root = np.where(measured, 1.0 / np.sqrt(variance + np.maximum(excess, 0.0)), 0.0)
         for component in range(residual.shape[1]):
-            known = np.isfinite(residual[:, component])
-            root = np.sqrt(np.where(known, weights[:, component], 0.0))[:, None]
-            flat = np.where(known, residual[:, component], 0.0)[:, None]
-            stacked = root * np.hstack([every, flat])
-            whole = np.linalg.norm(stacked[:, :-1], axis=0)
-            stacked = _beyond(_basis(root * base), stacked)
+            own = root[:, component, None]
+            stacked = own * np.hstack([every, values[:, component, None]])
+            stacked = _beyond(own * base, stacked)
             self._columns.append(stacked[:, :-1])
             self._values.append(stacked[:, -1])
-            self._size.append(whole**2)
 
-    def gains(self, inside: list[int], owner: Labels, signs: Array) -> Array:
-        """Return what each condition explains beyond the columns inside, (repeats + 1, k).
-
-        NaN where nothing of the condition is left.
-        """
-        n_conditions = int(owner.max(initial=-1)) + 1
-        total, alive = np.zeros((len(signs), n_conditions)), np.ones(n_conditions, dtype=bool)
-        seen = np.zeros(n_conditions, dtype=bool)
-        for columns, values, size in zip(self._columns, self._values, self._size, strict=True):
-            taken = _basis(columns[:, inside])
-            beyond, left = _beyond(taken, columns), _beyond(taken, values)
-            moved = signs @ self._per_block(beyond * left[:, None])
-            for which in range(n_conditions):
+    def gains(self, owner: Labels, signs: Array) -> Array:
+        """Return what each condition explains, (repeats + 1, k)."""
+        total = np.zeros((len(signs), int(owner.max(initial=-1)) + 1))
+        for columns, values in zip(self._columns, self._values, strict=True):
+            moved = signs @ self._per_block(columns * values[:, None])
+            for which in range(total.shape[1]):
                 own = np.flatnonzero(owner == which)
-                if not size[own].any():
-                    continue  # this component was never measured
-                gram = beyond[:, own].T @ beyond[:, own]
-                alive[which] &= bool((np.diagonal(gram) > ALIKE * size[own]).all())
-                seen[which] = True
-                total[:, which] += np.sum(moved[:, own] * (moved[:, own] @ _inverse(gram)), axis=1)
-        total[:, ~(alive & seen)] = np.nan
+                inverse = _inverse(columns[:, own].T @ columns[:, own])
+                total[:, which] += np.sum(moved[:, own] * (moved[:, own] @ inverse), axis=1)
         return total
 
-    def fit(self, inside: list[int]) -> tuple[Array, Array]:
-        """Return slopes (k, m) of these columns together and their covariance (k m, k m).
+    def slopes(self) -> tuple[Array, Array]:
+        """Return slopes (k, m) of all columns together and their covariance (k m, k m).
 
         The covariance is that of clustered errors: whatever happens inside a block may be coupled.
         """
-        m = len(self._values)
-        slopes = np.zeros((len(inside), m))
-        moves = np.zeros((self._n_blocks, len(inside), m))
-        for component, (columns, values) in enumerate(
-            zip(self._columns, self._values, strict=True)
-        ):
-            own = columns[:, inside]
+        k, m = self._columns[0].shape[1], len(self._values)
+        slopes, moves = np.zeros((k, m)), np.zeros((self._n_blocks, k, m))
+        for component, (own, values) in enumerate(zip(self._columns, self._values, strict=True)):
             inverse = _inverse(own.T @ own)
             slopes[:, component] = inverse @ (own.T @ values)
             left = values - own @ slopes[:, component]
             moves[:, :, component] = self._per_block(own * left[:, None]) @ inverse
         flat = moves.reshape(self._n_blocks, -1)
         # As many blocks are used up as there are columns.
-        factor = self._n_blocks / max(1, self._n_blocks - len(inside) - 1)
+        factor = self._n_blocks / max(1, self._n_blocks - k - 1)
         return slopes, factor * flat.T @ flat
 
     def _per_block(self, rows: Array) -> Array:
@@ -256,19 +264,17 @@ class _Weighted:
 
 
 def _inverse(gram: Array) -> Array:
+    if gram.shape[0] == 0:
+        return gram
     return np.asarray(np.linalg.pinv(gram, rcond=1e-10, hermitian=True), dtype=np.float64)
 
 
-def _basis(columns: Array) -> Array:
-    """Orthonormal basis of columns (n, k), blind to their scales."""
-    norm = np.linalg.norm(columns, axis=0)
-    columns = columns[:, norm > 0.0] / norm[norm > 0.0]
-    if columns.shape[1] == 0:
-        return np.empty((len(columns), 0))
-    left, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, size > 1e-9 * size[0]])
-
-
-def _beyond(basis: Array, columns: Array) -> Array:
-    beyond: Array = columns - basis @ (basis.T @ columns)
-    return beyond
+def _beyond(base: Array, columns: Array) -> Array:
+    """Columns without their part along a base, whatever the scales of the base."""
+    norm = np.linalg.norm(base, axis=0)
+    base = base[:, norm > 0.0] / norm[norm > 0.0]
+    if base.shape[1] == 0:
+        return columns
+    left, size, _ = np.linalg.svd(base, full_matrices=False)
+    basis = left[:, size > 1e-9 * size[0]]
+    return np.asarray(columns - basis @ (basis.T @ columns))

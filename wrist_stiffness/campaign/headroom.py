@@ -33,7 +33,7 @@ MOST_UNITS_OF_POSE = 24
 def held_out_process(observations: Observations, rng: np.random.Generator) -> Array:
     """Return what a Gaussian process over the conditions leaves of blocks it has not seen.
 
-    Length and signal are those that leave least; a process that helps nowhere leaves all.
+    Length and signal are those that leave least, for each component; all is left if none helps.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def held_out_process(observations: Observations, rng: np.random.Generator) -> Ar
     # One lost beam would tell the process more than all others together.
     told = np.clip(flat, -10.0, 10.0)
     blocks = time_blocks(observations.sessions, min(BLOCKS, observations.n_units))
-    best, least = flat, float(np.sum(told**2))
+    best, least = flat.copy(), np.sum(told**2, axis=0)
     for length in LENGTHS:
         columns = _columns(observations.covariates, length, rng)
         for signal in SIGNALS:
@@ -63,9 +63,9 @@ def held_out_process(observations: Observations, rng: np.random.Generator) -> Ar
                 left[:, same] = _left(
                     columns, flat[:, same], told[:, same], pattern, blocks, signal
                 )
-            energy = float(np.sum(np.clip(left, -10.0, 10.0) ** 2))
-            if energy < least:
-                best, least = left, energy
+            energy = np.sum(np.clip(left, -10.0, 10.0) ** 2, axis=0)
+            better = energy < least
+            best[:, better], least[better] = left[:, better], energy[better]
     return np.where(measured, best * scale, np.nan)
 
 

@@ -125,12 +125,12 @@ def report_of_diagnosis(
     return Page(
         "Which physical effect is missing?",
         f"{', '.join(recordings)}: {shown.observations.n_units} dwells and moments in motion",
-        verdict_of(result),
+        verdict_of(result, quantities),
         tuple(sections),
     )
 
 
-def verdict_of(result: Diagnosis) -> tuple[str, ...]:
+def verdict_of(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
     """Return the answer in a few sentences."""
     found = [_class_of(finding) for finding in result.findings]
     if result.verdict == "none":
@@ -138,6 +138,12 @@ def verdict_of(result: Diagnosis) -> tuple[str, ...]:
     lines = []
     if found:
         lines.append(f"Missing in the model: {'; and '.join(found)}.")
+        falls = [
+            f"{q.name} from {number(result.before[q.key])} to {number(result.after[q.key])} "
+            f"{unit_of(q.unit)} (noise floor {number(result.noise_floor[q.key])})"
+            for q in quantities
+        ]
+        lines.append(f"Adding it changes {' and '.join(falls)}, RMS on the part put aside.")
     if result.verdict == "unknown":
         share = 100.0 * result.unexplained.energy_share
         lines.append(

@@ -28,8 +28,8 @@ def unit_of(unit: str) -> str:
 
 
 def number(value: float) -> str:
-    """Return three significant digits."""
-    return f"{value:.3g}"
+    """Return three significant digits, without an exponent where a person would write none."""
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def against(statement: Statement, models: Sequence[tuple[str, Observations]]) -> Against:

@@ -1,0 +1,261 @@
+"""Floor, headroom, sentences and worst poses on a table made by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.comparison import ComparedModel, Comparison, sizes
+from wrist_stiffness.campaign.contrast_sentences import Told, tell
+from wrist_stiffness.campaign.headroom import held_out_process
+from wrist_stiffness.campaign.noise_floor import (
+    NoiseFloor,
+    by_side,
+    noise_floor,
+    repeatability,
+)
+from wrist_stiffness.campaign.observing import QUANTITIES
+from wrist_stiffness.campaign.worst_poses import worst_poses
+from wrist_stiffness.diagnosis import Observations
+
+N = 400
+SIGMA = np.repeat([1e-6, 1e-4], 3)
+
+
+def table(rng, change=None, n=N):
+    """Random dwells three seconds apart: 1 um and 0.1 mrad of noise in each component."""
+    force, moment = rng.normal(0, 0.6, (n, 3)), rng.normal(0, 0.01, (n, 3))
+    force[::10], moment[::10] = 0.0, 0.0
+    conditions = {
+        **{f"theta_{motor}": rng.uniform(-0.8, 0.8, n) for motor in (1, 2)},
+        **{f"approach_{motor}": rng.choice([-1.0, 1.0], n) for motor in (1, 2)},
+        **{f"speed_{motor}": np.zeros(n) for motor in (1, 2)},
+        **dict(zip(("fx", "fy", "fz"), force.T, strict=True)),
+        **dict(zip(("mx", "my", "mz"), moment.T, strict=True)),
+        "force": np.linalg.norm(force, axis=1),
+        "moment": np.linalg.norm(moment, axis=1),
+        "held_s": rng.uniform(0.5, 20, n),
+        "loaded_at_rest": rng.integers(0, 2, n).astype(float),
+        "time_s": 3.0 * np.arange(n),
+        "T_link_1": 20 + 5 * (1 - np.exp(-np.arange(n) / 150)),
+        "humidity": rng.uniform(30, 70, n),
+    }
+    values = SIGMA * rng.normal(size=(n, 6))
+    if change is not None:
+        values = values + change(conditions)
+    return Observations(
+        values,
+        conditions,
+        np.diag(SIGMA**2),
+        conditions["time_s"],
+        np.zeros(n, dtype=int),
+        quantities=QUANTITIES,
+    )
+
+
+def told(observations, seed=0):
+    return tell(observations, noise_floor(observations), np.random.default_rng(seed))
+
+
+def along(component, values):
+    out = np.zeros((len(values), 6))
+    out[:, component] = values
+    return out
+
+
+def test_noise_depends_on_nothing_and_every_topic_is_named():
+    found = told(table(np.random.default_rng(0)))
+    assert found.statements == ()
+    assert set(found.silent) >= {"approach direction", "load direction", "hold time", "humidity"}
+    assert found.not_varied == ("speed",)
+    assert found.sentences[0].startswith("Nothing depends beyond chance on approach direction")
+
+
+def test_backlash_is_told_as_a_gap_that_grows_with_the_load():
+    def lost_motion(c):
+        return along(2, c["approach_2"] * (1.6e-6 + 1.2e-6 * (c["force"] - c["force"].mean())))
+
+    found = told(table(np.random.default_rng(1), lost_motion))
+    gap, growth = found.statements
+    # 2 * 1.6 um between both sides; two groups of 200 units with 1 um each: 0.1 um.
+    assert gap.condition.name == "approach of motor 2"
+    (change,) = gap.changes
+    assert change.size == pytest.approx(3.2, abs=4 * change.uncertainty)
+    assert change.uncertainty == pytest.approx(0.1, rel=0.4)
+    assert change.where == "+z"
+    assert growth.condition.name == "approach of motor 2 with load"
+    assert growth.changes[0].size == pytest.approx(2.4, abs=4 * growth.changes[0].uncertainty)
+    assert "rather than falling angle, the platform stands 3." in gap.sentence
+    assert "the gap between both approaches of motor 2 grows by" in growth.sentence
+
+
+def change_of(name, component, size):
+    return lambda c: along(component, size * c[name])
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "size"),
+    [
+        (change_of("fy", 1, 2e-6), "fy", 2.0),
+        (change_of("force", 0, 3e-6), "force", 3.0),
+        (change_of("humidity", 2, 0.1e-6), "humidity", 0.1),
+        (lambda c: along(0, 2e-6 * np.log10(c["held_s"])), "hold time", 2.0),
+        (lambda c: along(1, 4e-6 * (c["force"] == 0)), "zero load", 4.0),
+        (
+            lambda c: along(2, 2e-6 * (c["loaded_at_rest"] - 0.5) * (c["force"] > 0)),
+            "loaded at rest",
+            2.0,
+        ),
+        (lambda c: along(0, 1e-6 * c["T_link_1"]), "link 1", 1.0),
+        (lambda c: along(2, 5e-6 * np.cos(4 * c["theta_1"])), "angle of motor 1, four times", 5.0),
+    ],
+    ids=["direction", "size", "covariate", "hold", "zero", "at rest", "temperature", "harmonic"],
+)
+def test_each_kind_of_condition_is_found_first_with_its_size(change, name, size):
+    first = told(table(np.random.default_rng(2), change)).statements[0]
+    assert first.condition.name.startswith(name)
+    (shift,) = (each for each in first.changes if each.quantity == "s")
+    assert shift.size == pytest.approx(size, abs=4 * shift.uncertainty)
+    assert shift.uncertainty < 0.3 * size
+
+
+def test_twins_are_named():
+    def with_twin(c):
+        c["spindle"] = 2 * c["humidity"] + 5
+        return along(0, 0.2e-6 * c["humidity"])
+
+    first = told(table(np.random.default_rng(3), with_twin)).statements[0]
+    assert {first.condition.name, *first.twins} == {"humidity", "spindle"}
+    assert "the same as: " in first.sentence
+
+
+def test_slow_conditions_of_a_short_recording_are_not_told_from_wander():
+    short = table(np.random.default_rng(4), lambda c: along(0, 5e-6 * c["T_link_1"]), n=100)
+    found = told(short)
+    assert "temperature" in found.too_short
+    assert "temperature" not in {each.condition.topic for each in found.statements}
+    assert "10 minutes" in found.sentences[-1]
+
+
+def test_a_process_learns_a_law_of_pose_and_load_down_to_the_noise():
+    def law(c):
+        return along(2, 4e-6 * c["fz"] * np.cos(c["theta_1"]) + 3e-6 * np.sin(2 * c["theta_2"]))
+
+    observations = table(np.random.default_rng(5), law, n=1200)
+    left = observations.with_values(held_out_process(observations, np.random.default_rng(0)))
+    before, after = sizes(observations)["s_um"].rms, sizes(left)["s_um"].rms
+    assert before > 3
+    # The noise of three components of 1 um.
+    assert np.sqrt(3) * 0.97 < after < np.sqrt(3) * 1.15
+
+
+def test_a_process_makes_nothing_of_noise():
+    observations = table(np.random.default_rng(6))
+    left = observations.with_values(held_out_process(observations, np.random.default_rng(0)))
+    before, after = sizes(observations)["s_um"].rms, sizes(left)["s_um"].rms
+    # The best of eight settings may look better by chance, by less than one unit in fifty.
+    assert 0.98 * before < after <= before
+
+
+def test_blanks_stay_blanks_in_what_a_process_leaves():
+    observations = table(np.random.default_rng(7), change_of("fz", 2, 3e-6))
+    values = observations.values.copy()
+    values[::3, 3:], values[:, 0] = np.nan, np.nan
+    left = held_out_process(observations.with_values(values), np.random.default_rng(0))
+    np.testing.assert_array_equal(np.isnan(left), np.isnan(values))
+    assert np.nanstd(left[:, 2]) < 0.7 * np.std(values[:, 2])
+
+
+def repeated(rng, extra):
+    """Pairs of dwells, half of them approached from both sides."""
+    observations = table(rng)
+    label = np.arange(N) // 4
+    shared = extra * rng.normal(size=(N // 4, 6))[label]
+    return replace(
+        observations,
+        values=observations.values * 2 + shared,
+        replicate=label,
+    )
+
+
+def test_floor_comes_from_dwells_that_repeat_each_other():
+    observations = repeated(np.random.default_rng(8), 30e-6)
+    floor = noise_floor(observations)
+    assert floor.source == "replicates"
+    # Twice the stated 1 um, in three components; 100 groups of 4 tell it to a few per cent.
+    assert floor.rms(observations)["s_um"] == pytest.approx(2 * np.sqrt(3), rel=0.12)
+
+
+def test_floor_without_repeats_is_the_instruments_own():
+    observations = table(np.random.default_rng(9))
+    floor = noise_floor(observations)
+    assert floor.source == "instrument"
+    assert floor.rms(observations)["s_um"] == pytest.approx(np.sqrt(3), rel=1e-9)
+
+
+def test_floor_without_any_word_of_the_instrument_is_what_nothing_predicts():
+    observations = replace(table(np.random.default_rng(10)), covariance=None)
+    floor = noise_floor(observations)
+    assert floor.source == "unpredictable"
+    assert floor.rms(observations)["s_um"] == pytest.approx(sizes(observations)["s_um"].rms)
+
+
+def test_lost_motion_shows_in_repeats_from_any_side_only():
+    rng = np.random.default_rng(11)
+    observations = repeated(rng, 0.0)
+    gap = along(2, 10e-6 * observations.covariates["approach_1"])
+    observations = observations.with_values(observations.values + gap)
+    assert repeatability(observations)["s_um"] > 9
+    assert repeatability(by_side(observations))["s_um"] == pytest.approx(2 * np.sqrt(3), rel=0.15)
+
+
+def test_uncertainty_of_an_error_is_its_scatter_over_repetitions():
+    draws = [sizes(table(rng))["s_um"] for rng in np.random.default_rng(12).spawn(60)]
+    scatter = np.std([each.rms for each in draws], ddof=1)
+    assert np.mean([each.uncertainty for each in draws]) == pytest.approx(scatter, rel=0.3)
+
+
+def compared(levels, process):
+    rng = np.random.default_rng(13)
+    noise = table(rng)
+    quiet = Told((), (), {}, (), ())
+    models = tuple(
+        ComparedModel(f"m{place}", noise, noise.with_values(noise.values * level), (), quiet)
+        for place, level in enumerate(levels)
+    )
+    floor = NoiseFloor(np.broadcast_to(SIGMA**2, (N, 6)), "instrument")
+    unit = sizes(noise)
+    left = {key: process * size.rms for key, size in unit.items()}
+    return Comparison(("day",), models, floor, {}, {}, left)
+
+
+def test_headroom_is_the_share_of_what_could_fall():
+    found = compared((10.0, 4.0, 1.0), 1.0)
+    assert found.headroom(found.models[1], "s_um") == pytest.approx(6 / 9)
+    assert found.headroom(found.models[2], "phi_mdeg") == pytest.approx(1.0)
+    assert "67 %" in compared((10.0, 4.0), 1.0).verdict[-1]
+
+
+def test_no_headroom_is_claimed_where_nothing_could_fall():
+    found = compared((1.0, 0.99), 0.995)
+    assert found.headroom(found.models[1], "s_um") is None
+
+
+def test_verdict_says_whether_it_is_noise():
+    found = compared((5.0, 1.0), 1.0)
+    assert "5.1 x the noise" in found.verdict[0] or "5.0 x the noise" in found.verdict[0]
+    assert "no more than the noise" in found.verdict[1]
+
+
+def test_worst_poses_are_apart_and_in_order():
+    rng = np.random.default_rng(14)
+    observations = table(rng)
+    values = observations.values.copy()
+    values[100, 2], values[200, 4], values[300, 0] = 50e-6, 3e-3, 20e-6
+    floor = {"s_um": 1.7, "phi_mdeg": 9.9}
+    worst = worst_poses(observations.with_values(values), floor, ("day",), most=3)
+    assert [each.time_s for each in worst] == [300, 600, 900]
+    assert worst[0].errors["s_um"] == pytest.approx(50, rel=0.05)
+    assert worst[1].errors["phi_mdeg"] == pytest.approx(np.degrees(3e-3) * 1e3, rel=0.05)
+    close = replace(observations.with_values(values), time_s=0.001 * np.arange(N))
+    assert len(worst_poses(close, floor, ("day",), most=3)) == 1
