@@ -2,8 +2,7 @@
 
 Both are processes of their own and get the same JointState, one at a time, in alternating blocks;
 the echo node answers with an empty PoseWithCovarianceStamped of the same stamp.  A second echo node
-shows what the comparison can resolve.  Then the predictor gets a steady stream, 1 kHz if not told
-otherwise, and losses are counted.
+shows what the comparison can resolve.  `bench/ros_endurance.py` sends a steady stream instead.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import os
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -79,6 +79,7 @@ class Probe:
         )
         self.answered: dict[int, float] = {}
         self.inputs = {}
+        self.sent: Counter[str] = Counter()
         self.stamp_ns = SECOND
 
     def connect(self, name: str, in_topic: str, out_topic: str) -> None:
@@ -112,6 +113,7 @@ class Probe:
             self.load.publish(wrench_message(self.stamp_ns, "wrist_base", DOWN))
         message = joint_message(self.stamp_ns, "", NAMES, theta)
         message.header.stamp = time_message(self.stamp_ns)
+        self.sent[name] += 1
         start = time.perf_counter()
         self.inputs[name].publish(message)
         return self.stamp_ns, start
@@ -146,29 +148,35 @@ def interval(values: np.ndarray, rng: np.random.Generator) -> str:
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--blocks", type=int, default=20)
     parser.add_argument("--pings", type=int, default=100, help="per block and node")
-    parser.add_argument("--seconds", type=float, default=10.0, help="of the stream")
-    parser.add_argument("--rate", type=float, default=1000.0, help="of the stream [Hz]")
     parser.add_argument("--echo", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.echo:
         echo(options.echo)
         return
     with (
-        process(__file__, "--echo", "echo_1"),
-        process(__file__, "--echo", "echo_2"),
+        process(__file__, "--echo", "echo_1") as echo_1,
+        process(__file__, "--echo", "echo_2") as echo_2,
         process("-m", "wrist_stiffness.ros.pose_error_predictor") as predictor,
     ):
+        nodes = {"echo_1": echo_1, "echo_2": echo_2, "predictor": predictor}
         probe = Probe()
         for name in ("echo_1", "echo_2"):
             probe.connect(name, f"/{name}/in", f"/{name}/out")
         probe.connect("predictor", "/joint_states", "/pose_error_predicted")
         probe.load_the_wrist()
+        cpu = {name: cpu_seconds(running.pid) for name, running in nodes.items()}
         round_trips(probe, options.blocks, options.pings)
-        endurance(probe, predictor.pid, options.seconds, options.rate)
+        print(
+            "processor time per answer [us]: "
+            + ", ".join(
+                f"{name} {1e6 * (cpu_seconds(running.pid) - cpu[name]) / probe.sent[name]:.0f}"
+                for name, running in nodes.items()
+            )
+        )
 
 
 def round_trips(probe: Probe, blocks: int, pings: int) -> None:
@@ -188,26 +196,6 @@ def round_trips(probe: Probe, blocks: int, pings: int) -> None:
         ratio = np.median(medians[name] / medians["echo_1"])
         p99 = interval(values[~np.isnan(values)], rng)
         print(f"{name:12} {np.nanmedian(values):8.0f}   {p99:>26} {lost:6d}   {ratio:8.3f}")
-
-
-def endurance(probe: Probe, pid: int, seconds: float, rate_hz: float) -> None:
-    """Send a steady stream and count what does not come back."""
-    probe.answered.clear()
-    count = round(rate_hz * seconds)
-    cpu, memory, start = cpu_seconds(pid), memory_mb(pid), time.perf_counter()
-    for i in range(count):
-        while time.perf_counter() < start + i / rate_hz:
-            probe.executor.spin_once(timeout_sec=0.0)
-        probe.send("predictor")
-    wall = time.perf_counter() - start
-    end = time.perf_counter() + 3.0
-    while len(probe.answered) < count and time.perf_counter() < end:
-        probe.executor.spin_once(timeout_sec=0.05)
-    cpu = cpu_seconds(pid) - cpu
-    print(
-        f"{rate_hz:g} Hz for {wall:.1f} s: {count - len(probe.answered)} of {count} lost, "
-        f"{100 * cpu / wall:.0f} % of a core, memory {memory:.1f} -> {memory_mb(pid):.1f} MB"
-    )
 
 
 if __name__ == "__main__":

@@ -64,6 +64,35 @@ def test_a_best_effort_planner_is_not_heard_for_a_command_must_not_be_lost(graph
     assert lossy.get_subscription_count() == 0
 
 
+@pytest.mark.parametrize(
+    ("node", "topic", "answer", "kind", "waiting"),
+    [
+        (
+            PoseErrorPredictor,
+            "/joint_states",
+            "/pose_error_predicted",
+            PoseWithCovarianceStamped,
+            1000,
+        ),
+        (AngleCorrector, "/motor_commands", "/motor_commands_corrected", JointState, 50),
+    ],
+    ids=["a second of joint states", "50 ms of commands"],
+)
+def test_what_comes_while_a_node_is_held_up_is_answered(
+    graph, model_path, node, topic, answer, kind, waiting
+):
+    graph.add(node, model_file=str(model_path))
+    load = publisher(graph, WrenchStamped, "/load_estimate", RELIABLE)
+    inputs = publisher(graph, JointState, topic, QoSProfile(depth=waiting))
+    heard, _ = listener(graph, kind, answer, QoSProfile(depth=waiting))
+    load.publish(wrench_message(SECOND, "wrist_base", DOWN))
+    # Nothing spins meanwhile.
+    for i in range(waiting):
+        inputs.publish(joint_message(SECOND + i, "", NAMES, THETA))
+    graph.until(lambda: len(heard) == waiting, "every answer")
+    assert [message.header.stamp.nanosec for message in heard] == list(range(waiting))
+
+
 def test_the_alarm_reaches_a_listener_that_comes_later(graph, model_path, model):
     node = graph.add(ModelMonitor, model_file=str(model_path), baseline_samples=2)
     load = publisher(graph, WrenchStamped, "/load_estimate", RELIABLE)

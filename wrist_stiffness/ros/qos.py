@@ -2,13 +2,14 @@
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Sensors in: hears reliable and best-effort drivers; 0.2 s of a 1 kHz stream may wait."""
+SENSOR_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Sensors in: hears reliable and best-effort drivers; a second of a 1 kHz stream may wait."""
 
-COMMAND_QOS = QoSProfile(depth=10)
-"""Commands in: reliable, but a corrector that cannot keep up drops old ones and does not lag."""
+COMMAND_QOS = QoSProfile(depth=50)
+"""Commands in: reliable.  50 ms of a 1 kHz stream may wait for a corrector that is held up; one
+that cannot keep up drops older ones, so that it does not lag further."""
 
-RELIABLE_QOS = QoSProfile(depth=200)
+RELIABLE_QOS = QoSProfile(depth=1000)
 """Everything out."""
 
 ALARM_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
