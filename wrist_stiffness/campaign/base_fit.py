@@ -184,13 +184,15 @@ def fit_base(
         for name, effect in added.items()
         if name not in usual
     ]
-    problem = BaseProblem(model.with_effects(*held), sessions, (*widened, *more), model)
+    whole = model.with_effects(*held)
+    bare = BaseProblem(whole, sessions, tuple(widened), model)
+    problem = BaseProblem(whole, sessions, (*widened, *more), model)
     z = _start(problem, start)
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
     for _ in range(MOST_STEPS):
-        columns = problem.columns(z)
+        columns = _columns(problem, bare, z)
         left = problem.whiten(residual)
         scale = 1.0 if extras else _robust_variance(left)
         step = _step(problem.whiten(columns), left, z * weights, weights, scale)
@@ -209,7 +211,23 @@ def fit_base(
         if before - after < ENOUGH * before:
             break
     cost = _cost(problem.whiten(residual), z, weights, 1.0)
-    return BaseFit(problem, z, residual, problem.columns(z), tuple(added), cost)
+    return BaseFit(problem, z, residual, _columns(problem, bare, z), tuple(added), cost)
+
+
+def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
+    """Return the columns of the base, as if no extras were there, and those of the extras.
+
+    What the extras do to the base's columns is of second order; play and friction would be solved
+    again for each of them.
+    """
+    of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
+    of_extras = [place for place, u in enumerate(problem.unknowns) if u.free >= len(bare.free)]
+    first = bare.columns(z[of_bare])
+    columns = np.zeros((*first.shape[:2], len(z)))
+    columns[:, :, of_bare] = first
+    if of_extras:
+        columns[:, :, of_extras] = problem.columns(z, places=of_extras)
+    return columns
 
 
 def _moving(effect: Effect) -> list[str]:

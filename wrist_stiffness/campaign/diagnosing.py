@@ -1,4 +1,4 @@
-"""Which physical effect is missing in a model of this wrist?
+"""Find the physical effects that are missing in a model of this wrist.
 
 The statistics are linear, the wrist is not: so the point about which its effects become columns is
 sought first, by fits of the leading candidates with their own laws, the base along with them.
@@ -15,7 +15,7 @@ from wrist_stiffness.campaign.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, UnitSession, as_units
-from wrist_stiffness.campaign.screening import MOST_FITTED, Fitted, Screen
+from wrist_stiffness.campaign.screening import MOST_FITTED, Screen
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
@@ -85,10 +85,7 @@ def diagnose_sessions(
     if not sessions:
         raise InputError("no session to diagnose")
     units = tuple(as_units(model, session) for session in sessions)
-    base, near = seek_point(model, units, progress)
-    candidates = wrist_candidates(
-        _point(base, with_extras=False), _absent(model, base), near, progress
-    )
+    base, candidates = seek_point(model, units, progress)
     observed = base.without_extras()
     result = diagnose(
         _table(base, observed),
@@ -104,49 +101,56 @@ def diagnose_sessions(
 
 def seek_point(
     model: ErrorModel, units: tuple[UnitSession, ...], progress: Progress
-) -> tuple[BaseFit, dict[str, Mapping[str, float]]]:
-    """Return the base fitted along with whatever effects make a difference, and their values."""
+) -> tuple[BaseFit, tuple[WristCandidate, ...]]:
+    """Return the base, fitted along with effects that make a difference, and the catalogue there.
+
+    The catalogue is evaluated about the base alone; an effect found has its columns at its values.
+    """
     base = fit_base(model, units)
-    near: dict[str, Mapping[str, float]] = {}
+    absent = _absent(base)
+    candidates = wrist_candidates(_point(base), absent, {}, progress)
     extras: tuple[Effect, ...] = ()
     while len(extras) < MOST_EXTRAS:
-        point = _point(base)
-        taken = {*_absent(model, base), *(each.name for each in extras)}
-        screen = Screen(base, point)
-        leaders = screen.leaders(wrist_candidates(point, taken, {}, progress))
+        screen = Screen(base, _point(base))
+        taken = {each.name for each in extras}
+        leaders = screen.leaders([each for each in candidates if each.name not in taken])
         chosen = [each for each in leaders if each[0] > max(WORTH, LEADING * leaders[0][0])]
         fits = [screen.fitted(candidate, shape) for _, candidate, shape in chosen[:MOST_FITTED]]
         if not fits:
             break
         best = max(fits, key=lambda each: each.gain)
-        trial = fit_base(model, units, (*extras, _effect(best)), base)
+        trial = fit_base(model, units, (*extras, best.effect), base)
         if base.cost - trial.cost < WORTH:
             break
         base, extras = trial, _fitted_extras(trial)
+        candidates = wrist_candidates(_point(base), absent, _near(model, extras), progress)
+    return base, candidates
+
+
+def _near(model: ErrorModel, extras: tuple[Effect, ...]) -> dict[str, Mapping[str, float]]:
+    """Return the values found, of effects that are no part of the base."""
     usual = {each.effect.name for each in free_base(model)[0]}
-    for each in extras:
-        if each.name not in usual:
-            near[each.name] = {key: own.value for key, own in each.estimates.items()}
-    return base, near
-
-
-def _effect(fitted: Fitted) -> Effect:
-    return fitted.candidate.effect_of(fitted.values)
+    return {
+        each.name: {key: own.value for key, own in each.estimates.items()}
+        for each in extras
+        if each.name not in usual
+    }
 
 
 def _fitted_extras(base: BaseFit) -> tuple[Effect, ...]:
     return tuple(each for each in base.effects(0) if each.name in base.extras)
 
 
-def _point(base: BaseFit, with_extras: bool = True) -> Point:
+def _point(base: BaseFit) -> Point:
+    """Return the fitted base, without the effects fitted along."""
     sessions = base.problem.sessions
     used = tuple(
         np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1) for each in sessions
     )
-    return Point(tuple(base.model(n, with_extras) for n in range(len(sessions))), used)
+    return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
 
 
-def _absent(model: ErrorModel, base: BaseFit) -> set[str]:
+def _absent(base: BaseFit) -> set[str]:
     """Return effects that the model holds fast: a second one of the name cannot be added."""
     return {effect.name for effect in base.problem.model.effects}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -150,19 +150,32 @@ class FitProblem:
             ]
         )
 
-    def columns(self, z: Array) -> Array:
+    def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
         By one-sided differences, away from the nearer bound.  Where neither the parameter's effect
         nor the step needs the path, effects with a memory are left out of the difference: that is
         far quicker, and good enough for the slope.
+
+        Parameters
+        ----------
+        z : (p,) float
+            Steps from the prior means.
+        places : collection of int, optional
+            Which unknowns are asked for; all by default.
+
+        Returns
+        -------
+        (u, 6, p or number of places) array
+            In the order of `places`.
         """
+        asked = range(len(self.unknowns)) if places is None else places
         step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
         blocks = []
         for number, model in enumerate(self._models):
             base = (*self.model.effects, *self.effects(z, number))
             quick = tuple(effect for effect in base if not model.remembers((effect,)))
-            moved = [place for place, u in enumerate(self.unknowns) if u.session in (None, number)]
+            moved = [p for p in asked if self.unknowns[p].session in (None, number)]
             tried, reference = [base, quick], []
             for place in moved:
                 other = z.copy()
@@ -183,7 +196,7 @@ class FitProblem:
             for place, which, other in zip(moved, reference, others, strict=True):
                 twist = references[0] + (other - references[which])
                 block[:, :, place] = np.nan_to_num((session.residual(twist) - first) / step[place])
-            blocks.append(block)
+            blocks.append(block[:, :, list(asked)])
         return self._rows(blocks)
 
     @cached_property

@@ -1,7 +1,7 @@
 """How each law of the catalogue becomes columns: which trials, at which shapes.
 
-A law is linear in some parameters and not in others.  The linear ones become columns by differences;
-the others are a grid of shapes.  A few laws need other coordinates: a mass and its place are linear
+A law is linear in some parameters and not in others.  The linear ones become columns by
+differences; the others are a grid of shapes.  A few laws need other coordinates: a mass and its place are linear
 as a mass and its first moment; a gap, a hardening or a friction is a shape times a share.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from wrist_stiffness.diagnosis import ShapeParameter
 from wrist_stiffness.diagnosis import Parameter as Factor
+from wrist_stiffness.diagnosis import ShapeParameter
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.parameters import Estimate, Parameter
@@ -101,7 +101,7 @@ def recipe(
 
 
 def plain(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
-    """Differences in the linear parameters, grids in those of `GRIDS`, the tangent in the rest."""
+    """Return differences in most parameters at the points of the grids of the others."""
     parameters = law.parameters(place)
     gridded = [p for p in parameters if p.key in GRIDS and not _idle(p.key, place, signals)]
     other = [p for p in parameters if p.key not in GRIDS]
@@ -181,7 +181,7 @@ MASS_G, ARM_MM = 10.0, 10.0
 
 
 def weight(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
-    """A mass and its first moment, and the tilt of the base."""
+    """Return columns of a mass and its first moment, and of the tilt of the base."""
     own = {p.key: p for p in law.parameters(place)}
     zero = dict.fromkeys(own, 0.0)
     heavy = zero | {"mass_g": MASS_G}
@@ -208,7 +208,7 @@ PLATE_MM = -12.0
 
 
 def moving_mass(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
-    """A moving mass at the plate, the change of its place, and a round inertia."""
+    """Return columns of a mass moving at the plate, of its place, and of a round inertia."""
     own = {p.key: p for p in law.parameters(place)}
     at_plate = {"mass_g": 50.0, "x_mm": 0.0, "y_mm": 0.0, "z_mm": PLATE_MM, "inertia_gmm2": 0.0}
     nothing = at_plate | {"mass_g": 0.0}

@@ -7,7 +7,7 @@ their own law, the base to first order, before one is chosen to be fitted with a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from wrist_stiffness.campaign.base_fit import BaseFit
 from wrist_stiffness.campaign.candidates import Point, WristCandidate
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
 
 MOST_FITTED = 8
 """So many leaders are fitted with their own law."""
@@ -41,6 +42,11 @@ class Fitted:
     candidate: WristCandidate
     values: Mapping[str, float]
     gain: float
+
+    @property
+    def effect(self) -> Effect:
+        """The effect with these values."""
+        return self.candidate.effect_of(self.values)
 
 
 class Screen:
@@ -83,7 +89,7 @@ class Screen:
         return self.beyond(np.vstack([white, priors]))
 
     def leaders(
-        self, candidates: tuple[WristCandidate, ...]
+        self, candidates: Sequence[WristCandidate]
     ) -> list[tuple[float, WristCandidate, tuple[float, ...]]]:
         """Return the gain by columns of each candidate at its best shape, largest first."""
         found = []
