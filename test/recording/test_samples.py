@@ -80,6 +80,28 @@ def test_rows_equal_the_messages_over_many_blocks(tmp_path):
     assert samples.faults == ()
 
 
+def test_rows_come_in_the_order_of_reception_whatever_that_of_the_file(tmp_path):
+    received = [5, 1, 3, 1, 4]
+    entries = [
+        ("/joint_states", log_time, joint_state(stamp, (0.1 * stamp, 0.0)))
+        for stamp, log_time in enumerate(received, 1)
+    ]
+    samples = samples_of(tmp_path, entries)
+    assert samples.joints.log_time_ns.tolist() == sorted(received)
+    assert samples.joints.time_ns.tolist() == [2, 4, 3, 5, 1]
+
+
+def test_topics_that_are_not_needed_stay_unread(tmp_path):
+    entries = [
+        ("/joint_states", 1, joint_state(1, (0.1, 0.2))),
+        ("/commands", 1, joint_state(1, (0.1, 0.2))),
+    ]
+    remaps = {"/motor_commands": "/commands"}
+    samples = samples_of(tmp_path, entries, remaps=remaps, without=("/motor_commands",))
+    assert len(samples.joints.time_ns) == 1
+    assert len(samples.commands.time_ns) == 0
+
+
 def test_names_of_joints_and_topics_can_be_given(tmp_path):
     entries = [("/robot/js", 1, joint_state(1, (1.0, 2.0), ("b", "a")))]
     samples = samples_of(

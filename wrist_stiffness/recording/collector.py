@@ -198,9 +198,16 @@ class Collector:
 
     def rows(self) -> Rows:
         """Return all rows in the order of reception, an empty dict without any."""
+        if not self.blocks:
+            return {}
         if len(self.blocks) > 1:
             self.blocks = [_joined(self.blocks)]
-        return self.blocks[0] if self.blocks else {}
+        rows = self.blocks[0]
+        if np.any(np.diff(rows["log_time_ns"]) < 0):
+            received = np.argsort(rows["log_time_ns"], kind="stable")
+            rows = {key: value[received] for key, value in rows.items()}
+            self.blocks = [rows]
+        return rows
 
     def faults(self) -> list[Fault]:
         """Return what was wrong, one entry for each kind."""

@@ -15,7 +15,12 @@ import yaml
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.channel import Channel
-from wrist_stiffness.recording.mcap_chunk import Chunk, StoredMessage, messages_in
+from wrist_stiffness.recording.mcap_chunk import (
+    Chunk,
+    StoredMessage,
+    messages_in,
+    payloads_in,
+)
 from wrist_stiffness.recording.mcap_index import McapIndex, Span, index_mcap
 from wrist_stiffness.recording.messages import Message
 
@@ -144,6 +149,40 @@ class Recording:
                 heapq.heapreplace(opened, following)
             else:
                 heapq.heappop(opened)
+
+    def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, list[int], list[bytes]]]:
+        """Iterate over the payloads of topics, many of one topic at a time.
+
+        Parameters
+        ----------
+        topics : Collection[str]
+            Names.
+
+        Yields
+        ------
+        tuple[str, list[int], list[bytes]]
+            Topic, log times [ns] and payloads, in the order of the file.
+
+        Raises
+        ------
+        RecordingError
+            If the recording was opened as strict and a chunk is damaged.
+        """
+        for index in self._indices:
+            wanted = {
+                number: channel.topic
+                for number, channel in index.channels.items()
+                if channel.topic in topics
+            }
+            for chunk in index.chunks:
+                try:
+                    found = payloads_in(chunk, wanted)
+                except RecordingError as error:
+                    self._report(f"{error}, its messages are left out")
+                    continue
+                for number, (log_times, payloads) in found.items():
+                    if payloads:
+                        yield wanted[number], log_times, payloads
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:
         """Iterate over the decoded messages in log-time order.

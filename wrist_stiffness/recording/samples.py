@@ -48,8 +48,6 @@ from wrist_stiffness.recording.reader import Recording
 TextArray = NDArray[np.str_]
 
 DEFAULT_JOINTS = ("motor_1_joint", "motor_2_joint")
-# Payloads held at a time before they become arrays.
-_BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -166,16 +164,8 @@ def read_samples(
         for topic, collector in _collectors_of(recording, remaps, tuple(joints)).items()
         if topic not in {remaps.get(standard, standard) for standard in without}
     }
-    pending: dict[str, tuple[list[int], list[bytes]]] = {name: ([], []) for name in collectors}
-    for channel, log_time_ns, payload in recording.raw_messages(collectors.keys()):
-        log_times, payloads = pending[channel.topic]
-        log_times.append(log_time_ns)
-        payloads.append(payload)
-        if len(payloads) == _BLOCK:
-            collectors[channel.topic].add(log_times, payloads)
-            pending[channel.topic] = ([], [])
-    for name, (log_times, payloads) in pending.items():
-        collectors[name].add(log_times, payloads)
+    for topic, log_times, payloads in recording.payloads(collectors.keys()):
+        collectors[topic].add(log_times, payloads)
 
     def of(standard: str) -> Rows:
         collector = collectors.get(remaps.get(standard, standard))
