@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from wrist_stiffness.campaign.design_signatures import Signature
-from wrist_stiffness.campaign.design_timeline import Timeline
+from wrist_stiffness.campaign.design_timeline import Experiment
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 
@@ -93,9 +93,16 @@ class Layout:
     columns: dict[str, NDArray[np.intp]]
     truths: dict[str, NDArray[np.intp]]
 
+    def scaled(self, grams: Array, factors: Mapping[str, float]) -> Array:
+        """Return Gram matrices (..., q, q) with the truths of some effects times a factor."""
+        size = np.ones(grams.shape[-1])
+        for name, factor in factors.items():
+            size[len(self.prior) + self.truths[name]] = factor
+        return size[:, None] * grams * size
+
 
 def whitened(
-    timeline: Timeline, twists: Array, table: Table, noise: MeasurementNoise
+    experiment: Experiment, twists: Array, table: Table, noise: MeasurementNoise
 ) -> list[Array]:
     """Whiten columns visit by visit.
 
@@ -104,7 +111,7 @@ def whitened(
 
     Parameters
     ----------
-    timeline : Timeline
+    experiment : Experiment
         With r observed rows.
     twists : (n, 6, p) float
         Columns at all samples of the path [m, rad].
@@ -119,14 +126,14 @@ def whitened(
         By visit.
     """
     mechanism = table.mechanism
-    theta = timeline.block.theta[timeline.rows]
+    theta = experiment.block.theta[experiment.rows]
     jacobian = np.zeros((len(theta), 6, 2))
     jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
     jacobian *= noise.encoder_step / np.sqrt(12.0)
     found = []
-    for number in range(int(timeline.visit.max()) + 1):
-        rows = np.flatnonzero(timeline.visit == number)
-        moving = timeline.moving[rows]
+    for number in range(int(experiment.visit.max()) + 1):
+        rows = np.flatnonzero(experiment.visit == number)
+        moving = experiment.moving[rows]
         size = np.where(moving, MOTION_NOISE, 1.0)
         covariance = np.diag((size[:, None] * noise.white).ravel() ** 2)
         # In motion every sample has a count of its own.
@@ -136,7 +143,7 @@ def whitened(
             shared[group] = jacobian[rows[group]]
             flat = shared.reshape(-1, 2)
             covariance += flat @ flat.T
-        values = twists[timeline.rows[rows]].reshape(6 * len(rows), -1)
+        values = twists[experiment.rows[rows]].reshape(6 * len(rows), -1)
         found.append(np.linalg.solve(np.linalg.cholesky(covariance), values))
     return found
 
@@ -164,14 +171,11 @@ class Information:
 
     def scaled(self, factors: Mapping[str, float]) -> Information:
         """Return the same with the truths of some effects times a factor."""
-        size = np.ones(self.grams.shape[-1])
-        for name, factor in factors.items():
-            size[len(self.layout.prior) + self.layout.truths[name]] = factor
-        return Information(size[:, None] * self.grams * size, self.layout)
+        return Information(self.layout.scaled(self.grams, factors), self.layout)
 
 
 def information(
-    timeline: Timeline,
+    experiment: Experiment,
     nuisances: Sequence[Signature],
     free: Sequence[str],
     effects: Sequence[Signature],
@@ -182,7 +186,7 @@ def information(
 
     Parameters
     ----------
-    timeline : Timeline
+    experiment : Experiment
         The experiment.
     nuisances : sequence of Signature
         Refitted whatever is asked.
@@ -217,8 +221,33 @@ def information(
             names[each.name] = np.arange(at, at + values.shape[2])
             at += values.shape[2]
     stacked = np.concatenate(blocks, axis=2)
-    grams = [rows.T @ rows for rows in whitened(timeline, stacked, table, noise)]
+    grams = [rows.T @ rows for rows in whitened(experiment, stacked, table, noise)]
     return Information(np.array(grams), Layout(np.array(prior), groups, columns, truths))
+
+
+def carried_over(known: Information, names: Sequence[str]) -> Array:
+    """Return what an experiment tells for another one in which some nuisances are set anew.
+
+    Parameters
+    ----------
+    known : Information
+        Of the earlier experiment.
+    names : sequence of str
+        Nuisances that are refitted in each.
+
+    Returns
+    -------
+    (q, q) float
+        Gram matrix, zero for those nuisances.
+    """
+    gram, layout = known.total, known.layout
+    own = np.concatenate([layout.nuisances[name] for name in names if name in layout.nuisances])
+    rest = np.setdiff1d(np.arange(len(gram)), own)
+    inner = gram[np.ix_(own, own)] + np.diag(layout.prior[own])
+    cross = gram[np.ix_(own, rest)]
+    left = np.zeros_like(gram)
+    left[np.ix_(rest, rest)] = gram[np.ix_(rest, rest)] - cross.T @ np.linalg.solve(inner, cross)
+    return left
 
 
 def beyond_nuisances(gram: Array, layout: Layout) -> Array:

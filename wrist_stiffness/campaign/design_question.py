@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,14 +19,18 @@ SESSION = (
     "encoder_offset@motor_1",
     "encoder_offset@motor_2",
 )
-"""Free in every session; the tare of the load sensor is known to its plausible size."""
+"""Of which nothing is known in a session."""
+
+TARE = "load_bias@load_sensor"
+"""Set anew in every session as well, but known to its plausible size."""
 
 WRIST = (
-    "load_bias@load_sensor",
+    TARE,
     *(f"axis_misalignment@joint_{i}" for i in range(1, 6)),
     *(f"link_stiffness@link_{i}" for i in range(1, 4)),
     *(f"bushing_stiffness@joint_{i}" for i in range(1, 6)),
 )
+"""Known to their plausible sizes."""
 
 TRUTHS = 2
 """Plausible sets of values at which an effect with several parameters is planned for."""
@@ -56,6 +60,14 @@ class Question:
     free: tuple[str, ...]
     goals: tuple[Goal, ...] | None = None
     alike: tuple[tuple[str, ...], ...] = ()
+
+    def without(self, names: Collection[str]) -> Question:
+        """Return the same without some of the effects."""
+        goals = self.goals
+        if goals is not None:
+            goals = tuple(g for g in goals if g.truth not in names and g.rival not in names)
+        effects = tuple(sets for sets in self.effects if sets[0].name not in names)
+        return replace(self, effects=effects, goals=goals)
 
 
 def effect_named(name: str) -> Effect:

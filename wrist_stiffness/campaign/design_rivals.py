@@ -80,8 +80,9 @@ def read_rivals(path: str | Path) -> Rivals:
     if schema != SCHEMA:
         raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
     floor = root.block("noise_floor")
-    sizes = floor.number("s_um", 1e-6, above=0.0), floor.number(
-        "phi_mdeg", np.pi / 180e3, above=0.0
+    sizes = (
+        floor.number("s_um", 1e-6, above=0.0),
+        floor.number("phi_mdeg", np.pi / 180e3, above=0.0),
     )
     classes = tuple(_members(block) for block in _blocks(root, "findings"))
     silent = (_effect(block) for block in _blocks(root, "not_excited"))

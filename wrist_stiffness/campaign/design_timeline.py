@@ -102,8 +102,30 @@ class Dwell:
 
 
 @dataclass(frozen=True, eq=False)
-class Timeline:
-    """An experiment.
+class Experiment:
+    """What is measured along a path.
+
+    Parameters
+    ----------
+    block : Block
+        n samples of the path that laws with memory need, the observed ones among them.
+    rows : (r,) int
+        Observed samples.
+    visit : (r,) int
+        Approach to a pose that each belongs to.
+    moving : (r,) bool
+        Whether it is observed in motion.
+    """
+
+    block: Block
+    rows: NDArray[np.intp]
+    visit: NDArray[np.intp]
+    moving: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline(Experiment):
+    """A planned experiment.
 
     Parameters
     ----------
@@ -112,24 +134,12 @@ class Timeline:
     knots : tuple of (float, (2,) float, (6,) float)
         Time [s], motor angles [rad] and wrench at O in F [N, N m] between which motors move and
         loads change by minimum jerk.
-    block : Block
-        Samples of the path that laws with memory need, the observed ones among them.
-    rows : (r,) int
-        Observed samples.
-    visit : (r,) int
-        Visit that each belongs to.
-    moving : (r,) bool
-        Whether it is observed in motion.
     ends : (v,) float
         When each visit is over [s].
     """
 
     dwells: tuple[Dwell, ...]
     knots: tuple[tuple[float, Array, Array], ...]
-    block: Block
-    rows: NDArray[np.intp]
-    visit: NDArray[np.intp]
-    moving: NDArray[np.bool_]
     ends: Array
 
     @property
@@ -263,7 +273,7 @@ class _Clock:
             )
         )
         knots = tuple((time[i], angles[i], wrench[i]) for i in self._knots)
-        return Timeline(dwells, knots, block, rows, visit, moving, np.array(self._ends))
+        return Timeline(block, rows, visit, moving, dwells, knots, np.array(self._ends))
 
     def _sample(self, theta: Array, speed: Array) -> int:
         self._samples.append((self._time_s, theta, speed, self._load))

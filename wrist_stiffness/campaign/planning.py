@@ -20,6 +20,7 @@ from wrist_stiffness.campaign.design_information import (
     Information,
     MeasurementNoise,
     calibrated,
+    carried_over,
     discrimination,
     improvement,
     information,
@@ -32,9 +33,9 @@ from wrist_stiffness.campaign.design_pool import (
     fixed_visits,
     reference_pose,
 )
-from wrist_stiffness.campaign.design_question import Question
+from wrist_stiffness.campaign.design_question import SESSION, TARE, Question
 from wrist_stiffness.campaign.design_signatures import signatures
-from wrist_stiffness.campaign.design_timeline import Pace, Timeline, Visit, run_through
+from wrist_stiffness.campaign.design_timeline import Experiment, Pace, Timeline, Visit, run_through
 from wrist_stiffness.campaign.loads_file import Source
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -138,6 +139,7 @@ def plan(
     model: ErrorModel,
     question: Question,
     conditions: Conditions,
+    earlier: Sequence[Experiment] = (),
     progress: Progress | None = None,
 ) -> Plan:
     """Plan an experiment.
@@ -150,6 +152,8 @@ def plan(
         What is asked.
     conditions : Conditions
         Loads, durations, noise.
+    earlier : sequence of Experiment
+        What was measured on this wrist before, each with instruments set up anew.
     progress : callable, optional
         Called with (done, total).
 
@@ -170,15 +174,19 @@ def plan(
     settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
     fixed = fixed_visits(settings, pace, workspace)
     pool = _Pool(settings, fixed, rng.permutation(2 * len(settings)), pace, model)
-    half = None if progress is None else lambda done, total: progress(done, 2 * total)
-    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, half)
+    stage = _Stages(progress, 2 + len(earlier))
+    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
+    question = question.without(lacking)
+    before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
     goals = question.goals
     if goals is None:
         goals = _all_goals(known)
-    goals = tuple(g for g in goals if g.truth not in lacking and g.rival not in lacking)
+    start = np.zeros_like(known.total)
+    for each in before:
+        start += carried_over(each, (*SESSION, TARE))
     sizes = equal_sizes(known, question.alike)
-    known = known.scaled(sizes)
-    best = np.sqrt(LONGER) * discrimination(known.total, known.layout, goals)
+    known, start = known.scaled(sizes), known.layout.scaled(start, sizes)
+    best = discrimination(start + LONGER * known.total, known.layout, goals)
     reachable = {goal: bool(d >= needed(goal)) for goal, d in zip(goals, best, strict=True)}
     aimed = [goal for goal in goals if reachable[goal]]
     whole = question.goals is None
@@ -208,15 +216,20 @@ def plan(
             "warm-up, reference poses and two long holds take"
         )
     chosen = choose(
-        grams, pool.cost_s, pool.fixed_gram(known.grams), seconds - least_s, utility, enough, rng
+        grams,
+        pool.cost_s,
+        start + pool.fixed_gram(known.grams),
+        seconds - least_s,
+        utility,
+        enough,
+        rng,
     )
     timeline = pool.arranged(chosen, rng)
     while timeline.duration_s > seconds:
         chosen = chosen[:-1]
         timeline = pool.arranged(chosen, rng)
-    rest = None if progress is None else lambda done, total: progress(total + done, 2 * total)
-    final = evaluated(model, question, timeline, conditions.noise, rest)[0].scaled(sizes)
-    reached = discrimination(final.total, final.layout, goals)
+    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0].scaled(sizes)
+    reached = discrimination(start + final.total, final.layout, goals)
     answers = [
         Answer(goal, float(d), reachable[goal]) for goal, d in zip(goals, reached, strict=True)
     ]
@@ -225,8 +238,26 @@ def plan(
         tuple(settings[i] for i in chosen),
         tuple(answers),
         lacking,
-        improvement(final.total, final.layout),
+        improvement(start + final.total, final.layout),
     )
+
+
+class _Stages:
+    """One progress for several evaluations of about the same length."""
+
+    def __init__(self, progress: Progress | None, count: int) -> None:
+        self._progress, self._count, self._begun = progress, count, 0
+
+    def next(self) -> Progress:
+        """Return the progress of the next evaluation."""
+        behind = self._begun
+        self._begun += 1
+
+        def told(done: int, total: int) -> None:
+            if self._progress is not None:
+                self._progress(behind * total + done, self._count * total)
+
+        return told
 
 
 class _Pool:
@@ -275,7 +306,7 @@ class _Pool:
 def evaluated(
     model: ErrorModel,
     question: Question,
-    timeline: Timeline,
+    experiment: Experiment,
     noise: MeasurementNoise,
     progress: Progress | None = None,
 ) -> tuple[Information, dict[str, str]]:
@@ -287,8 +318,8 @@ def evaluated(
         What is known of the wrist.
     question : Question
         What is asked.
-    timeline : Timeline
-        The experiment.
+    experiment : Experiment
+        Its path.
     noise : MeasurementNoise
         Of one dwell.
     progress : callable, optional
@@ -302,11 +333,11 @@ def evaluated(
         Those, and the signal.
     """
     sets = [*((effect,) for effect in question.nuisances), *question.effects]
-    found = signatures(model, timeline.block, sets, progress)
+    found = signatures(model, experiment.block, sets, progress)
     count = len(question.nuisances)
     lacking = {each.name: each.lacks for each in found[count:] if each.lacks}
     shown = [each for each in found[count:] if not each.lacks]
-    known = information(timeline, found[:count], question.free, shown, model.table, noise)
+    known = information(experiment, found[:count], question.free, shown, model.table, noise)
     return known, lacking
 
 

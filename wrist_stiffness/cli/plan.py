@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
+from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 
 DESCRIPTION = """\
 Plan an experiment: which poses, approached from where, under which of your loads, how long. With
@@ -20,7 +21,7 @@ on are due at the times of the table. Drive near the first pose before you start
 EPILOG = """\
 examples:
   wrist-stiffness plan --commissioning --loads loads.yaml --minutes 30 -o first_plan
-  wrist-stiffness plan --diagnosis found.json --loads loads.yaml -o next_plan
+  wrist-stiffness plan --diagnosis found.json --recording day_1 --loads loads.yaml -o next_plan
   ros2 bag play first_plan/trajectory     # with /motor_trajectory remapped to your controller
 
 loads.yaml:
@@ -44,6 +45,13 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--commissioning", action="store_true", help="the first experiment")
     what.add_argument("--diagnosis", metavar="FILE", help="result of diagnose --json")
+    parser.add_argument(
+        "--recording",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="recording that the diagnosis read, so that the plan adds to it; may be repeated",
+    )
     parser.add_argument("--loads", metavar="FILE", required=True, help="loads you can apply")
     parser.add_argument("-o", "--output", metavar="PLAN", required=True, help="folder to make")
     parser.add_argument(
@@ -73,6 +81,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         help="scatter of each component of a measured pose, with --commissioning (1 um, 1 mdeg)",
     )
     parser.add_argument("--seed", type=int, default=0, help="another one, another plan (0)")
+    add_recording_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
     parser.set_defaults(run=_run)
 
@@ -108,10 +117,15 @@ def _run(arguments: argparse.Namespace) -> int:
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
     progress = Progress("plan")
     if arguments.commissioning:
+        if arguments.recording:
+            raise InputError("--recording belongs to --diagnosis: a commissioning is the first one")
         known, planned = plan_commissioning(model, arguments.loads, options, progress)
     else:
+        recordings = None
+        if arguments.recording:
+            recordings = recordings_named(arguments.recording, arguments)
         known, planned = plan_between_rivals(
-            model, arguments.diagnosis, arguments.loads, options, progress
+            model, arguments.diagnosis, arguments.loads, options, recordings, progress
         )
     print(planned.text)
     if arguments.json:

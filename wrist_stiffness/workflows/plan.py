@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.campaign.design_earlier import as_experiment
 from wrist_stiffness.campaign.design_information import MeasurementNoise
 from wrist_stiffness.campaign.design_question import Question, between, commissioning
 from wrist_stiffness.campaign.design_rivals import read_rivals
-from wrist_stiffness.campaign.design_timeline import Pace, Timeline
+from wrist_stiffness.campaign.design_timeline import Experiment, Pace, Timeline
 from wrist_stiffness.campaign.loads_file import read_loads
 from wrist_stiffness.campaign.planning import Conditions, Plan, plan
 from wrist_stiffness.errors import InputError
@@ -27,6 +28,7 @@ from wrist_stiffness.recording.messages import JointTrajectory, JointTrajectoryP
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.workflows.pictures.plan import draw_plan
 from wrist_stiffness.workflows.plan_summary import summary
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
 
 JOINTS = ("motor_1_joint", "motor_2_joint")
 
@@ -159,7 +161,7 @@ def plan_commissioning(
     white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
     noise = MeasurementNoise(white, model.table.geometry.limits.encoder_step)
     question = commissioning(np.random.default_rng(options.seed))
-    return model, _planned(model, question, loads, noise, options, progress)
+    return model, _planned(model, question, loads, noise, options, (), progress)
 
 
 def plan_between_rivals(
@@ -167,6 +169,7 @@ def plan_between_rivals(
     diagnosis: str | Path,
     loads: str | Path,
     options: Options,
+    recordings: Recordings | None = None,
     progress: Progress | None = None,
 ) -> tuple[ErrorModel, Planned]:
     """Plan the next experiment, between the effects that a diagnosis could not tell apart.
@@ -177,6 +180,8 @@ def plan_between_rivals(
         Model, result of `diagnose --json`, and the loads that the user can apply.
     options : Options
         Without a duration it takes what it needs.
+    recordings : Recordings, optional
+        Those of the diagnosis: what they tell is not asked again.
     progress : callable, optional
         Called with (done, total).
 
@@ -195,7 +200,11 @@ def plan_between_rivals(
     model, rivals = load_model(model_file), read_rivals(diagnosis)
     question = between(rivals.classes, rivals.silent, np.random.default_rng(options.seed))
     noise = rivals.noise(model.table)
-    return model, _planned(model, question, loads, noise, options, progress)
+    earlier = []
+    if recordings is not None:
+        sessions = read_sessions(recordings, model.table, lambda done, total: None)
+        earlier = [as_experiment(model, session) for session in sessions.values()]
+    return model, _planned(model, question, loads, noise, options, earlier, progress)
 
 
 def _planned(
@@ -204,6 +213,7 @@ def _planned(
     loads: str | Path,
     noise: MeasurementNoise,
     options: Options,
+    earlier: Sequence[Experiment],
     progress: Progress | None,
 ) -> Planned:
     geometry = model.table.geometry
@@ -214,7 +224,7 @@ def _planned(
         None if options.minutes is None else 60.0 * options.minutes,
         options.seed,
     )
-    found = plan(model, question, conditions, progress)
+    found = plan(model, question, conditions, earlier, progress)
     return Planned(found, summary(found, question))
 
 
