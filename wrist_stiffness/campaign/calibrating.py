@@ -105,7 +105,7 @@ def calibrate(
     units = tuple(as_units(model, session) for session in sessions)
     problem = FitProblem(model.with_effects(*held), units, free)
     if hold_out:
-        seen = judged(problem, progress)
+        seen = judged(problem, progress=progress)
         found = fit(problem, start_of(problem, seen.fit.problem, seen.fit.z), progress=progress)
     else:
         found = fit(problem, progress=progress)
@@ -139,10 +139,11 @@ def as_it_stands(problem: FitProblem, seen: Judged) -> dict[str, float]:
     return {q.key: left.rmse(q) for q in seen.observations.reported}
 
 
-def told_model(found: Fit) -> ErrorModel:
+def told_model(found: Fit, keep: Sequence[str] = ()) -> ErrorModel:
     """Return a fitted model as it is written, of the newest session.
 
-    An effect of which the data say nothing is left out where it stayed at nothing.
+    An effect of which the data say nothing is left out where it stayed at nothing, unless it is
+    among those to keep.
     """
     problem = found.problem
     newest = problem.sessions[-1].name
@@ -155,6 +156,6 @@ def told_model(found: Fit) -> ErrorModel:
     effects = list(problem.model.effects)
     for free, fitted in zip(problem.free, found.effects(), strict=True):
         plain = Effect(free.effect.law, free.effect.component)
-        if fitted.name in told or free.effect.si != plain.si:
+        if fitted.name in (*told, *keep) or free.effect.si != plain.si:
             effects.append(fitted)
     return problem.model.with_effects(*effects)

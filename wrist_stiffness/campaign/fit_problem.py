@@ -143,7 +143,7 @@ class FitProblem:
 
     def residual(self, z: Array) -> Array:
         """Return log(T_measured T_predicted^-1) of all units, (u, 6) at O in F [m, rad]."""
-        return self._rows(
+        return self.rows(
             [
                 self._residuals(number, [self.effects(z, number)])[0]
                 for number in range(len(self.sessions))
@@ -197,7 +197,7 @@ class FitProblem:
                 twist = references[0] + (other - references[which])
                 block[:, :, place] = np.nan_to_num((session.residual(twist) - first) / step[place])
             blocks.append(block[:, :, list(asked)])
-        return self._rows(blocks)
+        return self.rows(blocks)
 
     @cached_property
     def table(self) -> Observations:
@@ -209,7 +209,7 @@ class FitProblem:
         units = sum(len(each.cut.dwell) for each in self.sessions)
         return tabulate(self.model, self.sessions, np.zeros((units, 6)))
 
-    def _rows(self, blocks: list[Array]) -> Array:
+    def rows(self, blocks: list[Array]) -> Array:
         """Put the sessions' units together and keep those of the table."""
         measured = [
             np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1) for each in self.sessions

@@ -37,6 +37,12 @@ CLOSE, SMALL_FALL = 0.05, 0.1
 """A round ends when no parameter moves by more than this share of its uncertainty, or the sum of
 squares falls by less than this, which no parameter can feel."""
 
+SUSPECT = 2.0
+"""Mean square, by the scatter that is known without any fit, from which other ways are tried."""
+
+LOST_COST = 50.0
+"""What a lost number costs when ways are compared: seven standard deviations."""
+
 MOST_HALVINGS = 6
 
 EXCITED = 0.7
@@ -129,6 +135,11 @@ class Fit:
         return self.problem.table.with_values(self.residual)
 
     @property
+    def seen(self) -> Observations:
+        """The units that the fit saw, the others blank."""
+        return self.problem.table.with_values(np.where(self.used[:, None], self.residual, np.nan))
+
+    @property
     def parameters(self) -> tuple[Fitted, ...]:
         """All that was fitted, with uncertainties."""
         problem = self.problem
@@ -216,30 +227,48 @@ def fit(
         raise InputError("fit: no parameter is free")
     if (measured := table.measured[~unseen].sum()) < max(1, np.count_nonzero(weight < 1.0)):
         raise InputError(f"fit: only {measured} numbers were measured")
-    z = np.zeros(len(weight)) if start is None else start
-    if start is None:
-        for stage in _stages(problem):
+    if start is not None:
+        return _settled(problem, start, unseen, NOISE_ROUNDS, progress)
+    found_all: list[Fit] = []
+    for way in _ways(problem):
+        z = np.zeros(len(weight))
+        for stage in way:
             led = _settled(stage, start_of(stage, problem, z), unseen, 1, silent)
             z = start_of(problem, stage, led.z)
-    return _settled(problem, z, unseen, NOISE_ROUNDS, progress)
+        found_all.append(_settled(problem, z, unseen, NOISE_ROUNDS, progress))
+        if _cost(found_all[-1]) < SUSPECT * table.measured[~unseen].sum():
+            break
+    return min(found_all, key=_cost)
 
 
-def _stages(problem: FitProblem) -> tuple[FitProblem, ...]:
-    """Return the problems that lead to a good start: set-up, then all but the flanges' gaps.
+def _ways(problem: FitProblem) -> list[tuple[FitProblem, ...]]:
+    """Return the stages of the ways to try, the best one first.
 
-    Flanges touch or do not, so the sum of squares has valleys apart from the deepest; with gaps
-    that follow the axes the way leads into the right one.
+    Flanges touch or do not, so the sum of squares has valleys apart from the deepest one.  Most
+    often the way through the set-up, and then through gaps that follow the axes, leads into that.
     """
 
     def only(kept: Callable[[FreeEffect], bool]) -> FitProblem:
         free = tuple(each if kept(each) else replace(each, scale={}) for each in problem.free)
         return replace(problem, free=free)
 
-    tried = [
-        only(lambda each: each.per_session),
-        only(lambda each: each.effect.law.id != GAPS),
-    ]
-    return tuple(each for each in tried if 0 < len(each.unknowns) < len(problem.unknowns))
+    set_up = only(lambda each: each.per_session)
+    shimmed = only(lambda each: each.effect.law.id != GAPS)
+    if not 0 < len(set_up.unknowns) < len(problem.unknowns):
+        return [()]
+    if len(shimmed.unknowns) == len(problem.unknowns):
+        return [(set_up,)]
+    return [(set_up, shimmed), (set_up,), ()]
+
+
+def _cost(found: Fit) -> float:
+    """Sum of squares by the scatter that is known without any fit, for ways to be compared."""
+    factor = replace(found.noise, scatter=np.eye(6), colour_share=0.0)
+    seen = found.observations.take(found.used)
+    white = factor.whiten(seen, seen.values[:, :, None])
+    # A unit that counts as lost on one way only must not make that way the better one.
+    blank = found.problem.table.measured[found.used].sum() - seen.measured.sum()
+    return float((white**2).sum()) + LOST_COST * float(blank)
 
 
 def _settled(

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
-from wrist_stiffness.campaign.fitting import Fit, fit
+from wrist_stiffness.campaign.fitting import Fit, fit, start_of
 from wrist_stiffness.diagnosis.observations import Labels, Observations
 from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
 from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.whitening import NoiseModel
+from wrist_stiffness.mechanism.components import Array
 
 ANOTHER_SESSION = "another session"
 THIS_SESSION = "this session only"
@@ -55,22 +56,29 @@ class Judged:
         return HeldOut(values, noise.whiten(self.observations, values[:, :, None])[:, 0])
 
 
-def judged(problem: FitProblem, progress: Progress = silent) -> Judged:
+def judged(
+    problem: FitProblem,
+    start: tuple[FitProblem, Array] | None = None,
+    progress: Progress = silent,
+) -> Judged:
     """Fit to all but the held-out units and say what is left of those.
 
     Parameters
     ----------
     problem : FitProblem
         All sessions.
+    start : (FitProblem, (q,) float), optional
+        Point of a like problem from which to begin.
     progress : callable
         Told steps done and steps at most.
     """
     table = problem.table
     aside = sealed_units(table, Settings().sealed_share)
     if len(problem.sessions) == 1:
-        found = fit(problem, held_out=aside, progress=progress)
+        found = fit(problem, _begin(problem, start), aside, progress)
         return Judged(found, found.observations.take(aside), table.rows[aside], THIS_SESSION)
-    found = fit(replace(problem, sessions=problem.sessions[:-1]), progress=progress)
+    earlier = replace(problem, sessions=problem.sessions[:-1])
+    found = fit(earlier, _begin(earlier, start), progress=progress)
     again = tuple(each for each in problem.free if each.per_session)
     own = {each.effect.name for each in again}
     wrist = tuple(each for each in found.effects() if each.name not in own)
@@ -79,6 +87,10 @@ def judged(problem: FitProblem, progress: Progress = silent) -> Judged:
     )
     left = fit(last).observations if again else last.table.with_values(last.residual(np.empty(0)))
     return Judged(found, left, table.rows[aside], ANOTHER_SESSION)
+
+
+def _begin(problem: FitProblem, start: tuple[FitProblem, Array] | None) -> Array | None:
+    return None if start is None else start_of(problem, *start)
 
 
 def judged_by_itself(found: Fit) -> Judged:
