@@ -22,6 +22,8 @@ from wrist_stiffness.recording.messages import (
     Float64,
     Header,
     JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
     Message,
     Temperature,
     Vector3,
@@ -52,6 +54,7 @@ COMMANDED = ("motor_1_joint", "motor_2_joint")
 # load silent                       --------
 # link_1        -----------                             --------
 # NaN, domain               x       x
+# trajectory                    x
 # border fade     x           x           x         (motor_1)
 
 
@@ -60,6 +63,15 @@ def joints(stamp_ns: int, names: tuple[str, ...], theta: dict[str, float], speed
     angles = tuple(theta[name] for name in names)
     speeds = tuple(0.1 * np.cos(angle) for angle in angles) if speed else ()
     return JointState(Header(stamp_ns), names, angles, speeds)
+
+
+def plan(stamp_ns: int) -> Message:
+    """Return a trajectory with speeds, and with accelerations at its end."""
+    points = [
+        JointTrajectoryPoint((0.1 * i, 0.2), (0.3, -0.1 * i), (1.0, 0.5) if i == 4 else (), (), i)
+        for i in range(5)
+    ]
+    return JointTrajectory(Header(stamp_ns), COMMANDED, tuple(points))
 
 
 def messages(rng: np.random.Generator) -> list[tuple[float, str, Message]]:
@@ -91,6 +103,8 @@ def messages(rng: np.random.Generator) -> list[tuple[float, str, Message]]:
             measured["motor_2_joint"] = 2.0
         found.append((time, "/joint_states", joints(stamp, SENSORS, measured, time < 3.0)))
         found.append((time, "/motor_commands", joints(stamp, COMMANDED, theta, time < 3.0)))
+        if time == 4.0:
+            found.append((time, "/motor_trajectory", plan(stamp)))
     return found
 
 

@@ -7,6 +7,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64
+from trajectory_msgs.msg import JointTrajectory
 
 from wrist_stiffness.recording import messages
 from wrist_stiffness.recording.channel import channel_of
@@ -20,18 +21,20 @@ from wrist_stiffness.workflows.output_changes import output_changes
 FOLDER = Path(__file__).parents[1] / "data/replay"
 HUMIDITY = "/covariates/humidity"
 PREDICTED, CORRECTED = "/pose_error_predicted", "/motor_commands_corrected"
-RESIDUAL = "/pose_error_residual"
+RESIDUAL, PLANNED = "/pose_error_residual", "/motor_trajectory_corrected"
 INPUTS = {
     "/load_estimate": WrenchStamped,
     "/temperatures": Temperature,
     HUMIDITY: Float64,
     "/joint_states": JointState,
     "/motor_commands": JointState,
+    "/motor_trajectory": JointTrajectory,
 }
 OUTPUTS = {
     PREDICTED: (PoseWithCovarianceStamped, messages.PoseWithCovarianceStamped),
     RESIDUAL: (PoseWithCovarianceStamped, messages.PoseWithCovarianceStamped),
     CORRECTED: (JointState, messages.JointState),
+    PLANNED: (JointTrajectory, messages.JointTrajectory),
 }
 """Without /motor_positions_corrected, which has no stamp to be found by."""
 
@@ -76,6 +79,8 @@ class Player:
             return answers == self.sent[topic]
         if topic == "/motor_commands":
             return len(self.graph.heard[CORRECTED]) == self.sent[topic]
+        if topic == "/motor_trajectory":
+            return len(self.graph.heard[PLANNED]) == self.sent[topic]
         streams = [node.stream for node in self.nodes]
         if topic == "/load_estimate":
             stamp_ns = nanoseconds(message.header.stamp)

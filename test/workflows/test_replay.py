@@ -9,7 +9,10 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.cli.main import main
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
@@ -17,6 +20,8 @@ from wrist_stiffness.recording.messages import (
     Float64,
     Header,
     JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
     Quaternion,
     String,
     Temperature,
@@ -30,6 +35,7 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.recording.reader import open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.parameter_file import node_settings
 from wrist_stiffness.workflows.replay import replay
 
 MODEL = shipped_file("config/palmieri2015_model.yaml")
@@ -123,6 +129,59 @@ def test_the_residual_is_what_the_sent_angles_leave(tmp_path):
     assert np.linalg.norm(np.array(sent) - later.position) > 1e-5
     # The residual is moved by the rigid Jacobian: off by the square of the correction, 1e-8 rad.
     assert np.allclose(rotvec, left, rtol=0.0, atol=3e-8)
+
+
+def test_trajectories_are_corrected_as_by_the_node(tmp_path, capsys):
+    """A zero stamp says "at once": when it was logged.  The second plan is out of the domain."""
+    points = tuple(JointTrajectoryPoint((0.1 * i, 0.2), (0.3, 0.1), (), (), i) for i in range(3))
+    plan = JointTrajectory(Header(0), MOTORS, points)
+    wild = JointTrajectory(Header(0), MOTORS, (JointTrajectoryPoint((9.0, 0.2)),))
+    timeline = [*TIMELINE, (31, "/motor_trajectory", plan), (31, "/motor_trajectory", wild)]
+    source = write(tmp_path / "in", timeline)
+    assert main(["replay", str(source), "-o", str(tmp_path / "out")]) == 0
+    assert "1 of 2 trajectories corrected" in capsys.readouterr().out
+    first, second = outputs(tmp_path / "out", "/motor_trajectory_corrected")
+    stream = CorrectionStream(load_model(MODEL), node_settings(None)[1], enabled=True)
+    for stamp, force in ((0, -1.0), (20 * MILLISECOND, -2.0)):
+        stream.loads.add(stamp, "wrist_base", (0.0, 0.0, force), (0.0, 0.0, 0.0))
+    # What is on at the first command is the payload.
+    stream.on_command(30 * MILLISECOND, "", COMMAND.name, COMMAND.position)
+    wanted = stream.on_trajectory(
+        31 * MILLISECOND, "", MOTORS, [planned_point(2, p.positions, p.velocities) for p in points]
+    )
+    assert wanted.fault is None
+    for found, point in zip(first.points, wanted.points, strict=True):
+        assert found.positions == tuple(point.positions)
+        assert found.velocities == tuple(point.velocities)
+        assert found.accelerations == ()
+    assert first.header.frame_id == "wrist_corrected"
+    assert [point.time_from_start_ns for point in first.points] == [0, 1, 2]
+    assert second.points == wild.points
+
+
+def test_the_residual_at_the_tool_point_is_the_same_motion(tmp_path):
+    model = load_model(MODEL)
+    header = model.table.header
+    platform = {**header.geometry["platform"], "tool_point_mm": [10.0, 0.0, 40.0]}
+    header = dataclasses.replace(header, geometry={**header.geometry, "platform": platform})
+    save_table(dataclasses.replace(model.table, header=header), tmp_path / "table.npz")
+    path = tmp_path / "model.yaml"
+    path.write_text("{schema: 1, name: x, table: {path: table.npz}, effects: []}")
+    replay(write(tmp_path / "in", TIMELINE), path, tmp_path / "out")
+    (at_origin,), (at_tool,) = (
+        outputs(tmp_path / "out", f"/pose_error_residual{name}") for name in ("", "/task_point")
+    )
+    turn = at_origin.pose.pose.orientation
+    assert at_tool.pose.pose.orientation == turn
+    turned = Rotation.from_quat((turn.x, turn.y, turn.z, turn.w))
+    desired = model.table.mechanism.forward(np.array(COMMAND.position)).platform
+    # The platform is nearly where it is desired: off by some 4e-4 rad, which move 41 mm by 16 um;
+    # these times the residual turn of some 4e-4 rad.
+    point = desired @ [0.01, 0.0, 0.04]
+    origin, tool = at_origin.pose.pose.position, at_tool.pose.pose.position
+    shift = np.array([origin.x, origin.y, origin.z]) + turned.apply(point) - point
+    assert np.allclose([tool.x, tool.y, tool.z], shift, rtol=0, atol=1e-8)
+    assert np.linalg.norm(shift - [origin.x, origin.y, origin.z]) > 1e-6
 
 
 def test_replay_of_a_replay_replaces_the_outputs(tmp_path):

@@ -16,6 +16,8 @@ from wrist_stiffness.recording.messages import (
     Float64MultiArray,
     Header,
     JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
     Point,
     Pose,
     PoseWithCovariance,
@@ -27,7 +29,7 @@ from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows.output_changes import output_changes
 from wrist_stiffness.workflows.parameter_file import node_settings
-from wrist_stiffness.workflows.replay import OUTPUTS, replay
+from wrist_stiffness.workflows.replay import replay
 
 FOLDER = Path(__file__).parents[1] / "data/replay"
 RECORDING, PARAMETERS = FOLDER / "recording.mcap", FOLDER / "parameters.yaml"
@@ -42,8 +44,13 @@ def test_a_replay_gives_what_is_stored(tmp_path, name):
     replay(RECORDING, MODELS[name], tmp_path / "out", node_settings(PARAMETERS))
     changes = output_changes(FOLDER / f"{name}.mcap", tmp_path / "out")
     assert [topic for topic in changes if not topic.same] == []
-    assert [topic.topic for topic in changes] == list(OUTPUTS)
-    assert all(topic.common > 100 for topic in changes)
+    assert {topic.topic: topic.common for topic in changes} == {
+        "/pose_error_predicted": 104,
+        "/pose_error_residual": 106,
+        "/motor_commands_corrected": 120,
+        "/motor_positions_corrected": 120,
+        "/motor_trajectory_corrected": 1,
+    }
 
 
 CHANGES = {
@@ -83,7 +90,7 @@ def test_the_command_says_what_changed_where_and_by_how_much(tmp_path, capsys):
     assert "covariance [%] by" in out
     assert "s [um] by" not in out
     changed = [topic["changed"] for topic in json.loads(result.read_text())["changes"]]
-    assert changed == [104, 0, 0, 0]
+    assert changed == [104, 0, 0, 0, 0]
 
 
 def test_against_itself_or_nothing_is_refused_before_the_replay(tmp_path, capsys):
@@ -150,6 +157,26 @@ def test_commands_differ_in_angles_speeds_and_form(tmp_path, other, quantity):
     topic = "/motor_commands_corrected"
     old = write(tmp_path / "old", [(topic, STATE, 1)])
     assert output_changes(old, write(tmp_path / "same", [(topic, STATE, 1)]))[0].same
+    (changes,) = output_changes(old, write(tmp_path / "new", [(topic, other, 1)]))
+    assert changes.changed == 1
+    assert [change.quantity for change in changes.largest] == ([quantity] if quantity else [])
+
+
+PLAN = JointTrajectory(
+    Header(1, "wrist_corrected"), ("a", "b"), (JointTrajectoryPoint((0.1, 0.2), (0.3, 0.4)),) * 2
+)
+PLANS = {
+    "angle": (JointTrajectoryPoint((0.1, 0.3), (0.3, 0.4)), "angle [mdeg]"),
+    "speed": (JointTrajectoryPoint((0.1, 0.2), (0.3, 0.5)), "speed [mdeg/s]"),
+    "form": (JointTrajectoryPoint((0.1, 0.2)), None),
+}
+
+
+@pytest.mark.parametrize(("point", "quantity"), PLANS.values(), ids=PLANS)
+def test_trajectories_differ_in_any_of_their_points(tmp_path, point, quantity):
+    topic = "/motor_trajectory_corrected"
+    old = write(tmp_path / "old", [(topic, PLAN, 1)])
+    other = replace(PLAN, points=(PLAN.points[0], point))
     (changes,) = output_changes(old, write(tmp_path / "new", [(topic, other, 1)]))
     assert changes.changed == 1
     assert [change.quantity for change in changes.largest] == ([quantity] if quantity else [])

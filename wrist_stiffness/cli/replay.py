@@ -101,6 +101,8 @@ def _run(arguments: argparse.Namespace) -> int:
         f"{summary.predictions} predictions for {summary.joint_states} joint states, "
         f"{summary.corrections} of {summary.commands} commands corrected"
     )
+    if summary.trajectories:
+        print(f"{summary.corrected_trajectories} of {summary.trajectories} trajectories corrected")
     if summary.predictions:
         for name, values in (("s [um]", summary.shift_norm_um), ("phi [mdeg]", summary.phi_mdeg)):
             print(f"  predicted {name:10} mean {np.mean(values):8.3f}   max {np.max(values):8.3f}")
@@ -127,6 +129,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 "predictions": summary.predictions,
                 "commands": summary.commands,
                 "corrections": summary.corrections,
+                "trajectories": summary.trajectories,
+                "corrected_trajectories": summary.corrected_trajectories,
                 "warnings": dict(summary.warnings),
                 "refused": dict(summary.refused),
                 "damage": summary.damage,

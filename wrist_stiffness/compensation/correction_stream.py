@@ -11,6 +11,7 @@ from wrist_stiffness.compensation.contact_policy import ContactGuard
 from wrist_stiffness.compensation.correction import Correction, as_applied, correct
 from wrist_stiffness.compensation.intake import COMMAND, CORRECTED_FRAME
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.safety import (
     AppliedCorrection,
     guard_weight,
@@ -218,6 +219,26 @@ class CorrectionStream(Stream):
         except WristError as error:
             return CorrectedTrajectory(CORRECTED_FRAME, unchanged, error)
         return CorrectedTrajectory(CORRECTED_FRAME, corrected, None)
+
+    def residual_at_task_point(self, correction: Correction) -> tuple[Array, Array] | None:
+        """Return the residual as seen from the geometry's tool point.
+
+        Parameters
+        ----------
+        correction : Correction
+            As applied.
+
+        Returns
+        -------
+        (6,) float, (6, 6) float or None
+            Twist in F with the tool point as origin, and its covariance; None where that is O.
+        """
+        tool_point = self.running_model().model.table.geometry.platform.tool_point
+        if not tool_point.any():
+            return None
+        prediction = correction.prediction
+        there = seen_from(prediction.configuration.platform @ tool_point)
+        return there @ correction.after, there @ prediction.covariance @ there.T
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
         theta = self.settings.motors.angles(names, positions, COMMAND)

@@ -16,7 +16,6 @@ from trajectory_msgs.msg import JointTrajectory
 from wrist_stiffness.compensation.correction import Correction
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.parameters import CORRECTION, correction_settings
-from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import WristError
@@ -125,13 +124,9 @@ class AngleCorrector(WristNode):
     def _publish_residual(self, stamp_ns: int, correction: Correction) -> None:
         twist, prediction = correction.after, correction.prediction
         self._residual.publish(error_message(stamp_ns, twist, prediction.covariance))
-        tool_point = self.stream.running_model().model.table.geometry.platform.tool_point
-        if not tool_point.any():
-            return
-        there = seen_from(prediction.configuration.platform @ tool_point)
-        self._task_residual.publish(
-            error_message(stamp_ns, there @ twist, there @ prediction.covariance @ there.T)
-        )
+        at_task_point = self.stream.residual_at_task_point(correction)
+        if at_task_point is not None:
+            self._task_residual.publish(error_message(stamp_ns, *at_task_point))
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         # A zero stamp says "at once".

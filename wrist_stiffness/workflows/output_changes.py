@@ -18,6 +18,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording.messages import (
     Float64MultiArray,
     JointState,
+    JointTrajectory,
     Message,
     PoseWithCovarianceStamped,
 )
@@ -25,12 +26,19 @@ from wrist_stiffness.recording.reader import open_recording
 from wrist_stiffness.workflows.replay import OUTPUTS
 
 SHIFT, TURN, COVARIANCE = "s [um]", "rotation [mdeg]", "covariance [%]"
-ANGLE, SPEED = "angle [mdeg]", "speed [mdeg/s]"
+ANGLE, SPEED, ACCELERATION = "angle [mdeg]", "speed [mdeg/s]", "acceleration [mdeg/s^2]"
 
-TOLERANCES = {SHIFT: 1e-6, TURN: 1e-4, COVARIANCE: 1e-3, ANGLE: 1e-4, SPEED: 1e-2}
+TOLERANCES = {
+    SHIFT: 1e-6,
+    TURN: 1e-4,
+    COVARIANCE: 1e-3,
+    ANGLE: 1e-4,
+    SPEED: 1e-2,
+    ACCELERATION: 10.0,
+}
 """What another processor or linear algebra may change.  Predictions are solved to rounding; the
-search for corrected angles ends within 1e-10 rad, 6e-6 mdeg, and a speed is the difference of two
-such angles over 1 mrad of motion."""
+search for corrected angles ends within 1e-10 rad, 6e-6 mdeg; at 1 rad/s a speed is the difference
+of two such angles over 10 ms, an acceleration of three over 5 ms each."""
 
 MILLIDEGREES = 1e3 * float(np.degrees(1.0))
 
@@ -156,6 +164,12 @@ def _form(message: Message) -> tuple[object, ...]:
     if isinstance(message, JointState):
         counts = len(message.position), len(message.velocity), len(message.effort)
         return JointState, message.header.frame_id, message.name, *counts
+    if isinstance(message, JointTrajectory):
+        sizes = [
+            (len(point.positions), len(point.velocities), len(point.accelerations))
+            for point in message.points
+        ]
+        return JointTrajectory, message.header.frame_id, message.joint_names, *sizes
     if isinstance(message, Float64MultiArray):
         return Float64MultiArray, len(message.data)
     return (type(message),)
@@ -176,6 +190,17 @@ def _sizes(old: Message, new: Message) -> Iterable[tuple[str, float]]:
     elif isinstance(old, JointState) and isinstance(new, JointState):
         yield ANGLE, MILLIDEGREES * _apart(old.position, new.position)
         yield SPEED, MILLIDEGREES * _apart(old.velocity, new.velocity)
+    elif isinstance(old, JointTrajectory) and isinstance(new, JointTrajectory):
+        for name, values in (
+            (ANGLE, "positions"),
+            (SPEED, "velocities"),
+            (ACCELERATION, "accelerations"),
+        ):
+            flat = [
+                [value for point in plan.points for value in getattr(point, values)]
+                for plan in (old, new)
+            ]
+            yield name, MILLIDEGREES * _apart(*flat)
     elif isinstance(old, Float64MultiArray) and isinstance(new, Float64MultiArray):
         yield ANGLE, MILLIDEGREES * _apart(old.data, new.data)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from wrist_stiffness.compensation.intake import BASE_FRAME, CORRECTED_FRAME
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import RecordingError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
@@ -24,6 +25,7 @@ from wrist_stiffness.recording.messages import (
     Float64MultiArray,
     Header,
     JointState,
+    JointTrajectory,
     Message,
     Point,
     Pose,
@@ -40,6 +42,7 @@ from wrist_stiffness.recording.topics import (
     JOINT_STATES,
     LOAD_ESTIMATE,
     MOTOR_COMMANDS,
+    MOTOR_TRAJECTORY,
     TEMPERATURES,
     TF_STATIC,
 )
@@ -49,13 +52,17 @@ from wrist_stiffness.workflows.signals_ahead import SignalsAhead
 
 POSE_ERROR_PREDICTED = "/pose_error_predicted"
 POSE_ERROR_RESIDUAL = "/pose_error_residual"
+POSE_ERROR_RESIDUAL_TASK = "/pose_error_residual/task_point"
 MOTOR_COMMANDS_CORRECTED = "/motor_commands_corrected"
 MOTOR_POSITIONS_CORRECTED = "/motor_positions_corrected"
+MOTOR_TRAJECTORY_CORRECTED = "/motor_trajectory_corrected"
 OUTPUTS = (
     POSE_ERROR_PREDICTED,
     POSE_ERROR_RESIDUAL,
+    POSE_ERROR_RESIDUAL_TASK,
     MOTOR_COMMANDS_CORRECTED,
     MOTOR_POSITIONS_CORRECTED,
+    MOTOR_TRAJECTORY_CORRECTED,
 )
 
 TYPES: dict[str, type[Message]] = {
@@ -64,11 +71,13 @@ TYPES: dict[str, type[Message]] = {
     MOTOR_COMMANDS: JointState,
     TEMPERATURES: Temperature,
     TF_STATIC: TFMessage,
+    MOTOR_TRAJECTORY: JointTrajectory,
 }
 """Topics that are used, besides those below `/covariates/`."""
 
 REQUIRED = (JOINT_STATES, LOAD_ESTIMATE)
-MOTOR_TOPICS = (JOINT_STATES, MOTOR_COMMANDS)
+SAMPLED = (JOINT_STATES, MOTOR_COMMANDS, MOTOR_TRAJECTORY)
+"""Topics whose messages are answered."""
 
 PROGRESS_EVERY = 500
 
@@ -88,6 +97,8 @@ class ReplaySummary:
         Joint states read, predictions written.
     commands, corrections : int
         Commands read, commands that were changed.
+    trajectories, corrected_trajectories : int
+        The same of trajectories.
     refused : Counter
         Samples without a result. Reasons that differ only in their numbers are one, told by the
         first of them.
@@ -106,6 +117,8 @@ class ReplaySummary:
     predictions: int = 0
     commands: int = 0
     corrections: int = 0
+    trajectories: int = 0
+    corrected_trajectories: int = 0
     refused: Counter[str] = field(default_factory=Counter)
     warnings: Counter[str] = field(default_factory=Counter)
     replaced: int = 0
@@ -163,9 +176,8 @@ def replay(
     error_model = load_model(model)
     source = open_recording(recording)
     names = _actual_names(source, topics or {})
-    signals = {
-        actual: standard for standard, actual in names.items() if standard not in MOTOR_TOPICS
-    }
+    signals = {actual: standard for standard, actual in names.items() if standard not in SAMPLED}
+    sampled = {names[standard]: standard for standard in SAMPLED if standard in names}
     summary = ReplaySummary()
     predicting = PredictionStream(error_model, prediction)
     correcting = CorrectionStream(error_model, correction, enabled=True)
@@ -180,13 +192,18 @@ def replay(
                 summary.replaced += 1
                 continue
             writer.write_raw(raw.channel, raw.payload, raw.log_time_ns)
-            if topic not in (names[JOINT_STATES], names.get(MOTOR_COMMANDS)):
+            if topic not in sampled:
                 continue
             ahead.read_for(raw.log_time_ns)
             try:
-                state = decode(JointState, raw.payload)
-                answer = _predict if topic == names[JOINT_STATES] else _correct
-                for name, message in answer(state, predicting, correcting, summary):
+                if sampled[topic] == MOTOR_TRAJECTORY:
+                    plan = decode(JointTrajectory, raw.payload)
+                    answers = _plan(plan, raw.log_time_ns, correcting, summary)
+                elif sampled[topic] == MOTOR_COMMANDS:
+                    answers = _correct(decode(JointState, raw.payload), correcting, summary)
+                else:
+                    answers = _predict(decode(JointState, raw.payload), predicting, summary)
+                for name, message in answers:
                     writer.write(name, message, raw.log_time_ns)
             except WristError as error:
                 summary.refuse(topic, error)
@@ -221,7 +238,7 @@ def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str
                 f"name it with --topic {standard}:=ACTUAL"
             )
         if topic.ros_type != wanted.ros_type:
-            if standard not in MOTOR_TOPICS and standard not in (*REQUIRED, *chosen):
+            if standard not in SAMPLED and standard not in (*REQUIRED, *chosen):
                 # Somebody else's topic of that name: a node would not hear it either.
                 continue
             raise RecordingError(
@@ -232,7 +249,7 @@ def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str
 
 
 def _predict(
-    state: JointState, predicting: PredictionStream, _: CorrectionStream, summary: ReplaySummary
+    state: JointState, predicting: PredictionStream, summary: ReplaySummary
 ) -> Iterator[tuple[str, Message]]:
     summary.joint_states += 1
     sample = predicting.on_joint_state(
@@ -248,7 +265,7 @@ def _predict(
 
 
 def _correct(
-    state: JointState, _: PredictionStream, correcting: CorrectionStream, summary: ReplaySummary
+    state: JointState, correcting: CorrectionStream, summary: ReplaySummary
 ) -> Iterator[tuple[str, Message]]:
     summary.commands += 1
     corrected = correcting.on_command(
@@ -273,6 +290,40 @@ def _correct(
                 header, corrected.correction.after, corrected.correction.prediction.covariance
             ),
         )
+        at_task_point = correcting.residual_at_task_point(corrected.correction)
+        if at_task_point is not None:
+            yield POSE_ERROR_RESIDUAL_TASK, pose_message(header, *at_task_point)
+
+
+def _plan(
+    plan: JointTrajectory, log_time_ns: int, correcting: CorrectionStream, summary: ReplaySummary
+) -> Iterator[tuple[str, Message]]:
+    summary.trajectories += 1
+    names = plan.joint_names
+    corrected = correcting.on_trajectory(
+        # A zero stamp says "at once".
+        plan.header.stamp_ns or log_time_ns,
+        plan.header.frame_id,
+        names,
+        [
+            planned_point(len(names), point.positions, point.velocities, point.accelerations)
+            for point in plan.points
+        ],
+    )
+    if corrected.fault is not None:
+        summary.refuse(MOTOR_TRAJECTORY, corrected.fault)
+    summary.corrected_trajectories += corrected.fault is None
+    points = tuple(
+        replace(
+            point,
+            positions=tuple(planned.positions.tolist()),
+            velocities=tuple(planned.velocities.tolist()),
+            accelerations=tuple(planned.accelerations.tolist()),
+        )
+        for point, planned in zip(plan.points, corrected.points, strict=True)
+    )
+    header = replace(plan.header, frame_id=corrected.frame_id)
+    yield MOTOR_TRAJECTORY_CORRECTED, replace(plan, header=header, points=points)
 
 
 def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
