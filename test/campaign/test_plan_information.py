@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from wrist_stiffness.campaign.design_earlier import as_experiment
 from wrist_stiffness.campaign.design_information import (
     CHARGE,
     FREE,
     MOTION_NOISE,
     Goal,
+    Information,
     MeasurementNoise,
     calibrated,
+    carried_over,
     discrimination,
     improvement,
     information,
+    whitened,
 )
 from wrist_stiffness.campaign.design_question import (
     SESSION,
@@ -26,8 +30,10 @@ from wrist_stiffness.campaign.design_question import (
 from wrist_stiffness.campaign.design_signatures import plausible, signatures
 from wrist_stiffness.campaign.design_timeline import Pace, Visit, run_through
 from wrist_stiffness.campaign.loads_file import NO_LOAD, AppliedLoad
+from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.planning import equal_sizes
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 
@@ -233,3 +239,67 @@ def test_plausible_values_are_within_bounds_and_not_nothing():
         for parameter in effect.parameters:
             value = effect.estimates[parameter.key].value
             assert parameter.lower < value <= parameter.upper
+
+
+def test_an_earlier_experiment_with_its_own_setup_adds_what_a_joint_fit_would(
+    model, timeline, evaluated, known
+):
+    """Two days in one least squares, the registration of each day free."""
+    nuisances, effects = evaluated
+    layout, count = known.layout, 5
+    days = [Information(known.grams[:count], layout), Information(known.grams[count:], layout)]
+    start = carried_over(days[0], ["measurement_frame@pose_sensor"])
+    goals = [Goal("backlash@motor_1", "drive_compliance@motor_1"), Goal("backlash@motor_1", "")]
+    found = discrimination(start + days[1].total, layout, goals)
+    stacked = [each.columns for each in (*nuisances, effects[1])] + [effects[0].truths]
+    white = whitened(timeline, np.concatenate(stacked, axis=2), model.table, NOISE)
+    first, second = np.vstack(white[:count]), np.vstack(white[count:])
+    design = np.block(
+        [
+            [first[:, :6], np.zeros_like(first[:, :6]), first[:, 6:-1]],
+            [np.zeros_like(second[:, :6]), second[:, :6], second[:, 6:-1]],
+        ]
+    )
+    y = np.concatenate([first[:, -1], second[:, -1]])
+    ridge = np.concatenate([np.full(12, 1 / FREE), np.ones(6), [1 / FREE]])
+    for columns, d in ((19, found[0]), (18, found[1])):
+        matrix = np.vstack([design[:, :columns], np.diag(ridge[:columns])])
+        target = np.concatenate([y, np.zeros(columns)])
+        left = target - matrix @ np.linalg.lstsq(matrix, target, rcond=None)[0]
+        assert d == pytest.approx(np.linalg.norm(left), rel=1e-5)
+
+
+def test_a_recorded_session_is_the_experiment_that_was_performed(model, timeline):
+    knots = timeline.knots
+    time = np.arange(0.0, knots[-1][0], 0.05)
+    angles, load = (
+        np.stack(
+            [
+                np.interp(time, [k[0] for k in knots], column)
+                for column in np.transpose([k[place] for k in knots])
+            ],
+            axis=1,
+        )
+        for place in (1, 2)
+    )
+    rotation = model.table.mechanism.forward(angles).platform
+    session = MeasuredSession(
+        "day 1", Block(time, angles, load), np.zeros((len(time), 3)), rotation
+    )
+    found = as_experiment(model, session)
+    rest = found.rows[~found.moving]
+    for dwell in timeline.dwells:
+        inside = (found.block.time[rest] > dwell.time_s) & (
+            found.block.time[rest] < dwell.time_s + dwell.hold_s
+        )
+        assert inside.sum() == 1, dwell.purpose
+        at = rest[inside][0]
+        assert np.allclose(found.block.theta[at], dwell.visit.theta, atol=1e-4)
+        assert np.allclose(found.block.load[at], dwell.wrench, atol=1e-3)
+    assert np.all(np.diff(found.visit) >= 0)
+    assert set(np.diff(found.visit)) <= {0, 1}
+    for visit in {dwell.visit for dwell in timeline.dwells if dwell.load.name}:
+        begin = min(d.time_s for d in timeline.dwells if d.visit is visit)
+        end = max(d.time_s + d.hold_s for d in timeline.dwells if d.visit is visit)
+        own = (found.block.time[found.rows] > begin) & (found.block.time[found.rows] < end)
+        assert len(set(found.visit[own & ~found.moving])) == 1

@@ -11,6 +11,9 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.model.error_model import ErrorModel
 
+SAME_COUNTS = 1.5
+"""Encoder counts by which a motor at rest may seem to turn."""
+
 
 def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
     """Return where and when a session measured.
@@ -40,7 +43,8 @@ def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
     last = np.append(np.diff(parts.unit[order]) != 0, True)
     rows = order[last]
     moving = ~parts.dwell[parts.unit[rows]]
-    theta = parts.block.theta
-    turned = np.append(0, np.cumsum(np.any(np.diff(theta, axis=0) != 0.0, axis=1)))[rows]
-    new = np.append(True, (np.diff(turned) != 0) | moving[1:] | moving[:-1])
-    return Experiment(replace(parts.block, theta_dot=parts.speed), rows, np.cumsum(new) - 1, moving)
+    limit = SAME_COUNTS * model.table.geometry.limits.encoder_step
+    turned = np.any(np.abs(np.diff(parts.block.theta, axis=0)) > limit, axis=1)
+    motions = np.append(0, np.cumsum(turned))[rows]
+    visit = np.unique(motions, return_inverse=True)[1]
+    return Experiment(replace(parts.block, theta_dot=parts.speed), rows, visit, moving)
