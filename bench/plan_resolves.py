@@ -1,14 +1,14 @@
-"""How many extra measurements tell twins apart: planned ones against random ones.
+"""How many extra poses tell twins apart: planned ones against random ones.
 
 A virtual cell hides an effect (laws of the simulation, not of the model) and is measured as in the
 paper: 25 poses, one load, one approach.  The effects that fit these measurements about as well as
 the true one are its class of twins.  `plan` chooses extra settings, each visited from both sides;
 where these do not suffice it plans once more, and no third time.  The others are random: poses,
 sides, and loads of the same list.  Both are performed by the virtual cell, with instruments set up
-anew.  Counted are measurements at rest: a planned visit with a load is two, as the pose is measured
-without it as well.  A class is resolved from the number on at which every wrong twin lies behind
-the true one by 25 in the Bayesian information criterion, noise aside, with everything refitted that
-a diagnosis refits.  Reference poses and long holds, which a plan has besides, are left out.
+anew.  Counted are poses (one approach each; the other side is another pose) and measurements at rest
+(a planned pose with a load is two, as it is measured without it as well; a random one is one).  A
+class is resolved from the number on at which every wrong twin lies behind the true one by 25 in the
+Bayesian information criterion, noise aside, with everything refitted that a diagnosis refits.  Reference poses and long holds, which a plan has besides, are left out.
 
     python bench/plan_resolves.py [CASES] [FIRST_SEED]
 """
@@ -82,7 +82,7 @@ VISIBLE = 6.0
 DECISIVE = 6.0
 MOST_TWINS = 5
 EXTRA = 48
-"""Extra measurements at most."""
+"""Extra poses at most."""
 
 PLANS = 2
 design_pool.POOL = 60
@@ -201,14 +201,14 @@ def fitted(known: Information, truth: str, signature: Signature) -> Effect | Non
 
 def resolved_from(
     poor: np.ndarray, extra: Information, counts: np.ndarray, truth: str, twins: list
-) -> float:
-    """Return the number of extra measurements from which on the class is resolved, or infinite."""
+) -> tuple[float, float]:
+    """Return the numbers of poses and measurements from which on the class is resolved."""
     grams = poor + np.cumsum(extra.grams, axis=0)
     good = behind(grams, extra.layout, truth, twins).min(axis=1) >= RESOLVED**2
     if not good[-1]:
-        return np.inf
-    bad = np.flatnonzero(~good)
-    return float(np.cumsum(counts)[bad[-1] + 1 if len(bad) else 0])
+        return np.inf, np.inf
+    last = int(np.flatnonzero(~good)[-1]) + 1 if not good.all() else 0
+    return float(last + 1), float(np.cumsum(counts)[last])
 
 
 def planned_visits(first: Effect, others: list, poor: Timeline, seed: int) -> list[Visit]:
@@ -327,36 +327,45 @@ def main() -> None:
             print(f"{seed:4d} {found['truth']:32s} left out: {found['skip']}", flush=True)
         else:
             done.append(found)
+            (planned, more), (random, _) = found["planned"], found["random"]
             print(
-                f"{seed:4d} {found['truth']:32s} planned {found['planned']:4.0f}  random "
-                f"{found['random']:4.0f}  against {', '.join(found['twins'])}",
+                f"{seed:4d} {found['truth']:32s} planned {planned:3.0f} poses ({more:3.0f} "
+                f"measurements)  random {random:3.0f}  against {', '.join(found['twins'])}",
                 flush=True,
             )
         seed += 1
     pairs = np.array([(each["planned"], each["random"]) for each in done])
-    report(pairs, skipped)
+    print(f"{len(done)} cases, {skipped} left out; up to {EXTRA} extra poses")
+    for place, what in enumerate(("poses", "measurements")):
+        report(pairs[..., place], what)
 
 
-def report(pairs: np.ndarray, skipped: int) -> None:
-    """Print medians with bootstrap intervals; never resolved counts as more than all poses."""
-    most = float(EXTRA)
-    capped = np.where(np.isfinite(pairs), pairs, 2.0 * most)
+def report(pairs: np.ndarray, what: str) -> None:
+    """Print medians with bootstrap intervals; never resolved counts as twice all poses."""
+    capped = np.where(np.isfinite(pairs), pairs, 2.0 * EXTRA)
     rng = np.random.default_rng(0)
     draws = capped[rng.integers(len(capped), size=(4000, len(capped)))]
-    ratio = np.median(capped[:, 0] / capped[:, 1])
-    low, high = np.quantile(np.median(draws[..., 0] / draws[..., 1], axis=1), [0.025, 0.975])
-    print(f"{len(pairs)} cases, {skipped} left out; up to {most:.0f} extra measurements")
     for name, column in (("planned", 0), ("random", 1)):
         never = int(np.sum(~np.isfinite(pairs[:, column])))
-        print(
-            f"{name:8s} median {np.median(capped[:, column]):4.0f} measurements, "
-            f"never resolved {never}"
-        )
+        print(f"{name:8s} median {np.median(capped[:, column]):4.1f} {what}, never {never}")
     print(
-        f"planned / random, median over cases {ratio:.2f} (95 % {low:.2f} to {high:.2f}); "
-        f"medians' ratio {np.median(capped[:, 0]) / np.median(capped[:, 1]):.2f}; "
-        f"never resolved counted as {2.0 * most:.0f}"
+        f"planned / random {what}: median of the cases' ratios "
+        f"{_spread(np.median(draws[..., 0] / draws[..., 1], axis=1), capped[:, 0] / capped[:, 1])}"
+        f", ratio of the medians "
+        f"{np.median(capped[:, 0]) / np.median(capped[:, 1]):.2f} "
+        f"({_interval(np.median(draws[..., 0], axis=1) / np.median(draws[..., 1], axis=1))}), "
+        f"ratio of the sums {capped[:, 0].sum() / capped[:, 1].sum():.2f} "
+        f"({_interval(draws[..., 0].sum(axis=1) / draws[..., 1].sum(axis=1))})"
     )
+
+
+def _spread(draws: np.ndarray, values: np.ndarray) -> str:
+    return f"{np.median(values):.2f} ({_interval(draws)})"
+
+
+def _interval(draws: np.ndarray) -> str:
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return f"95 % {low:.2f} to {high:.2f}"
 
 
 if __name__ == "__main__":
