@@ -230,3 +230,36 @@ def test_a_part_of_a_session_keeps_what_is_said_of_the_whole(tmp_path, complete,
     assert len(part) == 10
     assert part.remarks == session.remarks
     assert part.clock_offset_s == session.clock_offset_s
+
+
+def test_the_way_between_poses_that_are_far_apart_is_told(tmp_path, campaign, table):
+    """Poses every second; motor 1 turns back at 1, 3, 5 and 7 s, motor 2 at other times."""
+    campaign.with_joints().with_loads().with_poses(stamps=campaign.pose_ns[50::100])
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    measured = session.measured.all(axis=1)
+    assert measured.sum() == 8
+    theta, time = session.block.theta, session.block.time - 1_700_000_000
+    for reversal in (1.0, 3.0, 5.0, 7.0):
+        row = int(np.argmin(np.abs(time - reversal)))
+        assert not measured[row]
+        assert abs(theta[row, 0]) == pytest.approx(np.radians(20.0), rel=1e-9)
+    # Between the rows both angles go one way only.
+    dense = campaign.theta(campaign.joint_ns[55:750])
+    rows = np.searchsorted(time, 1e-9 * (campaign.joint_ns[55:750] - 1.7e18))
+    for start, end in zip(range(len(time) - 1), range(1, len(time)), strict=True):
+        between = dense[rows == end]
+        if len(between) > 1:
+            low = np.minimum(theta[start], theta[end]) - 2 * np.radians(0.015)
+            high = np.maximum(theta[start], theta[end]) + 2 * np.radians(0.015)
+            assert np.all((between >= low) & (between <= high))
+
+
+def test_a_pull_between_two_poses_is_told(tmp_path, campaign, table):
+    pulled = {130: (0.0, 0.0, -3.0)}
+    campaign.with_joints().with_loads(force=lambda i: pulled.get(i, (0.0, 0.0, -1.0)))
+    campaign.with_poses(stamps=campaign.pose_ns[50::100])
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    row = int(np.argmin(session.block.load[:, 2]))
+    assert session.block.load[row, 2] == -3.0
+    assert session.block.time[row] == pytest.approx(1_700_000_001.3, abs=1e-6)
+    assert not session.measured[row].any()

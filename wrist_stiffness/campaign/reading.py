@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.clocks import ClockOffset, clock_offset
 from wrist_stiffness.campaign.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.path import turning_stamps
 from wrist_stiffness.campaign.pose_track import PoseTrack, pose_track
 from wrist_stiffness.campaign.registration import agreement
 from wrist_stiffness.campaign.signals import Signal, Stamps
@@ -70,6 +71,12 @@ LEAST_SPIKE_M = 30e-6
 LEAST_SPIKE_STEPS = 4.0
 """In encoder steps: in motion the measured rotation leaves the encoders' by counts."""
 
+TURN_STEPS = 1.5
+"""In encoder steps: a smaller swing between two poses is the chatter of a count."""
+
+PULL_SHARE = 0.25
+"""Of the load's range: a smaller pull between two poses may be noise."""
+
 OTHER_GEOMETRY = float(np.radians(5.0))
 """Median angle between measured and rigid rotation that no effect explains."""
 
@@ -103,7 +110,8 @@ def read_session(
     Returns
     -------
     MeasuredSession
-        Named after the recording, with remarks on everything that could not be used.
+        Named after the recording, with remarks on everything that could not be used.  Where poses
+        are far apart, rows without a measurement tell where angles and load turned back in between.
 
     Raises
     ------
@@ -146,14 +154,15 @@ def _session(
     remarks += reasons
     if not usable.any():
         raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
-    block = machine.at(track.time_ns[usable])
-    shift, rotation = track.shift[usable], track.rotation[usable]
+    time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
+    block = machine.at(time_ns)
     reachable = table.mechanism.reachable(block.theta)
     if not reachable.all():
         remarks.append(
             f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
         )
-        block, shift, rotation = block.take(reachable), shift[reachable], rotation[reachable]
+        block, time_ns = block.take(reachable), time_ns[reachable]
+        shift, rotation = shift[reachable], rotation[reachable]
     rigid = rigid_rotation(table, block.theta)
     _require_same_wrist(rotation, rigid)
     lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
@@ -165,11 +174,14 @@ def _session(
         remarks.append(
             "the load never changes: what the load does and what is always there look the same"
         )
+    path_ns = _path(machine, time_ns, table, load_age_limit_s)
+    all_ns = np.union1d(time_ns, path_ns)
+    rows = np.searchsorted(all_ns, time_ns)
     session = MeasuredSession(
         name,
-        block,
-        shift,
-        rotation,
+        machine.at(all_ns) if len(path_ns) else block,
+        _spread(shift, rows, len(all_ns)),
+        _spread(rotation, rows, len(all_ns)),
         track.covariance,
         remarks=tuple(remarks),
         clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
@@ -182,6 +194,31 @@ def _session(
             f"needed ({why})"
         )
     return session
+
+
+def _path(
+    machine: MachineSignals, time_ns: Stamps, table: Table, load_age_limit_s: float
+) -> Stamps:
+    """Return the stamps that tell the way between poses that are far apart."""
+    if len(time_ns) < 2:
+        return time_ns[:0]
+    step = table.geometry.limits.encoder_step
+    turns = turning_stamps(machine.angles, time_ns, np.full(2, TURN_STEPS * step))
+    pulls = turning_stamps(
+        machine.loads, time_ns, PULL_SHARE * np.ptp(machine.loads.values, axis=0)
+    )
+    found = np.union1d(turns, pulls)
+    found = found[machine.usable(found, load_age_limit_s)[0]]
+    return found[table.mechanism.reachable(machine.angles.interpolated(found))]
+
+
+def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
+    """Return values (n, ...) at their rows among so many, NaN at the others."""
+    if count == len(values):
+        return values
+    out = np.full((count, *values.shape[1:]), np.nan)
+    out[rows] = values
+    return out
 
 
 def rigid_rotation(table: Table, theta: Array) -> Array:
