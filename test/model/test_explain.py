@@ -96,6 +96,7 @@ def test_rows_add_up_to_s_and_phi_and_name_the_rest(model_path, loaded):
     pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
     found = explain(model_path, POSE.tolist(), LOAD, measured=pose)
     assert found.measured
+    assert "5.39 um and 0.573 mdeg are not explained, " in found.verdict
     last = found.rows[-1]
     assert last.kind == "rest"
     assert np.allclose(last.twist, rest, atol=1e-12)
@@ -107,6 +108,21 @@ def test_rows_add_up_to_s_and_phi_and_name_the_rest(model_path, loaded):
     play = next(row for row in values["rows"] if row["name"] == "joint_clearance@joint_3")
     assert "play" in play["meaning"]
     assert play["s_sigma_um"] > 0.0
+
+
+def test_a_rest_within_the_uncertainty_is_no_reason_to_search(model_path, loaded):
+    prediction = loaded.predict(POSE, LOAD)
+    size, direction = np.linalg.eigh(prediction.covariance[:3, :3])
+    verdicts = []
+    for sigmas in (1.9, 2.1):
+        moved = np.concatenate([sigmas * np.sqrt(size[2]) * direction[:, 2], np.zeros(3)])
+        rotation, shift = exp_twist(prediction.twist + moved)
+        turned = rotation @ loaded.table.mechanism.forward(POSE).platform
+        pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
+        verdicts.append(explain(model_path, POSE.tolist(), LOAD, measured=pose).verdict)
+    assert "no more than the uncertainty" in verdicts[0]
+    assert "an effect is missing" in verdicts[1]
+    assert explain(model_path, POSE.tolist(), LOAD).verdict == ""
 
 
 def test_command_prints_a_table_and_writes_json(model_path, tmp_path, capsys):

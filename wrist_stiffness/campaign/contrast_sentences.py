@@ -292,7 +292,7 @@ def _slow_motions(times: Array, sessions: Labels) -> Array:
         own = sessions == session
         passed = times[own] - times[own][0]
         span = max(float(passed[-1]), 1e-9)
-        count = min(int(2.0 * span / WANDER_S), own.sum() // FEWEST_PER_MOTION)
+        count = min(int(2.0 * span / WANDER_S) + 1, own.sum() // FEWEST_PER_MOTION)
         for order in range(1, count + 1):
             column = np.zeros(len(times))
             column[own] = np.cos(np.pi * order * passed / span)

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.pose_options import add_pose_options, whole_load
 
 DESCRIPTION = """\
 Say why the platform is off at given motor angles under a given load: the error split by component
@@ -29,21 +30,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
-    parser.add_argument(
-        "--angles", nargs=2, type=float, required=True, metavar="DEG", help="motor angles [deg]"
-    )
-    parser.add_argument(
-        "--load",
-        nargs="+",
-        type=float,
-        default=[0.0] * 6,
-        metavar="N",
-        help="force [N], or force [N] and moment [N m], on the platform at O (default: none)",
-    )
-    parser.add_argument(
-        "--on-platform", action="store_true", help="the load's axes turn with the platform"
-    )
+    add_pose_options(parser)
     parser.add_argument(
         "--measured",
         nargs=7,
@@ -72,15 +59,12 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
-    from wrist_stiffness.errors import InputError
     from wrist_stiffness.model.block import Load
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.explain import explain
     from wrist_stiffness.workflows.json_file import write_json
 
-    if len(arguments.load) not in (3, 6):
-        raise InputError(f"--load takes 3 or 6 numbers, not {len(arguments.load)}")
-    load = np.array([*arguments.load, *[0.0] * (6 - len(arguments.load))])
+    load = np.array(whole_load(arguments.load))
     measured = arguments.measured
     if measured is not None:
         measured = [*(1e-3 * value for value in measured[:3]), *measured[3:]]
@@ -101,6 +85,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if explanation.measured:
         print(_line("measured", values["s_um"], 0.0, values["phi_mdeg"], 0.0))
         print(f"uncertainty of the prediction: {sigma[0]:.3f} um, {sigma[1]:.3f} mdeg")
+        print(values["verdict"])
     else:
         print(_line("predicted", values["s_um"], sigma[0], values["phi_mdeg"], sigma[1]))
     for warning in values["warnings"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.pose_options import add_pose_options, whole_load
 
 DESCRIPTION = """\
 Predict how far the platform is off at given motor angles under a given load, own weight included:
@@ -24,21 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
-    parser.add_argument(
-        "--angles", nargs=2, type=float, required=True, metavar="DEG", help="motor angles [deg]"
-    )
-    parser.add_argument(
-        "--load",
-        nargs="+",
-        type=float,
-        default=[0.0] * 6,
-        metavar="N",
-        help="force [N], or force [N] and moment [N m], on the platform at O (default: none)",
-    )
-    parser.add_argument(
-        "--on-platform", action="store_true", help="the load's axes turn with the platform"
-    )
+    add_pose_options(parser)
     parser.add_argument(
         "--both", action="store_true", help="by the table's closed form and by its spline"
     )
@@ -49,14 +36,11 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
-    from wrist_stiffness.errors import InputError
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.json_file import write_json
     from wrist_stiffness.workflows.predict import predict
 
-    if len(arguments.load) not in (3, 6):
-        raise InputError(f"--load takes 3 or 6 numbers, not {len(arguments.load)}")
-    load = [*arguments.load, *[0.0] * (6 - len(arguments.load))]
+    load = whole_load(arguments.load)
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
     theta = np.radians(arguments.angles).tolist()
     values = predict(model, theta, load, arguments.on_platform, arguments.both).as_values()

@@ -24,6 +24,9 @@ QUATERNION_TOLERANCE = 1e-3
 FARTHEST_MM = 100.0
 """A measured point farther from O is a unit mistake: the wrist is not much larger itself."""
 
+WITHIN = 2.0
+"""A rest up to so many standard uncertainties of the prediction is explained."""
+
 TEMPERATURES = (*BODY, "ambient")
 
 UM, MDEG = 1e6, 180e3 / np.pi
@@ -88,6 +91,8 @@ class Explanation:
         Standard uncertainty of the prediction along the total [m, rad].
     warnings : tuple of str
         Effects that were left out or have left first order.
+    verdict : str
+        Whether a measured error is explained, in one sentence; empty for a predicted one.
     """
 
     total: Array
@@ -95,10 +100,12 @@ class Explanation:
     rows: tuple[Row, ...]
     sigma: Array
     warnings: tuple[str, ...]
+    verdict: str
 
     def as_values(self) -> dict[str, Any]:
         """Return what people and programs read, with units in the names."""
         return {
+            "verdict": self.verdict,
             "s_um": UM * float(np.linalg.norm(self.total[:3])),
             "phi_mdeg": MDEG * float(np.linalg.norm(self.total[3:])),
             "measured": self.measured,
@@ -228,7 +235,23 @@ def _explained(
     if measured:
         rest = total - parts.measured
         rows.append(Row("not explained", "rest", rest, directions @ rest, sigma, ""))
-    return Explanation(total, measured, tuple(rows), sigma, parts.warnings)
+    verdict = _verdict(total - parts.measured, covariance) if measured else ""
+    return Explanation(total, measured, tuple(rows), sigma, parts.warnings, verdict)
+
+
+def _verdict(rest: Array, covariance: Array) -> str:
+    """Return whether a rest is more than the uncertainty of the prediction in its direction."""
+    directions = _directions(rest)
+    sizes = directions @ rest
+    sigma = np.sqrt(np.einsum("ki,ij,kj->k", directions, covariance, directions))
+    ratio = np.divide(sizes, sigma, out=np.where(sizes > 0.0, np.inf, 0.0), where=sigma > 0.0)
+    left = f"{UM * sizes[0]:.3g} um and {MDEG * sizes[1]:.3g} mdeg are not explained"
+    if ratio.max() <= WITHIN:
+        return f"{left}: no more than the uncertainty of the prediction"
+    return (
+        f"{left}, {ratio.max():.2g} x the uncertainty of the prediction: the measurement is off, "
+        "or an effect is missing ('compare' and 'diagnose' tell from many poses)"
+    )
 
 
 def _directions(total: Array) -> Array:
