@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -16,6 +16,9 @@ from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.registry import catalogue
+
+LARGE = 5.0
+"""An effect so many times its usual size would still surprise nobody who looks for a fault."""
 
 SET_UP = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias")
 """Refitted in every session before any search; there is nothing to find."""
@@ -104,10 +107,11 @@ class WristCandidate:
         """Return it as the statistics take it."""
         first = self.recipe.columns(tuple(p.grid[0] for p in self.recipe.shape))
         law = self.law
+        factors = [c.factor for c in first]
         return Candidate(
             law.id,
             self.place,
-            tuple(column.factor for column in first),
+            tuple(replace(f, plausible=LARGE * (f.plausible or np.inf)) for f in factors),
             self.columns,
             self.recipe.shape,
             needs=law.excited_by,

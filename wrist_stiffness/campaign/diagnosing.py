@@ -7,14 +7,14 @@ sought first, by fits of the leading candidates with their own laws, the base al
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wrist_stiffness.campaign.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import Observed, UnitSession, as_units
+from wrist_stiffness.campaign.observing import QUANTITIES, Observed, UnitSession, as_units
 from wrist_stiffness.campaign.screening import MOST_FITTED, Screen
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
@@ -94,6 +94,7 @@ def diagnose_sessions(
         rng,
         settings,
     )
+    result = replace(result, absorbed=_absorbed(base, [session.name for session in sessions]))
     known = {each.name: each for each in candidates}
     effects = tuple(_started(known[each.name], each.parameters) for each in result.findings)
     return WristDiagnosis(result, observed, effects, base)
@@ -153,6 +154,26 @@ def _point(base: BaseFit) -> Point:
 def _absent(base: BaseFit) -> set[str]:
     """Return effects that the model holds fast: a second one of the name cannot be added."""
     return {effect.name for effect in base.problem.model.effects}
+
+
+def _absorbed(base: BaseFit, sessions: list[str]) -> tuple[str, ...]:
+    """Tell how far each part of the base moved the prediction, as root mean squares."""
+    groups: dict[str, list[int]] = {}
+    for place, unknown in enumerate(base.problem.unknowns):
+        if base.of_base[place]:
+            name = base.problem.free[unknown.free].effect.name
+            where = "" if unknown.session is None else f" in {sessions[unknown.session]}"
+            groups.setdefault(name + where, []).append(place)
+    sentences = []
+    for name, places in groups.items():
+        moved = base.columns[:, :, places] @ base.z[places]
+        sizes = [
+            f"{q.per_si * np.sqrt(np.mean(np.sum(moved[:, list(q.components)] ** 2, axis=1))):.3g}"
+            f" {q.unit} of {q.name}"
+            for q in QUANTITIES
+        ]
+        sentences.append(f"{name}: {', '.join(sizes)}")
+    return tuple(sentences)
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:

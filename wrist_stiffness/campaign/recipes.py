@@ -1,8 +1,8 @@
 """How each law of the catalogue becomes columns: which trials, at which shapes.
 
 A law is linear in some parameters and not in others.  The linear ones become columns by
-differences; the others are a grid of shapes.  A few laws need other coordinates: a mass and its place are linear
-as a mass and its first moment; a gap, a hardening or a friction is a shape times a share.
+differences; the others are a grid of shapes.  A few laws need other
+coordinates: a mass and its place are linear as a mass and its first moment; a gap, a hardening or a friction is a shape times a share.
 """
 
 from __future__ import annotations

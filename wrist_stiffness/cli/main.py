@@ -11,6 +11,7 @@ from wrist_stiffness import __version__
 from wrist_stiffness.cli import (
     cell,
     compare,
+    diagnose,
     explain,
     export,
     import_,
@@ -75,6 +76,7 @@ COMMANDS: tuple[CommandModule, ...] = (
     import_,
     export,
     compare,
+    diagnose,
     plan,
     cell,
 )

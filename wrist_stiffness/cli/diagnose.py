@@ -1,0 +1,64 @@
+"""`wrist-stiffness diagnose`: which physical effect is missing."""
+
+from __future__ import annotations
+
+import argparse
+
+from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
+
+DESCRIPTION = """\
+Say which physical effect a model misses, from recordings with a measured pose of the platform.
+Registrations, encoder zeros, load tare and the wrist's tolerances are fitted first; then every
+effect of the catalogue is tried at every place.  Effects that the recordings cannot tell apart are
+named together.  The answer may be 'nothing' or 'none of these'.
+Several recordings are sessions of one wrist: the last one judges what the others show, so record
+on two days.  Of a single recording the end is put aside."""
+
+EPILOG = """\
+examples:
+  wrist-stiffness diagnose monday tuesday --model my_wrist.yaml --report why.html
+  wrist-stiffness diagnose monday --json why.json"""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `diagnose`."""
+    parser = commands.add_parser(
+        "diagnose",
+        help="which physical effect is missing in a model",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "recordings", nargs="+", metavar="RECORDING", help="recording, or folder of recordings"
+    )
+    parser.add_argument("--model", metavar="FILE", help="model file (default: the shipped wrist's)")
+    parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
+    add_recording_options(parser)
+    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+    parser.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.diagnose import diagnose_recordings
+    from wrist_stiffness.workflows.json_file import write_json
+
+    found = diagnose_recordings(
+        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+        recordings_named(arguments.recordings, arguments),
+        this_run(),
+        Progress,
+    )
+    print("\n".join(found.lines()))
+    if arguments.report:
+        from wrist_stiffness.workflows.report.page import write_page
+
+        write_page(arguments.report, found.report())
+        print(f"\nwritten: {arguments.report}")
+    if arguments.json:
+        write_json(arguments.json, found.as_values())
+    return 0

@@ -1,0 +1,201 @@
+"""Which physical effect is missing, from recordings to an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wrist_stiffness.campaign.diagnosing import WristDiagnosis, diagnose_sessions
+from wrist_stiffness.diagnosis import Diagnosis, Finding
+from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.workflows.calibrate import Run
+from wrist_stiffness.workflows.compare import remarks_of
+from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+
+if TYPE_CHECKING:
+    from wrist_stiffness.workflows.report.page import Page
+
+Progress = Callable[[int, int], None]
+
+SEED = 0
+"""Of what chance gives: the same recordings give the same answer."""
+
+COMPENSABLE = {
+    "yes": "the nodes can correct it",
+    "needs_signal": "the nodes can correct it where they get its signal",
+    "no": "it is in the instrument, so nothing is to be corrected",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A diagnosis and what it was made from.
+
+    Parameters
+    ----------
+    answer : WristDiagnosis
+        What was found.
+    recordings : tuple of str
+        Names of the sessions.
+    remarks : tuple of str
+        What could not be used of the recordings.
+    provenance : Provenance
+        Files and versions.
+    """
+
+    answer: WristDiagnosis
+    recordings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    provenance: Provenance
+
+    @property
+    def result(self) -> Diagnosis:
+        """What the statistics say."""
+        return self.answer.diagnosis
+
+    def lines(self) -> list[str]:
+        """Return the answer for a terminal, the verdict first."""
+        result = self.result
+        out = [*verdict_lines(result), "", *_table(result)]
+        for place, finding in enumerate(result.findings, 1):
+            out += ["", *_finding_lines(place, finding)]
+        if result.unexplained.evidence:
+            share = 100.0 * result.unexplained.energy_share
+            out += ["", f"not explained: {share:.0f} % of the structure above the noise"]
+            out.append(f"  {result.unexplained.evidence}")
+            if result.unexplained.depends_on:
+                out.append(f"  it depends on {', '.join(result.unexplained.depends_on)}")
+        if result.not_excited:
+            out += ["", "these recordings cannot show:"]
+            out += [f"  {names}: {needs}" for needs, names in _needs(result).items()]
+        out += ["", "taken up first, by the refit of the set-up and the wrist's tolerances:"]
+        out += [f"  {line}" for line in result.absorbed]
+        out.append(f"held-out errors are valid for {result.scope}")
+        if result.lost_units:
+            out.append(f"note: {result.lost_units} units left out as lost beams")
+        return [*out, *(f"note: {remark}" for remark in self.remarks)]
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        return {
+            **self.result.as_json(),
+            "notes": list(self.remarks),
+            "provenance": self.provenance.as_values(),
+        }
+
+    def report(self) -> Page:
+        """Return the report with pictures."""
+        from wrist_stiffness.workflows.report.diagnosis_report import (
+            report_of_diagnosis,
+            shown_by,
+        )
+
+        observed, result = self.answer.observed.observations, self.result
+        explained = self.answer.base.residual if result.findings else None
+        shown = shown_by(observed, np.random.default_rng(SEED), explained)
+        return report_of_diagnosis(result, shown, self.recordings, self.remarks, self.provenance)
+
+
+def diagnose_recordings(
+    model: str | Path,
+    recordings: Recordings,
+    run: Run,
+    progress: Callable[[str], Progress] = lambda label: lambda done, total: None,
+) -> Diagnosed:
+    """Find the effects that a model misses in recordings of one wrist.
+
+    Parameters
+    ----------
+    model : path
+        Model file.
+    recordings : Recordings
+        Each a session; the last one judges what the others show.
+    run : Run
+        For the report.
+    progress : callable
+        From a label to a function that is told steps done and in all.
+
+    Returns
+    -------
+    Diagnosed
+        Verdict, findings and what remains open.
+
+    Raises
+    ------
+    WristError
+        If the model or a recording cannot be used.
+    """
+    loaded = load_model(model)
+    sessions = read_sessions(recordings, loaded.table, progress("reading"))
+    rng = np.random.default_rng(SEED)
+    answer = diagnose_sessions(
+        loaded, list(sessions.values()), rng, progress=progress("trying effects")
+    )
+    hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
+    return Diagnosed(
+        answer,
+        tuple(hashes),
+        remarks_of(sessions.values()),
+        Provenance(run.command, run.date, {Path(model).stem: file_sha256(model)}, hashes),
+    )
+
+
+def verdict_lines(result: Diagnosis) -> list[str]:
+    """Return the verdict in one or two sentences."""
+    if result.verdict == "none":
+        return ["Nothing is missing: what is left is noise."]
+    found = "; ".join(_class_of(each) for each in result.findings)
+    if result.verdict == "effect":
+        return [f"Missing in the model: {found}."]
+    if found:
+        return [f"Missing in the model: {found}.", "Something else that no known effect explains."]
+    return ["Something is missing that no known effect explains."]
+
+
+def _class_of(finding: Finding) -> str:
+    names = finding.names
+    return names[0] if len(names) == 1 else f"{names[0]} (or {', '.join(names[1:])})"
+
+
+def _table(result: Diagnosis) -> list[str]:
+    titles = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
+    rows = (
+        ("set-up refitted", result.before),
+        ("with the findings", result.after),
+        ("noise floor", result.noise_floor),
+    )
+    out = [f"{'RMS on the part put aside':28}" + "".join(f"{titles[k]:>12}" for k in result.before)]
+    return out + [f"  {name:26}" + "".join(f"{row[k]:12.3g}" for k in row) for name, row in rows]
+
+
+def _finding_lines(place: int, finding: Finding) -> list[str]:
+    out = [f"{place}. {_class_of(finding)}", f"   {finding.evidence}"]
+    out += [
+        f"   {name} = {value:.4g} +- {error:.2g}"
+        for name, (value, error) in finding.parameters.items()
+    ]
+    if finding.check:
+        out.append(f"   to be sure: {finding.check}")
+    bought = ", ".join(
+        f"{key.rpartition('_')[0]} {gain:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
+        for key, (gain, error) in finding.buys.items()
+    )
+    out.append(f"   brings {bought}; {COMPENSABLE[finding.compensable]}")
+    out.append(
+        f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
+        f"BIC falls by {finding.delta_bic:.3g}"
+    )
+    return out
+
+
+def _needs(result: Diagnosis) -> dict[str, str]:
+    """Return what effects need to be recorded, by what it is."""
+    needs: dict[str, list[str]] = {}
+    for each in result.not_excited:
+        needs.setdefault(each.needs, []).append(f"{each.effect}@{each.component}")
+    return {need: ", ".join(names) for need, names in needs.items()}
