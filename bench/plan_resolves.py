@@ -5,10 +5,11 @@ paper: 25 poses, one load, one approach.  The effects that fit these measurement
 the true one are its class of twins.  `plan` chooses extra settings, each visited from both sides;
 where these do not suffice it plans once more, and no third time.  The others are random: poses,
 sides, and loads of the same list.  Both are performed by the virtual cell, with instruments set up
-anew.  Counted are poses (one approach each; the other side is another pose) and measurements at rest
-(a planned pose with a load is two, as it is measured without it as well; a random one is one).  A
-class is resolved from the number on at which every wrong twin lies behind the true one by 25 in the
-Bayesian information criterion, noise aside, with everything refitted that a diagnosis refits.  Reference poses and long holds, which a plan has besides, are left out.
+anew.  Counted are poses (one approach each; the other side is another pose) and measurements at
+rest (a planned pose with a load is two, as it is measured without it as well; a random one is one).
+A class is resolved from the number on at which every wrong twin lies behind the true one by 25 in
+the Bayesian information criterion, noise aside, with everything refitted that a diagnosis refits.
+Reference poses and long holds, which a plan has besides, are left out.
 
     python bench/plan_resolves.py [CASES] [FIRST_SEED]
 """
