@@ -117,6 +117,8 @@ def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Co
         With the residual moved by the rigid Jacobian; the error's own change between the two poses
         is smaller than that by the ratio of error to pose, 1e-3.
     """
+    if delta.tolist() == correction.delta.tolist():
+        return correction
     jacobian = mechanism.jacobian(correction.prediction.configuration)
     after = correction.after.copy()
     after[3:] += jacobian.dot(delta - correction.delta)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Literal
 
 import numpy as np
@@ -48,14 +49,15 @@ class MotorNames:
             If a motor is missing or named twice.
         """
         found = []
+        listed = list(names)
         for motor in (self.motor_1, self.motor_2):
-            count = list(names).count(motor)
+            count = listed.count(motor)
             if count != 1:
                 count_text = "is missing" if count == 0 else f"is named {count} times"
                 raise InputError(
                     f"{what}: {motor} {count_text} among {', '.join(names) or 'no names'}"
                 )
-            found.append(list(names).index(motor))
+            found.append(listed.index(motor))
         return found[0], found[1]
 
     def angles(
@@ -85,10 +87,10 @@ class MotorNames:
         places = self.places(names, what)
         if len(positions) != len(names):
             raise InputError(f"{what}: {len(positions)} positions for {len(names)} names")
-        theta = np.array([positions[place] for place in places], dtype=float)
-        if not np.all(np.isfinite(theta)):
-            raise InputError(f"{what}: motor angles ({theta[0]}, {theta[1]}) are not finite")
-        return theta
+        first, second = (float(positions[place]) for place in places)
+        if not (isfinite(first) and isfinite(second)):
+            raise InputError(f"{what}: motor angles ({first}, {second}) are not finite")
+        return np.array([first, second])
 
     def speeds(self, names: Sequence[str], velocities: Sequence[float]) -> Array | None:
         """Return the motor speeds of a joint state or command whose angles are usable.
@@ -134,6 +136,7 @@ class SensorFrame:
 
 
 IN_BASE = SensorFrame(BASE_FRAME)
+ON_PLATFORM = SensorFrame(PLATFORM_FRAME)
 
 
 @dataclass(frozen=True)
@@ -170,14 +173,17 @@ class Frames:
         InputError
             If a component is not finite.
         """
-        known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: SensorFrame(PLATFORM_FRAME)}
+        known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: ON_PLATFORM}
         frame = self.sensors.get(frame_id) or known.get(frame_id)
         if frame is None:
             names = ", ".join([*known, *self.sensors])
             raise FrameError(f"load: frame '{frame_id}' is not known (known: {names})")
-        wrench = np.array([*force, *moment], dtype=float)
-        if not np.all(np.isfinite(wrench)):
-            raise InputError(f"load: wrench {wrench.tolist()} is not finite")
+        components = [*map(float, force), *map(float, moment)]
+        if not all(map(isfinite, components)):
+            raise InputError(f"load: wrench {components} is not finite")
+        wrench = np.array(components)
+        if frame is IN_BASE or frame is ON_PLATFORM:
+            return Load(wrench, frame is ON_PLATFORM)
         sign = 1.0 if frame.acts_on == "platform" else -1.0
         turned_force = sign * (frame.rotation @ wrench[:3])
         turned_moment = sign * (frame.rotation @ wrench[3:]) + cross(frame.position, turned_force)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from math import hypot
 from typing import Any
@@ -46,7 +47,7 @@ class PoseErrorPredictor(WristNode):
         self._warnings: tuple[str, ...] = ()
         wait_s = self.get_parameter("load_wait_s").value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.waiting = LoadWait(wait_s, lambda: steady.now().nanoseconds)
+        self.waiting = LoadWait(wait_s, time.monotonic_ns)
         if wait_s > 0.0:
             self.create_timer(wait_s / CHECKS_PER_WAIT, self.after_load, clock=steady)
         self.autostart()
