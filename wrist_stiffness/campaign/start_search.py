@@ -67,13 +67,13 @@ def _factors(
         ],
         axis=1,
     )
-    size = np.array([column.factor.scale for column in columns])
+    size = np.array([column.factor.plausible or 1.0 for column in columns])
     lower = np.array([column.factor.lower for column in columns]) / size
     upper = np.array([column.factor.upper for column in columns]) / size
     rows = np.vstack([design * size, np.eye(len(size))])
     target = np.concatenate([-judge.residual, np.zeros(len(size))])
     best = lsq_linear(rows, target, (lower, upper))
-    names = [column.factor.key for column in columns]
+    names = [column.factor.name for column in columns]
     return float(best.cost), dict(zip(names, (best.x * size).tolist(), strict=True))
 
 

@@ -48,6 +48,31 @@ DEEPEST = 50
 """Levels of a formula's tree."""
 
 
+def names_in(text: str) -> frozenset[str]:
+    """Return the names of variables in an expression.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    used = {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
+    return frozenset(used - FUNCTIONS.keys())
+
+
+def _parsed(text: str) -> ast.expr:
+    if len(text) > LONGEST:
+        raise InputError(f"formula: {len(text)} characters, at most {LONGEST}")
+    try:
+        return ast.parse(text, mode="eval").body
+    except SyntaxError as error:
+        raise InputError(
+            f"formula {text!r}, column {error.offset or len(text) + 1}: {error.msg}"
+        ) from error
+    except (ValueError, RecursionError, MemoryError) as error:
+        raise InputError(f"formula {text!r}: cannot be read: {error}") from error
+
+
 @dataclass(frozen=True)
 class Formula:
     """An expression in named variables.
@@ -75,8 +100,7 @@ class Formula:
     @property
     def names(self) -> frozenset[str]:
         """Variables that the expression does use."""
-        used = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
-        return frozenset(used - FUNCTIONS.keys())
+        return names_in(self.text)
 
     def __call__(self, values: Mapping[str, Value]) -> Array:
         """Return the value for variables of n samples.
@@ -96,16 +120,7 @@ class Formula:
 
     @cached_property
     def _tree(self) -> ast.expr:
-        if len(self.text) > LONGEST:
-            raise InputError(f"formula: {len(self.text)} characters, at most {LONGEST}")
-        try:
-            return ast.parse(self.text, mode="eval").body
-        except SyntaxError as error:
-            raise InputError(
-                f"formula {self.text!r}, column {error.offset or len(self.text) + 1}: {error.msg}"
-            ) from error
-        except (ValueError, RecursionError, MemoryError) as error:
-            raise InputError(f"formula {self.text!r}: cannot be read: {error}") from error
+        return _parsed(self.text)
 
     def _check(self, node: ast.expr, depth: int) -> None:
         if depth > DEEPEST:

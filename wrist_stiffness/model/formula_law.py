@@ -19,6 +19,17 @@ MOTION = ("theta_1", "theta_2", "theta_dot_1", "theta_dot_2")
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 TEMPERATURE = "T_"
 
+SIGNALS = frozenset(
+    {
+        *MOTION,
+        *WRENCH,
+        *(f"W_{axis}" for axis in WRENCH),
+        "time",
+        *(f"{TEMPERATURE}{part}" for part in (*LIMB, "ambient")),
+    }
+)
+"""What every formula may use."""
+
 
 class FormulaLaw(Law):
     """A screw along a fixed direction of the component's body, as large as a formula says.
@@ -72,19 +83,12 @@ class FormulaLaw(Law):
         self.direction = direction
         self.covariates = tuple(covariates)
         self._keys = tuple(keys)
-        known = (
-            *MOTION,
-            *WRENCH,
-            *(f"W_{axis}" for axis in WRENCH),
-            "time",
-            *(f"{TEMPERATURE}{part}" for part in (*LIMB, "ambient")),
-        )
         for own in (*self.covariates, *self._keys):
             if not own.isidentifier():
                 raise InputError(f"{name}: {own!r} is not a name")
-            if own in known or own in FUNCTIONS or (*covariates, *keys).count(own) > 1:
+            if own in SIGNALS or own in FUNCTIONS or (*covariates, *keys).count(own) > 1:
                 raise InputError(f"{name}: the name {own} is in use")
-        self.formula = Formula(expression, (*known, *self.covariates, *self._keys))
+        self.formula = Formula(expression, (*sorted(SIGNALS), *self.covariates, *self._keys))
         self.signals = tuple(
             used
             for used in sorted(self.formula.names)

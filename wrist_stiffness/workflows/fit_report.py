@@ -100,11 +100,11 @@ def left_lines(errors: Errors, judged: Judged) -> list[str]:
     return [f"judged {JUDGED_BY[judged.by]}", left]
 
 
-def told_lines(parameters: Iterable[Fitted]) -> list[str]:
-    """Return the estimates that the data tell, a line each."""
+def told_lines(parameters: Iterable[Fitted], all_of_them: bool = False) -> list[str]:
+    """Return the estimates that the data tell, or all of them, a line each."""
     lines = []
     for each in parameters:
-        if each.excited:
+        if each.excited or all_of_them:
             note = ", on its bound" if each.at_bound else ""
             lines.append(
                 f"  {each.effect:30} {each.key:24}{plus_minus(each.value, each.sigma):>22}"

@@ -1,0 +1,116 @@
+"""`wrist-stiffness extend`: add one effect to a model and fit it."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from wrist_stiffness.cli.calibrate import add_fit_options
+from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.recording_options import recordings_named
+
+if TYPE_CHECKING:
+    from wrist_stiffness.workflows.extend import Addition
+
+DESCRIPTION = """\
+Add one effect to a model, fit it to recordings together with everything that is there, and write
+the new model, which predict, replay and the nodes use as it is. The error before and after is that
+of a part which the fit does not see: the last recording, or the end of the only one. The effect is
+added even where it does not help; then a WARNING says so."""
+
+EPILOG = """\
+examples:
+  wrist-stiffness extend wrist_7.yaml --effect joint_clearance@joint_3 --fit monday -o worn.yaml
+  wrist-stiffness extend wrist_7.yaml --effect-file laws.py:Twist@platform --fit monday -o own.yaml
+  wrist-stiffness extend wrist_7.yaml --formula 'sag_mdeg * tanh(fz / soft_N)' --component link_2 \\
+      --direction 0 0 0 1 0 0 --start soft_N=0.5 --fit monday -o own.yaml
+
+In a formula every name that is no signal and no covariate of the recordings is a parameter. A
+parameter whose name ends in a unit (_um, _mdeg, _N ...) is in SI units inside the formula."""
+
+
+def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+    """Add the parser of `extend`."""
+    parser = commands.add_parser(
+        "extend",
+        help="add one effect to a model and fit it",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
+    added = parser.add_mutually_exclusive_group(required=True)
+    added.add_argument("--effect", metavar="NAME@COMPONENT", help="an effect of the catalogue")
+    added.add_argument(
+        "--effect-file",
+        metavar="FILE.py:CLASS@COMPONENT",
+        help="a law of your own in Python; the file is run as a program",
+    )
+    added.add_argument("--formula", metavar="TEXT", help="a law of your own as a formula")
+    own = parser.add_argument_group("with --formula")
+    own.add_argument("--component", help="where it is")
+    own.add_argument(
+        "--direction",
+        nargs=6,
+        type=float,
+        metavar="D",
+        help="screw for a value of 1: translation [m], rotation [rad], at O in the component's "
+        "home frame",
+    )
+    own.add_argument("--name", default="own_formula", help="its name (default: own_formula)")
+    own.add_argument(
+        "--start",
+        action="append",
+        default=[],
+        metavar="PARAMETER=VALUE",
+        help="size of a parameter that would not surprise, in the unit of its name (default: 1); "
+        "may be repeated",
+    )
+    add_fit_options(parser)
+    parser.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.workflows.extend import extend_model
+    from wrist_stiffness.workflows.json_file import write_json
+
+    found = extend_model(
+        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+        _addition(arguments),
+        recordings_named(arguments.fit, arguments),
+        arguments.output,
+        this_run(),
+        Progress("extend"),
+    )
+    print("\n".join(found.lines()))
+    print(f"\nwritten: {arguments.output}")
+    if arguments.json:
+        write_json(arguments.json, found.as_values())
+    return 0
+
+
+def _addition(arguments: argparse.Namespace) -> Addition:
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.workflows.extend import CatalogueEffect, FileEffect, FormulaEffect
+
+    if arguments.formula is None:
+        if arguments.component or arguments.direction or arguments.start:
+            raise InputError("--component, --direction and --start belong to --formula")
+        if arguments.effect is not None:
+            return CatalogueEffect(arguments.effect)
+        return FileEffect(arguments.effect_file)
+    if arguments.component is None or arguments.direction is None:
+        raise InputError("--formula needs --component and --direction")
+    start = {}
+    for text in arguments.start:
+        name, _, number = text.partition("=")
+        try:
+            start[name] = float(number)
+        except ValueError as error:
+            raise InputError(f"--start {text}: write PARAMETER=NUMBER") from error
+    return FormulaEffect(
+        arguments.name, arguments.component, arguments.direction, arguments.formula, start
+    )

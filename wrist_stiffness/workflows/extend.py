@@ -1,0 +1,257 @@
+"""Add one effect to a model, fit it, and write the new model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from wrist_stiffness.campaign.extending import Extension, extend
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula import names_in
+from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
+from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law, law_from_file
+from wrist_stiffness.workflows.calibrate import Run, writable
+from wrist_stiffness.workflows.fit_report import (
+    Errors,
+    left_lines,
+    parameter_values,
+    plus_minus,
+    told_lines,
+    used_lines,
+)
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
+
+Progress = Callable[[int, int], None]
+
+MOST_MOVED = 8
+"""Parameters of the base that are told of, those that moved farthest."""
+
+
+class Addition(Protocol):
+    """What to add."""
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect; `covariates` are those that all recordings have."""
+
+
+@dataclass(frozen=True)
+class CatalogueEffect:
+    """A law of the catalogue or of another package, `NAME@COMPONENT`."""
+
+    name: str
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect at its component."""
+        law, component = at_component(self.name)
+        return Effect(find_law(law), component)
+
+
+@dataclass(frozen=True)
+class FileEffect:
+    """A user's own law, `FILE.py:CLASS@COMPONENT`; the file is run."""
+
+    name: str
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect at its component."""
+        reference, component = at_component(self.name)
+        return Effect(law_from_file(reference, Path.cwd()), component)
+
+
+@dataclass(frozen=True)
+class FormulaEffect:
+    """A formula; what in it is neither a signal nor a covariate is a parameter.
+
+    Parameters
+    ----------
+    id : str
+        Name of the effect.
+    component : str
+        Where it is.
+    direction : sequence of 6 float
+        Screw for a value of 1, at O in the component's home frame [m, rad].
+    expression : str
+        See `model.formula_law`.
+    start : dict of str to float
+        Values of parameters from which the fit begins; 1 where there is none.
+    """
+
+    id: str
+    component: str
+    direction: Sequence[float]
+    expression: str
+    start: Mapping[str, float]
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect with its start values."""
+        names = names_in(self.expression)
+        used = sorted(names & set(covariates))
+        keys = sorted(names - SIGNALS - set(covariates))
+        if unknown := sorted(self.start.keys() - set(keys)):
+            raise InputError(
+                f"{self.id}: start value of {unknown[0]}, but the formula's parameters are "
+                f"{', '.join(keys) or 'none'}"
+            )
+        if not keys:
+            raise InputError(
+                f"{self.id}: the formula {self.expression!r} has no parameter to fit; multiply it "
+                "by one, 'size_um * ...'"
+            )
+        direction = np.array(self.direction, dtype=float)
+        law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
+        estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
+        return Effect(law, self.component, estimates)
+
+
+def at_component(text: str) -> tuple[str, str]:
+    """Split `NAME@COMPONENT`.
+
+    Raises
+    ------
+    InputError
+        If one of them is missing.
+    """
+    name, _, component = text.rpartition("@")
+    if not name or not component:
+        raise InputError(f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2")
+    return name, component
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """An extension and what it was made from.
+
+    Parameters
+    ----------
+    extension : Extension
+        What was found.
+    sessions : tuple of MeasuredSession
+        What was measured, in the order of time.
+    """
+
+    extension: Extension
+    sessions: tuple[MeasuredSession, ...]
+
+    @property
+    def errors(self) -> Errors:
+        """Before and after on the unseen part."""
+        found = self.extension
+        floor = found.floor.rms(found.after.observations)
+        rows = {
+            "without the effect": found.before.rms,
+            f"with {found.effect.name}": found.after.rms,
+        }
+        return Errors(rows, floor, found.floor.source)
+
+    def lines(self) -> list[str]:
+        """Return what a technician reads."""
+        found = self.extension
+        sentence = found.effect.law.sentence.format(place=found.effect.component)
+        lines = [*used_lines(self.sessions, found.fit), ""]
+        lines += [*self.errors.lines(), *left_lines(self.errors, found.after)]
+        lines += ["", f"{found.effect.name}: {sentence}"]
+        lines += told_lines(found.own, all_of_them=True)
+        lines += [f"WARNING: {warning}" for warning in found.warnings]
+        moved = found.base_moved[:MOST_MOVED]
+        lines += (
+            ["", "the rest of the model moved by no more than chance"]
+            if not moved
+            else [
+                "",
+                "what the effect moved in the rest of the model:",
+                *(
+                    f"  {before.effect:30} {before.key:24}"
+                    f"{plus_minus(before.value, before.sigma):>20} -> "
+                    f"{plus_minus(after.value, after.sigma)}"
+                    for before, after in moved
+                ),
+            ]
+        )
+        return lines
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        found = self.extension
+        return {
+            "schema": 1,
+            **self.errors.as_values(("before", "after")),
+            "judged_by": found.after.by,
+            "buys": {key: list(gain) for key, gain in found.bought.items()},
+            "effect": found.effect.law.id,
+            "component": found.effect.component,
+            "warnings": list(found.warnings),
+            "sessions": [
+                {"name": session.name, "remarks": list(session.remarks)}
+                for session in self.sessions
+            ],
+            "lost": found.fit.lost,
+            "misfit": found.fit.misfit,
+            "settled": found.fit.arrived,
+            "parameters": parameter_values(found.parameters),
+            "base_moved": [
+                {
+                    "effect": before.effect,
+                    "parameter": before.key,
+                    "session": before.session,
+                    "before": [before.value, before.sigma],
+                    "after": [after.value, after.sigma],
+                }
+                for before, after in found.base_moved
+            ],
+        }
+
+
+def extend_model(
+    model: str | Path,
+    addition: Addition,
+    recordings: Recordings,
+    output: str | Path,
+    run: Run,
+    progress: Progress = lambda done, of: None,
+) -> Extended:
+    """Add an effect to a model, fit it with what is there, and write the model.
+
+    Parameters
+    ----------
+    model : path
+        Model file.
+    addition : CatalogueEffect, FileEffect or FormulaEffect
+        What to add.
+    recordings : Recordings
+        With measured poses, of one wrist.
+    output : path
+        Model file to write.
+    run : Run
+        For the lineage.
+    progress : callable
+        Told steps done and steps at most.
+
+    Returns
+    -------
+    Extended
+        What was found.
+
+    Raises
+    ------
+    WristError
+        If a file cannot be read, used or written, or the effect cannot be added; then no model is
+        written.
+    """
+    output = writable(output)
+    parent = load_model(model)
+    sessions = read_sessions(recordings, parent.table, progress)
+    measured = tuple(sessions.values())
+    covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
+    effect = addition.effect(sorted(covariates))
+    step = run.step(model, sessions)
+    found = extend(parent, effect, measured, progress)
+    save_model(replace(found.model, lineage=(*parent.lineage, step)), output)
+    return Extended(found, measured)
