@@ -15,7 +15,10 @@ from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.trajectory import STEP as DIFFERENCE_RAD
 from wrist_stiffness.lookup.table_file import save_table
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.model_file import save_model
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import nanoseconds, time_message
 
@@ -312,3 +315,13 @@ def test_the_residual_is_also_given_at_the_task_point(graph, model, tmp_path):
     assert [place.x, place.y, place.z] == pytest.approx(
         (twist[:3] + np.cross(twist[3:], arm)).tolist(), rel=0, abs=1e-9
     )
+
+
+def test_an_effect_that_is_left_out_is_reported(graph, model, tmp_path):
+    path = tmp_path / "warm.yaml"
+    save_model(model.with_effects(Effect(find_law("thermal_expansion"), "link_1", {})), path)
+    node = add_corrector(graph, path, enabled_on_start=True)
+    send_load(graph, node, SECOND)
+    send_settled(graph, SECOND)
+    status, _ = graph.status(NAME, lambda status, values: "temperature" in status.message)
+    assert status.level == status.WARN

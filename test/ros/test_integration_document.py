@@ -24,8 +24,12 @@ def test_every_parameter_is_described_with_its_default(entry):
     row = re.search(rf"^\| `{entry.name}` \| `(.*?)` \|(.*)\|", TEXT, re.MULTILINE)
     assert row is not None
     assert row[1] == (str(default) or "empty")
+    limits, _, text = row[2].partition("|")
     for choice in entry.choices:
-        assert choice in row[2]
+        assert choice in limits
+    if isinstance(entry.default, int | float) and not isinstance(entry.default, bool):
+        assert limits.strip() == f"{entry.lower:g} … {entry.upper:g}"
+    assert ("(at the start only)" in text) is entry.fixed
 
 
 @pytest.mark.parametrize(

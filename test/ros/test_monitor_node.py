@@ -4,7 +4,10 @@ from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, PoseWithCovar
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Bool
 
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.model_file import save_model
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.ros.conversions import nanoseconds, pose_message_stamped, time_message
 from wrist_stiffness.ros.model_monitor import ModelMonitor
 
@@ -164,3 +167,12 @@ def test_turning_is_seen_as_turning(graph, monitor, model):
     turn = Rotation.from_rotvec([0.0, 2e-4, 0.0]).as_matrix()
     send(graph, (turn @ rotation, turn @ position), 1)
     assert residuals(graph)[0].pose.pose.orientation.y == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_an_effect_that_is_left_out_is_reported(graph, model, tmp_path):
+    path = tmp_path / "warm.yaml"
+    save_model(model.with_effects(Effect(find_law("thermal_expansion"), "link_1", {})), path)
+    add_monitor(graph, path)
+    send(graph, true_pose(model), 1)
+    status, _ = graph.status(NAME, lambda status, values: "temperature" in status.message)
+    assert status.level == status.WARN

@@ -49,10 +49,13 @@ class MonitoredPose:
         Measured minus predicted; NaN where not measured [m, rad].
     covariance : (6, 6) float
         Of measurement and prediction together.
+    warnings : tuple of str
+        Of the prediction.
     """
 
     residual: Array
     covariance: Array
+    warnings: tuple[str, ...]
 
 
 class MonitorStream(Stream):
@@ -196,7 +199,7 @@ class MonitorStream(Stream):
             self._judged, self.monitor = running.model, ResidualMonitor(self._monitoring)
         excess = noise - self._monitoring.noise**2
         self.monitor.add(residual, np.diag(prediction.covariance) + excess)
-        return MonitoredPose(residual, prediction.covariance + np.diag(noise))
+        return MonitoredPose(residual, prediction.covariance + np.diag(noise), prediction.warnings)
 
     def _joints_at(self, stamp_ns: int) -> tuple[Array, Array | None]:
         newest = next((kept for kept in reversed(self._joints) if kept[0] <= stamp_ns), None)

@@ -221,7 +221,14 @@ MONITOR = (
         upper=3600.0,
         fixed=True,
     ),
-    ParameterEntry("baseline_samples", 500, "poses from which the baseline is learned", fixed=True),
+    ParameterEntry(
+        "baseline_samples",
+        500,
+        "poses from which the baseline is learned",
+        lower=1,
+        upper=1e6,
+        fixed=True,
+    ),
     ParameterEntry(
         "alarm_threshold",
         15.0,

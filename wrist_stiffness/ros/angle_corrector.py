@@ -118,6 +118,7 @@ class AngleCorrector(WristNode):
             self.warn(command.fault)
             return
         if command.correction is not None:
+            self.left_out = command.correction.prediction.warnings
             self._publish_residual(stamp_ns, command.correction)
         self.health.good()
 

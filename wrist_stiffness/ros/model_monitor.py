@@ -128,6 +128,7 @@ class ModelMonitor(WristNode):
         except WristError as error:
             self.warn(error)
             return
+        self.left_out = judged.warnings
         # What is not measured is sent as zero with a huge variance: poses cannot carry a NaN.
         residual = np.nan_to_num(judged.residual)
         covariance = judged.covariance + np.diag(NOT_MEASURED * np.isnan(judged.residual))

@@ -44,7 +44,6 @@ class PoseErrorPredictor(WristNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
         self._drawn_ns = -NANOSECONDS
-        self._warnings: tuple[str, ...] = ()
         wait_s = self.get_parameter("load_wait_s").value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.waiting = LoadWait(wait_s, time.monotonic_ns)
@@ -59,10 +58,6 @@ class PoseErrorPredictor(WristNode):
     def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
         """Check parameters and return the settings that they stand for."""
         return prediction_settings(values)
-
-    def restriction(self) -> str:
-        """Return what the model left out of the last prediction."""
-        return "; ".join(self._warnings)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the outputs and load the model."""
@@ -112,7 +107,7 @@ class PoseErrorPredictor(WristNode):
         if self._phi_mdeg.get_subscription_count():
             self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
         self.health.good()
-        self._warnings = prediction.warnings
+        self.left_out = prediction.warnings
         self._draw(stamp_ns, prediction)
 
     def _draw(self, stamp_ns: int, prediction: Prediction) -> None:

@@ -58,6 +58,15 @@ class WristNode(LifecycleNode):
     options
         Of rclpy's node.
 
+    Attributes
+    ----------
+    stream : Stream
+        Of the core.
+    health : Health
+        Counts of good samples and faults.
+    left_out : tuple of str
+        Effects that the model left out of its last prediction, and why.
+
     Raises
     ------
     InputError
@@ -75,6 +84,7 @@ class WristNode(LifecycleNode):
         self.health = Health(self.get_name())
         self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
         self._model_fault = "no model is loaded"
+        self.left_out: tuple[str, ...] = ()
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._use_parameters)
         # Of a group of its own: while it waits for the model, no other callback of its group runs.
@@ -283,7 +293,9 @@ class WristNode(LifecycleNode):
             "loads that came late": str(self.stream.loads.history.late),
             **self.facts(),
         }
-        restrictions = filter(None, (self.restriction(), *self.stream.dropped_signals))
+        restrictions = filter(
+            None, (self.restriction(), *self.left_out, *self.stream.dropped_signals)
+        )
         message = DiagnosticArray(
             status=[self.health.report(facts, self._model_fault, "; ".join(restrictions))]
         )
