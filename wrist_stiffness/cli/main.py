@@ -9,11 +9,13 @@ from typing import Protocol
 
 from wrist_stiffness import __version__
 from wrist_stiffness.cli import (
+    calibrate,
     cell,
     compare,
     diagnose,
     explain,
     export,
+    extend,
     import_,
     plan,
     predict,
@@ -75,8 +77,10 @@ COMMANDS: tuple[CommandModule, ...] = (
     replay,
     import_,
     export,
+    calibrate,
     compare,
     diagnose,
+    extend,
     plan,
     cell,
 )
