@@ -122,7 +122,8 @@ def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
     theta = table.workspace.grid(per_axis)
     configuration = table.mechanism.forward(theta)
     wrench = push.wrench(configuration.platform)
-    table.check_load(wrench)
+    for each in np.reshape(wrench, (-1, 6)):
+        table.check_load(each)
     operators = contact_operators(configuration, table.components, np.zeros(3))
     response = respond(operators, wrench)
     energy = strain_energies(configuration, table.components, wrench, response.force)
