@@ -24,6 +24,8 @@ AT_REST = (
 )
 """Effects whose laws need no motion: those that the exact path can hide."""
 
+RECORDED_ONE_IN = 25
+
 Place = tuple[str, str, str]
 
 
@@ -81,6 +83,11 @@ class Case:
         return "ordinary" if self.ordinary else ("single", "double")[len(self.effects) - 1]
 
     @property
+    def recorded(self) -> bool:
+        """Whether this case belongs to the sample that is solved from MCAP files as well."""
+        return crc32(self.key.encode()) % RECORDED_ONE_IN == 0
+
+    @property
     def static(self) -> bool:
         """Whether the instrument measures at rests only."""
         return instrument(self.instrument).static
@@ -112,16 +119,12 @@ def ordinary_wrist(seed: int) -> tuple[Place, ...]:
 
 def quick_cases() -> list[Case]:
     """Return some of each kind in one design: a look at everything within minutes."""
-    play, turn = ("joint_clearance", "joint_1", "algebraic"), ("backlash", "motor_1", "single")
+    turn = ("backlash", "motor_1", "single")
     return [
         Case((), 0.0),
-        Case((), 0.0, base="exact"),
-        Case((play,), 3.0),
         Case((turn,), 3.0),
         Case((("mount_compliance", "motor_1", "plain"),), 3.0),
-        Case((("cable_wrench", "platform", "smooth"),), 30.0),
         Case((turn,), 3.0, instrument="tracker", lost_beams=0.02),
-        Case((turn,), 3.0, sees="points"),
         Case((turn,), 3.0, sees="pointing"),
         Case((turn, ("load_point", "load_sensor", "frame")), 3.0),
         Case((("creep", "joint_1", "standard_solid"),), 0.05),

@@ -2,25 +2,46 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import numpy as np
 from bench_wrist import Array, wrist
 from dictionary import Dictionary
-from observe import Day, Riddle
+from observe import Day, Riddle, noise_seed, settings_of
 from solvers import Answer
 
 from wrist_stiffness.campaign.diagnosing import diagnose_sessions
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.reading import read_session
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.workflows.simulate import simulate_recording
 
 
 def own_diagnosis(riddle: Riddle, words: Dictionary | None = None) -> Answer:
     """Diagnose the first day as it was recorded; its findings predict both days.
 
-    The sessions hold what a recording holds.  No word of the simulation is looked at.
+    The session holds what a recording holds.  No word of the simulation is looked at.
     """
+    return diagnosed(riddle, riddle.days[0].recorded)
+
+
+def own_diagnosis_mcap(riddle: Riddle, words: Dictionary | None = None) -> Answer:
+    """Do the same by way of a recording: written as MCAP, read as any other."""
+    case = riddle.case
+    settings = replace(settings_of(case, 0), hidden=riddle.hidden)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "day_1.mcap"
+        simulate_recording(path, wrist(), settings, case.seconds, noise_seed(case, 0))
+        return diagnosed(riddle, read_session(path, wrist()))
+
+
+def diagnosed(riddle: Riddle, session: MeasuredSession) -> Answer:
+    """Return the answer of the project to a first day."""
     model = ErrorModel("benchmark", wrist(), "closed_form")
-    rng = np.random.default_rng(riddle.case.seed)
-    found = diagnose_sessions(model, [riddle.days[0].recorded], rng)
+    found = diagnose_sessions(model, [session], np.random.default_rng(riddle.case.seed))
     result = found.diagnosis
     extended = model.with_effects(*found.effects)
     one, two = (predicted(extended, day) for day in riddle.days)

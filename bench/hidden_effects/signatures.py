@@ -20,7 +20,7 @@ from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, Entry, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.size import Scale
-from wrist_stiffness.workflows.pictures.figure import DPI, new_figure
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 SECONDS, RATE_HZ = 40.0, 50.0
 SIZE = 3.0
@@ -71,7 +71,7 @@ def draw_page(scale: Scale, entries: dict[str, Entry], path: Path) -> None:
     for panel in panels[-COLUMNS:]:
         panel.set_xlabel("time [s]", fontsize=7)
     panels[0].legend(fontsize=6, loc="upper left")
-    figure.savefig(path, dpi=DPI)
+    save_figure(figure, path)
 
 
 def main() -> None:

@@ -1,0 +1,126 @@
+"""Write the results of the benchmark into docs/hidden-effects.md and draw its pictures.
+
+python bench/hidden_effects/page.py [--results FILE] [--docs FOLDER]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from run import SOLVERS, current
+from score import wilson
+from tables import Line, by_solver, of_one_solver
+
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
+
+BEGIN, END = "<!-- results: begin (page.py) -->", "<!-- results: end -->"
+OWN = "own_diagnosis"
+SHOWN = {OWN: "o", "spans_of_the_laws": "s", "elastic_net": "^", "stepwise_bic": "v"}
+
+
+def text_of(lines: Sequence[Line]) -> str:
+    """Return the part of the page that the results write."""
+    scored = [line for line in lines if "verdict" in line]
+    if not scored:
+        return "No results yet."
+    cases = len({line["key"] for line in scored})
+    unreached = len({line["key"] for line in lines if "out_of_reach" in line})
+    failed = Counter(line["solver"] for line in lines if "error" in line)
+    failures = ", ".join(f"{name}: {count}" for name, count in sorted(failed.items())) or "none"
+    version = next((line["version"] for line in scored if line["solver"] == OWN), "-")
+    return "\n\n".join(
+        [
+            f"{cases} riddles posed; {unreached} more cannot be as large as wanted. "
+            f"Answers that failed with an error: {failures}. Code `{version}`.",
+            by_solver(scored),
+            "![Right answers by size](pictures/hidden_effects_by_size.png)",
+            "![Right answers by effect](pictures/hidden_effects_by_effect.png)",
+            of_one_solver(scored, OWN),
+        ]
+    )
+
+
+def _rates(lines: Sequence[Line]) -> tuple[float, float, float]:
+    hits = sum(line["inside"] for line in lines)
+    return hits / len(lines), *wilson(hits, len(lines))
+
+
+def draw_sizes(lines: Sequence[Line], path: Path) -> None:
+    """Draw how often the first class is right against the size of the effect."""
+    figure = new_figure(6.4, 3.6)
+    axes = figure.subplots()
+    for solver, marker in SHOWN.items():
+        mine = [
+            line
+            for line in lines
+            if line["solver"] == solver
+            and line["kind"] in ("single", "unexcitable")
+            and line["experiment"] == "rich"
+        ]
+        sizes = sorted({line["size"] for line in mine})
+        if not sizes:
+            continue
+        rates = np.array([_rates([x for x in mine if x["size"] == size]) for size in sizes]).T
+        axes.errorbar(
+            sizes,
+            100 * rates[0],
+            100 * np.abs(rates[1:] - rates[0]),
+            marker=marker,
+            capsize=3,
+            label=solver,
+        )
+    axes.set_xscale("log")
+    axes.set_ylim(0, 102)
+    axes.set_xlabel("size of the hidden effect, in noise of one sample")
+    axes.set_ylabel("true effect inside the first class [%]")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+    save_figure(figure, path)
+
+
+def draw_effects(lines: Sequence[Line], path: Path) -> None:
+    """Draw how often the project's diagnosis has the true effect inside its first class."""
+    mine = [line for line in lines if line["solver"] == OWN and line["kind"] == "single"]
+    effects = sorted({line["effect"] for line in mine}, reverse=True)
+    if not effects:
+        return
+    figure = new_figure(6.4, 0.24 * len(effects) + 1.0)
+    axes = figure.subplots()
+    rates = np.array([_rates([x for x in mine if x["effect"] == effect]) for effect in effects]).T
+    place = np.arange(len(effects))
+    axes.barh(place, 100 * rates[0], color="0.75")
+    spread = 100 * np.abs(rates[1:] - rates[0])
+    axes.errorbar(100 * rates[0], place, xerr=spread, fmt="none", ecolor="0.2", capsize=2)
+    axes.set_yticks(place, effects, fontsize=7)
+    axes.set_xlim(0, 102)
+    axes.set_xlabel("true effect inside the first class of own_diagnosis [%], 95 % interval")
+    save_figure(figure, path)
+
+
+def main() -> None:
+    """Write tables and pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    here = Path(__file__).parent
+    parser.add_argument("--results", type=Path, default=here / "results" / "full.jsonl")
+    parser.add_argument("--docs", type=Path, default=here.parents[1] / "docs")
+    arguments = parser.parse_args()
+    lines = current(arguments.results, list(SOLVERS))
+    page = arguments.docs / "hidden-effects.md"
+    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
+    after = rest.split(END)[1]
+    text = f"{before}{BEGIN}\n\n{text_of(lines)}\n\n{END}{after}"
+    with replacing(page) as written:
+        written.write_text(text, encoding="utf-8")
+    scored = [line for line in lines if "verdict" in line]
+    draw_sizes(scored, arguments.docs / "pictures" / "hidden_effects_by_size.png")
+    draw_effects(scored, arguments.docs / "pictures" / "hidden_effects_by_effect.png")
+    print(f"{page}: {len(lines)} answers")
+
+
+if __name__ == "__main__":
+    main()
