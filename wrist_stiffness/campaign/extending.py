@@ -156,7 +156,7 @@ def extend(
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)
     base = FitProblem(model.with_effects(*held), units, free)
-    before = judged(base, progress=progress)
+    before = judged(base, progress=progress, most_ways=1)
     wide = replace(base, free=(*free, _free(effect, units)))
     start = _with_effect(wide, before.fit, start_values(before.fit, effect))
     after = judged(wide, start, progress)

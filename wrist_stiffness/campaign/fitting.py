@@ -196,6 +196,7 @@ def fit(
     start: Array | None = None,
     held_out: Mask | None = None,
     progress: Progress = silent,
+    most_ways: int = 3,
 ) -> Fit:
     """Find the most probable parameters.
 
@@ -210,6 +211,9 @@ def fit(
         Units of `problem.table` that the fit must not see.
     progress : callable
         Is told steps done and steps at most.
+    most_ways : int
+        How many ways to try from the means of the priors where much is left: 1 where an effect is
+        known to be missing.
 
     Returns
     -------
@@ -230,7 +234,7 @@ def fit(
     if start is not None:
         return _settled(problem, start, unseen, NOISE_ROUNDS, progress)
     found_all: list[Fit] = []
-    for way in _ways(problem):
+    for way in _ways(problem)[:most_ways]:
         z = np.zeros(len(weight))
         for stage in way:
             led = _settled(stage, start_of(stage, problem, z), unseen, 1, silent)
