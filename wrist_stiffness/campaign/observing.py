@@ -53,6 +53,9 @@ class UnitSession:
         Measurements left out as lost beams.
     white : (6,) float
         Scatter of one measurement, NaN where it is not known [m, rad].
+    wander : (6,) float
+        Slow scatter beside it, which no mean over a dwell makes smaller: what the instrument states
+        beyond the white scatter [m, rad].
     """
 
     name: str
@@ -62,6 +65,7 @@ class UnitSession:
     samples: Array
     lost: int
     white: Array
+    wander: Array
 
     @property
     def block(self) -> Block:
@@ -175,8 +179,10 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     values = np.concatenate([session.shift, turn], axis=1)
     units = len(parts.dwell)
     lost = _lost(values, parts)
+    stated = np.zeros(6) if session.covariance is None else np.diag(session.covariance)
     label = np.where(lost, -1, parts.label)
     mean, count = _means(values, label, units)
+    white = _white(values, label, parts, stated)
     return UnitSession(
         session.name,
         parts,
@@ -184,7 +190,8 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         mean[:, 3:],
         np.maximum(count.max(axis=1), 1.0),
         int(lost.sum()),
-        _white(values, label, parts, session.covariance),
+        white,
+        np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0)),
     )
 
 
@@ -223,7 +230,7 @@ def _lost(values: Array, parts: Cut) -> Mask:
     return lost
 
 
-def _white(values: Array, label: Labels, parts: Cut, stated: Array | None) -> Array:
+def _white(values: Array, label: Labels, parts: Cut, stated: Array) -> Array:
     """Return the scatter of one measurement from neighbours in dwells, else as stated, (6,)."""
     inside = (label[1:] == label[:-1]) & (label[1:] >= 0) & parts.dwell[label[1:]]
     step = np.abs(np.diff(values, axis=0)[inside])
@@ -232,8 +239,8 @@ def _white(values: Array, label: Labels, parts: Cut, stated: Array | None) -> Ar
         good = each[np.isfinite(each)]
         if len(good) >= FEWEST_FOR_NOISE:
             white[column] = MAD_TO_SIGMA / np.sqrt(2.0) * np.median(good)
-        elif stated is not None and stated[column, column] > 0.0:
-            white[column] = np.sqrt(stated[column, column])
+        elif stated[column] > 0.0:
+            white[column] = np.sqrt(stated[column])
     return white
 
 
@@ -304,7 +311,10 @@ def _covariance(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Arr
         return None
     variance = np.nan_to_num(white, nan=1.0) ** 2
     own = np.concatenate(
-        [v / each.samples[:, None] for v, each in zip(variance, sessions, strict=True)]
+        [
+            own / each.samples[:, None] + each.wander**2
+            for own, each in zip(variance, sessions, strict=True)
+        ]
     )
     return np.asarray(counts + own[:, :, None] * np.eye(6))
 

@@ -1,8 +1,9 @@
 """How each law of the catalogue becomes columns: which trials, at which shapes.
 
 A law is linear in some parameters and not in others.  The linear ones become columns by
-differences; the others are a grid of shapes.  A few laws need other
-coordinates: a mass and its place are linear as a mass and its first moment; a gap, a hardening or a friction is a shape times a share.
+differences; the others are a grid of shapes.  A few laws need other coordinates: a mass and its
+place are linear as a mass and its first moment; a gap, a hardening or a friction is a shape times
+a share.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ SMALL = 0.1
 """Share of a parameter's prior scale at which a column is the tangent."""
 
 GRIDS: dict[str, tuple[float, ...]] = {
-    "time_constant_s": (1.0, 4.0, 12.0, 35.0, 120.0, 600.0),
-    "lag_s": (0.0, 120.0, 600.0, 2400.0),
-    "motor_share_percent": (0.0, 50.0, 100.0),
-    "hysteresis_deg": (0.0, 2.0, 6.0, 15.0),
+    "time_constant_s": (2.0, 8.0, 25.0, 90.0, 400.0),
+    "lag_s": (0.0, 200.0, 1200.0),
+    "motor_share_percent": (0.0, 100.0),
+    "hysteresis_deg": (0.0, 5.0),
     "order": tuple(3.0 + 1.2 * i for i in range(40)),
 }
 """Values to try of parameters in which a law is not linear, in the units of their names."""
@@ -243,7 +244,7 @@ def _clipped(parameter: Parameter, value: float) -> float:
     return min(max(value, parameter.lower), parameter.upper)
 
 
-GAPS_UM = (-60.0, -20.0, -7.0, -2.0, -0.5, 0.5, 2.0, 7.0, 20.0, 60.0)
+GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
 
 SPECIAL: dict[str, Maker] = {
     "gravity": weight,
@@ -252,11 +253,11 @@ SPECIAL: dict[str, Maker] = {
     "joint_clearance": at_width("clearance_um", 5.0),
     "flange_contact": shares("gap_um", {"gap_um": GAPS_UM}, {}),
     "bushing_hardening": shares(
-        "hardening_percent_per_N", {"hardening_percent_per_N": (3.0, 30.0, 120.0, 400.0)}, {}
+        "hardening_percent_per_N", {"hardening_percent_per_N": (5.0, 50.0, 300.0)}, {}
     ),
     "joint_friction": shares(
         "coefficient",
-        {"coefficient": (0.02, 0.1, 0.3, 0.8), "presliding_um": (1.0, 5.0, 20.0)},
+        {"coefficient": (0.03, 0.15, 0.6), "presliding_um": (1.0, 8.0)},
         {"preload_N": 0.0},
     ),
 }

@@ -15,6 +15,9 @@ from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors
 FEWEST_REPLICATE_DOF = 12
 """Below this the scatter of the replicates is itself too uncertain to be a floor."""
 
+MOST_BEYOND_STATED = 2.0
+"""Variance of a unit over what its observer states that may still be wander."""
+
 RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
 
@@ -137,10 +140,13 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
         visible = share_inside_groups(observations, share, time_constant)
         scatter = np.diag(repeated * freedom / (freedom - 2) / visible)
         return NoiseModel(reference, scatter, share, time_constant, freedom * m, "replicates")
-    if observations.covariance is not None:
-        # What was stated is the white part; the wander comes on top of it.
-        return NoiseModel(reference, np.eye(m) / (1 - share), share, time_constant, np.inf, "given")
     dof = float(measured.sum() * loss)
+    if observations.covariance is not None:
+        # What was stated is the white part; a wander comes on top of it.  No more than that: what
+        # nothing in the catalogue explains may also be an effect outside of it.
+        beyond = np.clip(np.diag(coupled), 1.0, MOST_BEYOND_STATED)
+        scatter = np.diag(np.maximum(beyond, 1 / (1 - share)))
+        return NoiseModel(reference, scatter, share, time_constant, dof, "given")
     return NoiseModel(reference, coupled, share, time_constant, dof, "residual")
 
 
