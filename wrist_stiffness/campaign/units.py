@@ -99,7 +99,8 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
         Where anything was measured; the other samples only tell the path.
     """
     n = len(block)
-    step = float(np.median(np.diff(block.time))) if n > 1 else np.inf
+    # Moments that only tell the path between two poses do not make these denser.
+    step = float(np.median(np.diff(block.time[measured]))) if measured.sum() > 1 else np.inf
     sparse = step > SPARSE_S
     before, after = _windows(block.time, max(WINDOW_S, 1.5 * step) if not sparse else 0.0)
     turning = _changes(block.theta, before, after, np.full(2, COUNTS * encoder_step), 0.0)
