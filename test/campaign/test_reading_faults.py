@@ -172,6 +172,27 @@ def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign,
     assert any("cannot reach" in remark for remark in session.remarks)
 
 
+@pytest.mark.parametrize(
+    ("angle_deg", "load_late_s", "reason"),
+    [(180.0, 0, "cannot reach"), (0.0, 100, "no load estimate in the 0.5 s before")],
+)
+def test_where_nothing_is_left_the_reason_is_said(
+    tmp_path, campaign, table, angle_deg, load_late_s, reason
+):
+    campaign.theta = lambda time_ns: np.tile(np.radians([0.0, angle_deg]), (len(time_ns), 1))
+    campaign.with_joints()
+    del campaign.theta
+    campaign.with_poses()
+    loads = len(campaign.entries)
+    campaign.with_loads()
+    for i in range(loads, len(campaign.entries)):
+        topic, stamp, message = campaign.entries[i]
+        header = type(message.header)(stamp + load_late_s * SECOND, "wrist_base")
+        campaign.entries[i] = (topic, stamp, type(message)(header, message.wrench))
+    with pytest.raises(InputError, match=f"no measured pose can be used: .*{reason}"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
 def test_what_is_left_of_a_cut_recording_is_used_and_said(tmp_path, campaign, table):
     campaign.count = 5000
     campaign.with_joints().with_loads().with_poses()

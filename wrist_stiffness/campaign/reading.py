@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.clocks import ClockOffset, clock_offset
 from wrist_stiffness.campaign.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.path import turning_stamps
+from wrist_stiffness.campaign.path import GAP_S, turning_stamps
 from wrist_stiffness.campaign.pose_track import PoseTrack, pose_track
 from wrist_stiffness.campaign.registration import agreement
 from wrist_stiffness.campaign.signals import Signal, Stamps
@@ -152,17 +152,16 @@ def _session(
         track = replace(track, time_ns=track.time_ns - round(offset.seconds * NANOSECONDS))
     usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
     remarks += reasons
-    if not usable.any():
-        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
     time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
-    block = machine.at(time_ns)
-    reachable = table.mechanism.reachable(block.theta)
+    reachable = table.mechanism.reachable(machine.angles.interpolated(time_ns))
     if not reachable.all():
         remarks.append(
             f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
         )
-        block, time_ns = block.take(reachable), time_ns[reachable]
-        shift, rotation = shift[reachable], rotation[reachable]
+        time_ns, shift, rotation = time_ns[reachable], shift[reachable], rotation[reachable]
+    if len(time_ns) == 0:
+        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
+    block = machine.at(time_ns)
     rigid = rigid_rotation(table, block.theta)
     _require_same_wrist(rotation, rigid)
     lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
@@ -179,7 +178,7 @@ def _session(
     rows = np.searchsorted(all_ns, time_ns)
     session = MeasuredSession(
         name,
-        machine.at(all_ns) if len(path_ns) else block,
+        block if len(all_ns) == len(block) else machine.at(all_ns),
         _spread(shift, rows, len(all_ns)),
         _spread(rotation, rows, len(all_ns)),
         track.covariance,
@@ -199,15 +198,16 @@ def _session(
 def _path(
     machine: MachineSignals, time_ns: Stamps, table: Table, load_age_limit_s: float
 ) -> Stamps:
-    """Return the stamps that tell the way between poses that are far apart."""
-    if len(time_ns) < 2:
-        return time_ns[:0]
+    """Return the stamps that tell the way to the first pose and between poses far apart."""
+    start = max(machine.angles.time_ns[0], machine.loads.time_ns[0])
+    far = time_ns[0] - start > GAP_S * NANOSECONDS
+    time_ns = np.append(start, time_ns) if far else time_ns
     step = table.geometry.limits.encoder_step
     turns = turning_stamps(machine.angles, time_ns, np.full(2, TURN_STEPS * step))
     pulls = turning_stamps(
         machine.loads, time_ns, PULL_SHARE * np.ptp(machine.loads.values, axis=0)
     )
-    found = np.union1d(turns, pulls)
+    found = np.union1d(np.union1d(turns, pulls), time_ns[:1])
     found = found[machine.usable(found, load_age_limit_s)[0]]
     return found[table.mechanism.reachable(machine.angles.interpolated(found))]
 

@@ -1,0 +1,37 @@
+"""Poses one by one stay so where the joint states between them tell the way."""
+
+import numpy as np
+
+from wrist_stiffness.campaign.observing import observe
+from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+
+
+def test_each_pose_measured_at_rest_is_a_unit_and_knows_its_approach(tmp_path, campaign, table):
+    """Motor 1 goes to 10 deg and back each time: straight to even poses, beyond to odd ones.
+
+    10 deg     __      /\\__     __      /\\__
+              /  \\    /    \\   /  \\    /
+     0 deg __/    \\__/      \\_/    \\__/        a pose every 1.6 s, at rest
+    """
+
+    def theta(time_ns):
+        t = 2.5e-9 * (np.asarray(time_ns) - campaign.joint_ns[0])
+        number, phase = np.floor(t / 4.0), np.mod(t, 4.0)
+        beyond = np.where(number % 2 == 1, 12.0, 10.0)
+        angle = np.interp(phase, [0.0, 1.0], [0.0, 1.0]) * beyond
+        angle = np.where(phase > 1.0, np.interp(phase, [1.0, 1.2], [0.0, 1.0]), 0.0) * (
+            10.0 - beyond
+        ) + np.where(phase > 1.0, beyond, angle)
+        angle = np.where(phase > 2.5, 10.0 * np.interp(phase, [2.5, 3.5], [1.0, 0.0]), angle)
+        return np.radians(np.stack([angle, np.zeros_like(angle)], axis=-1))
+
+    campaign.theta, campaign.count = theta, 1280
+    stamps = campaign.joint_ns[70::160]
+    campaign.with_joints().with_loads(force=lambda i: (0.0, 0.0, -1.0)).with_poses(stamps=stamps)
+    path = campaign.written(tmp_path / "bag")
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    observed = observe(model, [read_session(path, table)]).observations
+    assert len(observed.values) == 8
+    np.testing.assert_array_equal(observed.covariates["approach_1"], [1, -1] * 4)
