@@ -78,7 +78,7 @@ def solve_contacts(
         If an input is not finite or a matrix is not positive definite.
     """
     n, m = gap.shape
-    closed = np.zeros((n, m), dtype=bool)
+    closed = gap < 0.0
     if isinstance(guess, Held):
         force, closed[:] = -(guess.stiffness @ gap[..., None])[..., 0], guess.active
     else:
@@ -147,6 +147,11 @@ def _patterns(
     closed: NDArray[np.bool_],
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Yield the rows of each contact state that occurs, and its sectors, unless it has none."""
+    if len(closed) == 1:
+        held = np.flatnonzero(closed[0])
+        if len(held):
+            yield np.zeros(1, dtype=np.intp), held
+        return
     patterns, which = np.unique(np.packbits(closed, axis=1), axis=0, return_inverse=True)
     for number in range(len(patterns)):
         rows = np.flatnonzero(which.ravel() == number)

@@ -56,8 +56,14 @@ class Play:
     opening: Array
     approach: Array
 
-    def resting(self) -> Array:
+    def resting(self, before: Array | None = None) -> Array:
         """Return the displacements of both ends, (n, 4) [m].
+
+        Parameters
+        ----------
+        before : (4,) float, optional
+            Of the sample before a single one: where the search begins.  The energy is convex, so it
+            changes the cost and not the result beyond rounding [m].
 
         Returns
         -------
@@ -68,17 +74,28 @@ class Play:
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
         held = np.flatnonzero((gap < 0.0).any(axis=1))
         if len(held):
-            x[held] = self.take(held)._hindered(x[held])
+            x[held] = self.take(held)._hindered(x[held], before if len(x) == 1 else None)
         return x
 
-    def _hindered(self, x: Array) -> Array:
+    def _hindered(self, x: Array, before: Array | None) -> Array:
         """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
-        for wall in WALLS:
-            tolerance = FORCE_TOLERANCE if wall == WALLS[-1] else ROUGH_TOLERANCE
-            x = self._newton(x, wall, tolerance)
-        return x
+        if before is not None:
+            near, rests = self._newton(before[None], WALLS[-1], FORCE_TOLERANCE)
+            if rests:
+                return self._settled(near)
+        for wall in WALLS[:-1]:
+            x, _ = self._newton(x, wall, ROUGH_TOLERANCE)
+        return self._settled(self._newton(x, WALLS[-1], FORCE_TOLERANCE)[0])
 
-    def _newton(self, x: Array, wall: float, tolerance: float) -> Array:
+    def _settled(self, x: Array) -> Array:
+        """Go one more step from where the pins rest, so that no trace of the way is left."""
+        _, gradient, active = self._state(x, WALLS[-1], None)
+        hessian = self._hessian(x, WALLS[-1], active)
+        settled: Array = x - np.linalg.solve(hessian, gradient[..., None])[..., 0]
+        return settled
+
+    def _newton(self, x: Array, wall: float, tolerance: float) -> tuple[Array, bool]:
+        """Return where the steps end, (n, 4), and whether all pins rest there."""
         x, rows, left = x.copy(), np.arange(len(x)), self
         active = None
         for _ in range(MAX_STEPS):
@@ -86,7 +103,7 @@ class Play:
             bound = tolerance * (1.0 + np.abs(left.force).max(axis=1))
             moving = np.abs(gradient).max(axis=1) > bound
             if not moving.any():
-                break
+                return x, True
             rows, left = rows[moving], left.take(moving)
             energy, gradient, active = energy[moving], gradient[moving], active[moving]
             hessian = left._hessian(x[rows], wall, active)
@@ -101,7 +118,7 @@ class Play:
                     break
                 size[short] *= 0.5
             x[rows] += size[:, None] * step
-        return x
+        return x, False
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Play:
         """Return some of the samples."""

@@ -43,12 +43,14 @@ class JointClearance(Law):
         radial = 0.5 * values["clearance_um"]
         if radial == 0.0:
             return NOTHING, None
+        before: Array | None = state
         ends = end_screws(at.table.geometry, place)
         opening = np.stack([at.carried(at.screw(place, end))[1] for end in ends], axis=-1)
         carried = at.at_home(place, at.through_place(place)) @ ends.T
         flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
         play = Play(radial, carried - flanges, at.free[1], opening, at.operators.approach)
-        return at.screw(place, play.resting() @ ends), None
+        resting = play.resting(before)
+        return at.screw(place, resting @ ends), resting[-1]
 
 
 def end_screws(geometry: Geometry, joint: str) -> Array:
