@@ -1,0 +1,231 @@
+"""Planted parameters are found within their uncertainty, and the uncertainty is honest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from wrist_stiffness.campaign.fit_problem import FitProblem
+from wrist_stiffness.campaign.fitting import fit
+from wrist_stiffness.campaign.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import LoadSensor, Noise
+
+SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
+"""White scatter of a measured pose in tests with noise of their own [m, rad]."""
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def effect(name, **values):
+    law, component = name.split("@")
+    return Effect(find_law(law), component).with_values(values)
+
+
+def simulated(model, *hidden, seed=1, seconds=60.0, **settings):
+    """Return a session of the virtual cell at 10 Hz, which knows nothing of the model's laws."""
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=seconds, program_seed=seed, hidden=hidden, **settings
+    )
+    cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
+    time = np.arange(round(10 * seconds)) / 10.0
+    sample = cell.run(time, cell.desired(time))
+    block = Block(time, sample.encoder, sample.wrench)
+    return MeasuredSession("s", block, sample.measured_shift, sample.measured_rotation)
+
+
+def measured(model, block, rng, sigma=SIGMA):
+    """Return a session in which the wrist is the model, with white noise and hidden counts."""
+    twist = model.batch(block).measured
+    rotation, shift = exp_twist(twist)
+    noise = rng.normal(size=twist.shape) * sigma
+    wobble, _ = exp_twist(np.concatenate([np.zeros((len(noise), 3)), noise[:, 3:]], axis=1))
+    step = model.table.geometry.limits.encoder_step
+    shaft = block.theta + step * rng.uniform(-0.5, 0.5, block.theta.shape)
+    nominal = model.table.mechanism.forward(shaft).platform
+    return MeasuredSession(
+        "s", block, shift + noise[:, :3], wobble @ rotation @ nominal, np.diag(sigma**2)
+    )
+
+
+def poses(rng, n=40, load=0.5):
+    """Return poses measured one by one, each under a load of its own."""
+    theta = np.radians(rng.uniform(-30.0, 30.0, (n, 2)))
+    wrench = rng.normal(size=(n, 6)) * np.repeat([load, 0.02 * load], 3)
+    return Block(2.0 * np.arange(n), theta, wrench)
+
+
+def problem_of(model, sessions, free):
+    return FitProblem(model, tuple(as_units(model, each) for each in sessions), tuple(free))
+
+
+def by_name(found):
+    return {(p.effect, p.key): p for p in found.parameters}
+
+
+def test_parameters_planted_in_the_virtual_cell_are_recovered(model):
+    softer, zero = 0.4, np.radians(0.05)
+    session = simulated(
+        model,
+        HiddenEffect("bushing_stiffness", "joint_1", "plain", softer, 0),
+        HiddenEffect("encoder_offset", "motor_2", "plain", zero, 0),
+    )
+    free = (
+        free_all(effect("bushing_stiffness@joint_1")),
+        free_all(effect("bushing_stiffness@joint_2")),
+        free_all(effect("encoder_offset@motor_2"), per_session=True),
+        free_all(effect("load_bias@load_sensor"), per_session=True),
+    )
+    found = by_name(fit(problem_of(model, [session], free)))
+    soft = found["bushing_stiffness@joint_1", "flexibility_percent"]
+    assert abs(soft.value - 100.0 * softer) < 3.0 * soft.sigma
+    assert soft.sigma < 5.0
+    offset = found["encoder_offset@motor_2", "offset_mdeg"]
+    assert abs(offset.value - 50.0) < 3.0 * offset.sigma
+    assert offset.sigma < 3.0
+    other = found["bushing_stiffness@joint_2", "flexibility_percent"]
+    assert abs(other.value) < 3.0 * other.sigma
+
+
+def test_registrations_of_a_millimetre_are_recovered_to_the_noise(model):
+    true = (
+        effect("measurement_frame@pose_sensor", shift_x_um=1000.0, shift_z_um=-700.0,
+               turn_y_mdeg=200.0, turn_z_mdeg=-150.0),
+        effect("target_mounting@pose_sensor", shift_y_um=900.0, turn_x_mdeg=-200.0),
+    )  # fmt: skip
+    rng = np.random.default_rng(5)
+    session = measured(model.with_effects(*true), poses(rng), rng)
+    free = [free_all(effect(each.name), per_session=True) for each in true]
+    found = fit(problem_of(model, [session], free))
+    for each in found.parameters:
+        planted = next(e for e in true if e.name == each.effect).estimates[each.key].value
+        assert abs(each.value - planted) < 3.5 * each.sigma
+        assert each.sigma < 10.0
+    assert found.misfit == pytest.approx(1.0, abs=0.4)
+    assert found.arrived
+
+
+def test_three_of_a_thousand_lie_beyond_three_sigma(model):
+    """Chi square of all errors over twenty seeds; parameters are drawn from their priors."""
+    free = (
+        free_all(effect("bushing_stiffness@joint_1")),
+        free_all(effect("link_stiffness@link_2")),
+        free_all(effect("measurement_frame@pose_sensor"), per_session=True),
+        free_all(effect("encoder_offset@motor_1"), per_session=True),
+    )
+    total = count = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        true = [
+            each.effect.with_values(
+                {key: float(np.clip(rng.normal(0, s), -80, None)) for key, s in each.scale.items()}
+            )
+            for each in free
+        ]
+        session = measured(model.with_effects(*true), poses(rng, 30), rng)
+        found = fit(problem_of(model, [session], free))
+        planted = {(e.name, key): v.value for e in true for key, v in e.estimates.items()}
+        steps = [u.step for u in found.problem.unknowns]
+        error = np.array([p.value - planted[p.effect, p.key] for p in found.parameters]) / steps
+        total += error @ np.linalg.solve(found.covariance, error)
+        count += len(error)
+    assert chi2.ppf(0.001, count) < total < chi2.ppf(0.999, count)
+
+
+def test_columns_are_the_derivative_of_the_residual(model):
+    rng = np.random.default_rng(2)
+    session = measured(model, poses(rng, 12), rng)
+    free = [
+        each for each in commissioning(model)[0] if each.effect.law.id != "flange_contact"
+    ] + [free_all(effect("joint_clearance@joint_1"))]  # fmt: skip
+    problem = problem_of(model, [session], free)
+    z = np.full(len(problem.unknowns), 0.2)
+    columns = problem.columns(z)
+    for place in range(len(z)):
+        step = np.zeros(len(z))
+        step[place] = 1e-3
+        central = (problem.residual(z + step) - problem.residual(z - step)) / 2e-3
+        scale = np.abs(central).max(axis=0) + 1e-9
+        assert np.max(np.abs(columns[:, :, place] - central) / scale) < 0.05
+
+
+def test_lost_beams_do_not_move_the_fit(model):
+    rng = np.random.default_rng(7)
+    true = effect("bushing_stiffness@joint_1", flexibility_percent=40.0)
+    session = measured(model.with_effects(true), poses(rng, 100), rng)
+    free = (free_all(effect(true.name)),)
+    clean = fit(problem_of(model, [session], free))
+    shift = session.shift.copy()
+    shift[[20, 70]] += 5e-4
+    lost = fit(problem_of(model, [replace(session, shift=shift)], free))
+    assert lost.lost == 2
+    (before,), (after,) = clean.parameters, lost.parameters
+    assert abs(after.value - before.value) < 0.5 * before.sigma
+    assert after.sigma < 1.3 * before.sigma
+
+
+def test_what_no_data_tell_stays_and_is_said(model):
+    rng = np.random.default_rng(3)
+    session = measured(model, poses(rng, load=0.0), rng)
+    free = (
+        free_all(effect("load_scale@load_sensor", scale_percent=1.5)),
+        free_all(effect("encoder_offset@motor_1")),
+    )
+    scale, offset = fit(problem_of(model, [session], free)).parameters
+    assert not scale.excited
+    assert scale.value == pytest.approx(1.5)
+    assert scale.sigma == pytest.approx(3.0, rel=1e-3)
+    assert offset.excited
+
+
+def test_a_noisy_load_does_not_bias_a_stiffness(model):
+    noisy = LoadSensor(Noise(2e-2, 0.0), Noise(5e-4, 0.0))
+    session = simulated(
+        model,
+        HiddenEffect("bushing_stiffness", "joint_1", "plain", 0.4, 0),
+        load_sensor=noisy,
+        seconds=120.0,
+    )
+    found = fit(problem_of(model, [session], (free_all(effect("bushing_stiffness@joint_1")),)))
+    (soft,) = found.parameters
+    assert abs(soft.value - 40.0) < 2.0 * soft.sigma
+
+
+def test_two_sessions_have_registrations_of_their_own_and_one_wrist(model):
+    rng = np.random.default_rng(11)
+    soft = effect("bushing_stiffness@joint_1", flexibility_percent=30.0)
+    sessions = [
+        replace(
+            measured(
+                model.with_effects(soft, effect("measurement_frame@pose_sensor", shift_x_um=shift)),
+                poses(rng),
+                rng,
+            ),
+            name=name,
+        )
+        for name, shift in (("monday", 100.0), ("tuesday", -300.0))
+    ]
+    free = (
+        free_all(effect("bushing_stiffness@joint_1")),
+        FreeEffect(effect("measurement_frame@pose_sensor"), {"shift_x_um": 1000.0}, True),
+    )
+    found = fit(problem_of(model, sessions, free))
+    stiffness, monday, tuesday = found.parameters
+    assert (stiffness.session, monday.session, tuesday.session) == (None, "monday", "tuesday")
+    for each, planted in ((stiffness, 30.0), (monday, 100.0), (tuesday, -300.0)):
+        assert abs(each.value - planted) < 3.0 * each.sigma
+    newest = {e.name: e for e in found.model().effects}["measurement_frame@pose_sensor"]
+    assert newest.estimates["shift_x_um"].value == pytest.approx(tuesday.value)
