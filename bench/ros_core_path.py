@@ -9,12 +9,14 @@ from collections.abc import Callable
 import numpy as np
 
 from wrist_stiffness.compensation.contact_policy import ContactSettings
+from wrist_stiffness.compensation.correction import Correction, correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.lookup.response import respond
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 
@@ -48,19 +50,50 @@ def main() -> None:
     for stream in (predicting, correcting):
         stream.loads.add(1, "wrist_base", load.wrench[:3].tolist(), load.wrench[3:].tolist())
     configurations = [table.workspace.configuration(each) for each in theta]
-    operators = [table.operators_at(each) for each in configurations]
-    twist = model.predict(theta[0], load).twist
+    predictions = [model.predict(each, load) for each in theta]
+    objective = Objective("pointing", table.geometry.platform.normal, np.zeros(3))
+    jacobian = table.mechanism.jacobian(configurations[0])
+    unlike = np.random.default_rng(0).permutation(SAMPLES)
+
+    def guess(i: int) -> np.ndarray:
+        return predictions[i - 1].active
+
+    def predict(i: int) -> Prediction:
+        return model.predict(theta[i], load, guess(i))
+
+    def correction(i: int) -> Correction:
+        return correct(
+            lambda angles: model.predict(angles, load, guess(i)),
+            table.mechanism,
+            theta[i],
+            objective,
+        )
+
     lines = {
         "kinematics and domain": lambda i: table.workspace.configuration(theta[i]),
-        "operators": lambda i: table.operators_at(configurations[i]),
-        "contact and response": lambda i: respond(operators[i], load.wrench),
-        "model.predict": lambda i: model.predict(theta[i], load),
+        "response with contact": lambda i: table.single_pose.respond(
+            configurations[i], load.wrench, guess(i)
+        ),
+        "model.predict": predict,
+        "  of an unlike pose before": lambda i: model.predict(
+            theta[unlike[i]], load, predictions[i].active
+        ),
+        "covariance of the table": lambda i: model.table_covariance(
+            configurations[i], predictions[i].twist
+        ),
         "predict a sample": lambda i: predicting.on_joint_state(i + 2, NAMES, theta[i].tolist()),
+        "what cancels the task": lambda i: objective.cancelling(configurations[i], jacobian),
+        "residual twist": lambda i: residual_twist(predictions[i], configurations[i].platform),
+        "fixed point": correction,
         "correct a command": lambda i: correcting.on_command(i + 2, "", NAMES, theta[i].tolist()),
-        "pose of the twist": lambda i: pose_of_twist(twist),
+        "pose of the twist": lambda i: pose_of_twist(predictions[i].twist),
+        "general operators, response": lambda i: respond(
+            table.operators_at(configurations[i]), load.wrench, guess(i)
+        ),
     }
+    print(f"smallest matrix product {microseconds(lambda i: jacobian.T.dot(jacobian)):14.2f} us")
     for name, step in lines.items():
-        print(f"{name:24} {microseconds(step):8.1f} us")
+        print(f"{name:28} {microseconds(step):8.1f} us")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,90 +15,15 @@ from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.kinematics import Configuration
-from wrist_stiffness.mechanism.single_motion import exp_one
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import Memory, evaluate
 from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.situation import lengths
 
 CHUNK = 2048
 """Samples evaluated at a time: about 150 MB of operators with 24 flange sectors."""
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Predicted pose error of the platform, T_err = exp(twist).
-
-    Parameters
-    ----------
-    twist : (6,) float
-        At O in F, own weight included [m, rad].
-    configuration : Configuration
-        The rigid wrist.
-    active : (m,) bool
-        Flange sectors in contact.
-    measured : (6,) float
-        What the pose sensor would say of the twist; the same without effects of the sensor.
-    model : ErrorModel
-        Made the prediction.
-    added_covariance : (6, 6) float, optional
-        Covariance beyond the model's table: of the effects' parameters, of the load.
-    warnings : tuple of str
-        Effects that were left out or have left first order.
-    """
-
-    twist: Array
-    configuration: Configuration
-    active: NDArray[np.bool_]
-    measured: Array
-    model: ErrorModel = field(repr=False)
-    added_covariance: Array | None = None
-    warnings: tuple[str, ...] = ()
-
-    @cached_property
-    def covariance(self) -> Array:
-        """Covariance of the twist, (6, 6); made where it is asked for, as a search does not."""
-        own = self.model.table_covariance(self.configuration, self.twist)
-        return own if self.added_covariance is None else own + self.added_covariance
-
-    @property
-    def motion(self) -> tuple[Array, Array]:
-        """Rotation R_err (3, 3) and shift s (3,) [m]."""
-        return exp_one(self.twist)
-
-    @property
-    def shift_norm(self) -> float:
-        """Length of s [m]."""
-        return float(np.linalg.norm(self.motion[1]))
-
-    @property
-    def phi(self) -> float:
-        """Angle of R_err [rad]."""
-        return float(np.linalg.norm(self.twist[3:]))
-
-
-@dataclass(frozen=True)
-class BlockPrediction:
-    """Predicted pose errors of n samples.
-
-    Parameters
-    ----------
-    twist : (n, 6) float
-        At O in F, own weight included [m, rad]; NaN where refused.
-    measured : (n, 6) float
-        What the pose sensor would say [m, rad].
-    accepted : (n,) bool
-        False where a sample is outside the table's domain or load range or not finite; the effects'
-        memory passes over such samples as a node does.
-    warnings : tuple of str
-        Each once.
-    """
-
-    twist: Array
-    measured: Array
-    accepted: NDArray[np.bool_]
-    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,92 @@
+"""What a model predicts: of one sample, and of a block of samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.single_motion import exp_one
+
+if TYPE_CHECKING:
+    from wrist_stiffness.model.error_model import ErrorModel
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted pose error of the platform, T_err = exp(twist).
+
+    Parameters
+    ----------
+    twist : (6,) float
+        At O in F, own weight included [m, rad].
+    configuration : Configuration
+        The rigid wrist.
+    active : (m,) bool
+        Flange sectors in contact.
+    measured : (6,) float
+        What the pose sensor would say of the twist; the same without effects of the sensor.
+    model : ErrorModel
+        Made the prediction.
+    added_covariance : (6, 6) float, optional
+        Covariance beyond the model's table: of the effects' parameters, of the load.
+    warnings : tuple of str
+        Effects that were left out or have left first order.
+    """
+
+    twist: Array
+    configuration: Configuration
+    active: NDArray[np.bool_]
+    measured: Array
+    model: ErrorModel = field(repr=False)
+    added_covariance: Array | None = None
+    warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the twist, (6, 6); made where it is asked for, as a search does not."""
+        own = self.model.table_covariance(self.configuration, self.twist)
+        return own if self.added_covariance is None else own + self.added_covariance
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """Rotation R_err (3, 3) and shift s (3,) [m]."""
+        return exp_one(self.twist)
+
+    @property
+    def shift_norm(self) -> float:
+        """Length of s [m]."""
+        return float(np.linalg.norm(self.motion[1]))
+
+    @property
+    def phi(self) -> float:
+        """Angle of R_err [rad]."""
+        return float(np.linalg.norm(self.twist[3:]))
+
+
+@dataclass(frozen=True)
+class BlockPrediction:
+    """Predicted pose errors of n samples.
+
+    Parameters
+    ----------
+    twist : (n, 6) float
+        At O in F, own weight included [m, rad]; NaN where refused.
+    measured : (n, 6) float
+        What the pose sensor would say [m, rad].
+    accepted : (n,) bool
+        False where a sample is outside the table's domain or load range or not finite; the effects'
+        memory passes over such samples as a node does.
+    warnings : tuple of str
+        Each once.
+    """
+
+    twist: Array
+    measured: Array
+    accepted: NDArray[np.bool_]
+    warnings: tuple[str, ...]
