@@ -129,6 +129,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
     instrument, target = (np.eye(3), np.zeros(3)), (np.eye(3), np.zeros(3))
     zero, tare = np.zeros(2), np.zeros(6)
     taken = np.zeros(len(PLAUSIBLE))
+    pointed = np.isfinite(session.turn).all(axis=1)
 
     def said() -> tuple[Array, Array]:
         """Rotation and shift of the platform as the instrument should see it."""
@@ -137,18 +138,24 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
         shift = shift + turn @ target[1]
         return instrument[0] @ turn @ target[0], shift @ instrument[0].T + instrument[1]
 
-    def left() -> tuple[Array, Array]:
+    def left() -> tuple[Array, Array, Array]:
         turn, shift = said()
         twist = log_motion(turn @ np.swapaxes(home.platform, -1, -2), shift)
-        return session.residual(twist), turn
+        return session.residual(twist), turn, shift
 
     for _ in range(ROUNDS):
-        residual, turn = left()
+        residual, turn, shift = left()
         columns = np.zeros((len(theta), 6, len(PLAUSIBLE)))
         columns[:, :, :6] = np.eye(6)
         columns[:, :3, 6:9] = columns[:, 3:, 9:12] = turn
+        columns[:, :3, 9:12] = np.cross(shift[:, :, None], turn, axis=1)
         columns[:, 3:, 12:14] = mechanism.jacobian(home)
         columns[:, :, 14:] = softness
+        # Where no rotation was measured, shifts are compared and no twists.
+        lever = np.repeat(shift[:, :, None], len(PLAUSIBLE), axis=2)
+        lever[:, :, 12:] -= instrument[1][:, None]
+        carried = np.cross(columns[:, 3:], lever, axis=1)
+        columns[:, :3] += np.where(pointed[:, None, None], 0.0, carried)
         step = np.zeros(len(PLAUSIBLE))
         scale = PLAUSIBLE[free]
         step[free] = scale * _solved(columns[:, :, free] * scale, residual, taken[free] / scale)

@@ -1,0 +1,141 @@
+"""Registrations, zeros and tare planted in sessions made of the model's own predictions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.comparing import compare_models
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import observe
+from wrist_stiffness.campaign.set_up import refit_set_up, refitted_values
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.error_model import ErrorModel
+
+POSES = 60
+NOISE = np.repeat([0.3e-6, 3e-6], 3)
+INSTRUMENT = (Rotation.from_rotvec([2e-3, -3e-3, 1e-3]).as_matrix(), np.array([1e-3, 0, -5e-4]))
+TARGET = (Rotation.from_rotvec([-1e-3, 2e-3, 3e-3]).as_matrix(), np.array([-8e-4, 6e-4, 2e-4]))
+
+
+@pytest.fixture(scope="module")
+def model(table):
+    return ErrorModel("wrist", table, "closed_form")
+
+
+def session(model, instrument=INSTRUMENT, target=TARGET, zero=(0, 0), tare=0.0, seed=0, name="day"):
+    """Sixty dwells of a second at random poses and loads, half a second of motion between."""
+    rng = np.random.default_rng(seed)
+    at = np.repeat(1.5 * np.arange(POSES), 2) + np.tile([0.0, 1.0], POSES)
+    time = 0.05 * np.arange(30 * POSES - 10)
+    aims = np.repeat(rng.uniform(-0.6, 0.6, (POSES, 2)), 2, axis=0)
+    pushes = np.repeat(rng.normal(0, [0.5] * 3 + [0.01] * 3, (POSES, 6)), 2, axis=0)
+    theta = np.stack([np.interp(time, at, each) for each in aims.T], axis=1)
+    load = np.stack([np.interp(time, at, each) for each in pushes.T], axis=1)
+    block = Block(time, theta, load)
+    true = replace(block, theta=theta + zero, load=load + tare)
+    bent, moved = exp_twist(model.batch(true).twist)
+    turned = bent @ model.table.mechanism.forward(true.theta).platform
+    rotation = instrument[0] @ turned @ target[0]
+    shift = (moved + turned @ target[1]) @ instrument[0].T + instrument[1]
+    noise = NOISE * rng.normal(size=(len(time), 6))
+    jitter = Rotation.from_rotvec(noise[:, 3:]).as_matrix()
+    return MeasuredSession(name, block, shift + noise[:, :3], jitter @ rotation)
+
+
+def left(model, measured, calibrated=()):
+    """Set-up and what it leaves, in standard deviations of each unit's noise."""
+    observed = observe(model, [measured])
+    (set_up,) = refit_set_up(model, observed, calibrated)
+    scatter = NOISE / np.sqrt(observed.observations.samples)[:, None]
+    # Moments in motion are told to a tenth of a micrometre only: their load is smoothed.
+    dwell = observed.sessions[0].cut.dwell
+    return set_up, (refitted_values(observed, [set_up]) / scatter)[dwell]
+
+
+def rms(values):
+    return np.sqrt(np.nanmean(np.square(values)))
+
+
+def test_millimetres_of_registration_leave_only_noise(model):
+    set_up, residual = left(model, session(model))
+    assert set_up.values[:3] == pytest.approx(INSTRUMENT[1], abs=5e-6)
+    assert set_up.values[6:9] == pytest.approx(TARGET[1], abs=5e-6)
+    # Twenty parameters of 360 numbers take 3 %.
+    assert rms(residual) == pytest.approx(1.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("planted", "place", "value", "within"),
+    [
+        ({"zero": (4e-4, -3e-4)}, slice(12, 14), [4e-4, -3e-4], 1e-4),
+        ({"tare": np.array([0.05, 0, 0, 0, 0, 0])}, slice(14, 17), [0.05, 0, 0], 0.02),
+    ],
+    ids=["zeros", "tare"],
+)
+def test_zeros_and_tare_are_recovered(model, planted, place, value, within):
+    set_up, residual = left(model, session(model, **planted))
+    assert set_up.values[place] == pytest.approx(value, abs=within)
+    # Priors hold back a little of what sixty dwells hardly tell.
+    assert rms(residual) < 1.2
+
+
+def test_what_was_calibrated_stays(model):
+    set_up, residual = left(model, session(model), ("measurement_frame", "target_mounting"))
+    assert not set_up.values[:12].any()
+    assert rms(residual) > 100
+
+
+def test_lost_beams_do_not_pull(model):
+    measured = session(model)
+    shift = measured.shift.copy()
+    for pose in (10, 30, 50):
+        shift[30 * pose : 30 * pose + 20] += 1e-3
+    _, residual = left(model, replace(measured, shift=shift))
+    far = np.abs(residual).max(axis=1) > 100
+    assert far.sum() == 3
+    assert rms(residual[~far]) < 1.2
+
+
+@pytest.mark.parametrize("blank", [slice(0, 3), slice(3, 6)], ids=["pointing", "points"])
+def test_half_a_pose_is_enough(model, blank):
+    measured = session(model)
+    if blank.start == 0:
+        measured = replace(measured, shift=np.full_like(measured.shift, np.nan))
+    else:
+        measured = replace(measured, rotation=np.full_like(measured.rotation, np.nan))
+    _, residual = left(model, measured)
+    assert np.isnan(residual[:, blank]).all()
+    # Of points alone a lever of a millimetre tells the turn of the instrument: priors hold there.
+    assert rms(residual) < 1.4
+
+
+def test_each_session_has_its_own_set_up(model):
+    other = (np.eye(3), np.array([0, 0, 2e-3]))
+    days = [session(model), session(model, instrument=other, seed=1, name="next day")]
+    found = compare_models([("model", model)], days, np.random.default_rng(0))
+    (compared,) = found.models
+    assert compared.before["s_um"].rms > 1000
+    assert compared.after["s_um"].rms < 0.6
+    assert found.at_floor(compared, "s_um")
+    assert [line.split(":")[0] for line in compared.absorbed] == ["day", "next day"]
+
+
+def test_too_few_dwells_are_refused(model):
+    few = session(model).take(slice(0, 100))
+    with pytest.raises(InputError, match="dwells and moments are too few to compare with"):
+        compare_models([("m", model)], [few], np.random.default_rng(0))
+
+
+def test_a_model_of_another_wrist_is_refused(model):
+    axes = {**model.table.geometry.axes, "joint_3": np.array([0.0, 0.6, 0.8])}
+    table = replace(model.table, header=model.table.header)
+    table.__dict__["geometry"] = replace(model.table.geometry, axes=axes)  # a cached property
+    other = replace(model, table=table)
+    with pytest.raises(InputError, match="other is of another wrist than model"):
+        compare_models(
+            [("model", model), ("other", other)], [session(model)], np.random.default_rng(0)
+        )

@@ -1,0 +1,143 @@
+"""`compare` on recordings whose hidden effects are known (test/data/make_recordings.py)."""
+
+import base64
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.shipped import shipped_file
+
+DATA = Path(__file__).parents[1] / "data"
+BACKLASH = """\
+schema: 1
+name: with backlash
+table: {{path: {table}}}
+effects:
+  - effect: backlash
+    component: motor_2
+    parameters: {{width_mdeg: [90, 1]}}
+"""
+
+
+@pytest.fixture(scope="module")
+def with_backlash(tmp_path_factory):
+    path = tmp_path_factory.mktemp("models") / "with_backlash.yaml"
+    table = shipped_file("precomputed/palmieri2015.npz")
+    path.write_text(BACKLASH.format(table=table))
+    return path
+
+
+@pytest.fixture(scope="module")
+def compared(with_backlash, tmp_path_factory):
+    """Exit code, what was printed, values and page of the shipped model against the right one."""
+    folder = tmp_path_factory.mktemp("compared")
+    shipped = shipped_file("config/palmieri2015_model.yaml")
+    arguments = [str(DATA / "wrist_b.mcap"), "--model", str(shipped), "--model", str(with_backlash)]
+    files = ["--json", str(folder / "b.json"), "--report", str(folder / "b.html")]
+    with pytest.MonkeyPatch.context() as patch:
+        lines = []
+        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
+        assert main(["compare", *arguments, *files]) == 0
+    values = json.loads((folder / "b.json").read_text())
+    return "\n".join(lines), values, (folder / "b.html").read_text()
+
+
+def test_the_hidden_backlash_is_the_first_thing_that_is_told(compared):
+    _, values, _ = compared
+    first = values["models"][0]["depends_on"][0]
+    assert first["condition"] == "approach of motor 2"
+    (turn,) = (each["phi_mdeg"] for each in first["changes"] if "phi_mdeg" in each)
+    # The motion of the platform is the motor's, seen through the Jacobian.
+    assert 55 < turn[0] < 100
+    assert turn[0] > 10 * turn[1]
+
+
+def test_the_error_falls_to_the_noise_with_the_right_model(compared):
+    printed, values, _ = compared
+    before, after = (model["after_registration"]["phi_mdeg"]["rms"] for model in values["models"])
+    floor = values["noise_floor"]["phi_mdeg"]
+    assert before > 5 * floor
+    assert after < 1.15 * floor
+    assert values["models"][1]["explained_headroom"]["phi_mdeg"] > 0.9
+    assert values["models"][1]["depends_on"] == []
+    assert "with_backlash is off by" in printed
+    assert "no more than the noise" in printed
+
+
+def test_terminal_file_and_page_say_the_same(compared):
+    printed, values, page = compared
+    for line in values["verdict"]:
+        assert line in printed
+        assert line.replace(" um", " µm").replace("+-", "±") in page
+    sentence = values["models"][0]["depends_on"][0]["sentence"]
+    assert sentence.replace("+-", "±").replace(" um", " µm") in page
+    assert len(values["provenance"]["recordings"]["wrist_b.mcap"]) == 64
+
+
+def test_the_page_has_its_pictures_in_itself(compared):
+    _, _, page = compared
+    pictures = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
+    assert len(pictures) == 4
+    assert all(b"</svg>" in base64.b64decode(picture) for picture in pictures)
+    assert 'src="http' not in page
+
+
+def test_the_same_recording_gives_the_same_answer(compared, with_backlash, tmp_path):
+    _, values, _ = compared
+    shipped = shipped_file("config/palmieri2015_model.yaml")
+    out = tmp_path / "again.json"
+    arguments = [str(DATA / "wrist_b.mcap"), "--model", str(shipped), "--model", str(with_backlash)]
+    assert main(["compare", *arguments, "--json", str(out)]) == 0
+    again = json.loads(out.read_text())
+    assert again["models"] == values["models"]
+
+
+def test_a_model_fitted_to_the_recording_is_said_to_be(with_backlash, tmp_path, capsys):
+    from wrist_stiffness.workflows.read_sessions import recording_sha256
+
+    sha = recording_sha256(DATA / "wrist_b.mcap")
+    lineage = (
+        "lineage:\n  - {command: extend, date: '2026-01-01', "
+        f"parent_sha256: '{'0' * 64}', recordings: {{b: '{sha}'}}}}\n"
+    )
+    model = tmp_path / "fitted.yaml"
+    model.write_text(with_backlash.read_text() + lineage)
+    assert main(["compare", str(DATA / "wrist_b.mcap"), "--model", str(model)]) == 0
+    assert "fitted was fitted to one of these recordings" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
+    pytest.importorskip("distributed", reason="the extra fleet")
+    folder = tmp_path / "wrists"
+    folder.mkdir()
+    shutil.copy(DATA / "wrist_b.mcap", folder)
+    (folder / "wrist_x.mcap").write_bytes(b"no recording")
+    out = tmp_path / "fleet.json"
+    assert main(["compare", str(folder), "--each", "--json", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "approach of motor 2" in next(line for line in lines if "wrist_b" in line)
+    assert "not compared: " in next(line for line in lines if "wrist_x" in line)
+    rows = json.loads(out.read_text())["recordings"]
+    assert [row["comparison"] is None for row in rows] == [False, True]
+    assert np.isfinite(rows[0]["comparison"]["noise_floor"]["s_um"])
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--each", "--report", "x.html"], "--report draws one wrist"),
+        (["--scheduler", "tcp://localhost:1"], "add --each"),
+        (["--model", "missing.yaml"], "missing.yaml"),
+    ],
+)
+def test_wrong_use_is_one_line(options, named, capsys):
+    assert main(["compare", str(DATA / "wrist_a.mcap"), *options]) == 2
+    error = capsys.readouterr().err
+    assert named in error
+    assert error.count("\n") == 1
