@@ -67,6 +67,11 @@ def test_markers_that_cannot_be_used_say_why(stream, pose, model):
     points = model.table.geometry.platform.readout_points @ rotation.T + place
     with pytest.raises(InputError, match=f"{len(points) - 1} came, the geometry names"):
         stream.on_markers(SECOND, "wrist_base", points[1:])
+    for far in (1e4, 1e200, float("inf")):
+        wild = points.copy()
+        wild[0, 0] = far
+        with pytest.raises(InputError, match="beyond 1000 m"):
+            stream.on_markers(SECOND, "wrist_base", wild)
     points[2:] = NAN
     with pytest.raises(InputError, match="2 given; at least 3 needed"):
         stream.on_markers(SECOND, "wrist_base", points)
@@ -122,5 +127,7 @@ def test_a_frame_that_was_measured_once_must_go_on_being_measured(stream, pose):
     stream.loads.add(later, "wrist_base", DOWN[:3], DOWN[3:])
     with pytest.raises(InputError, match=r"newest pose of the frame is 1\.167 s older \(limit 1 s"):
         stream.on_pose(later, "wrist_base", place, quaternion(rotation))
+    with pytest.raises(InputError, match="measured pose: a coordinate of 1e.200 m is beyond"):
+        stream.on_pose(later, "wrist_base", [0.0, 1e200, 0.0], [0.0, 0.0, 0.0, 1.0])
     with pytest.raises(InputError, match="measured frame pose: .* is not finite"):
         stream.on_frame_pose(later, "wrist_base", [NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])

@@ -18,6 +18,9 @@ from wrist_stiffness.mechanism.components import Array
 UNIT_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's norm from one."""
 
+FARTHEST_M = 1e3
+"""No instrument measures a wrist from farther away; its square is still a number."""
+
 FRAME_POSES_KEPT = 256
 
 
@@ -53,7 +56,7 @@ def measured_pose(
     FrameError
         If the frame is neither `wrist_base` nor mapped to it.
     InputError
-        If a number is not finite or the quaternion is no unit quaternion.
+        If a number is not finite or beyond reason or the quaternion is no unit quaternion.
     """
     turn, origin = frames.in_base(frame_id, what)
     numbers = np.array([*position, *quaternion], dtype=float)
@@ -62,6 +65,7 @@ def measured_pose(
     norm = float(np.linalg.norm(numbers[3:]))
     if abs(norm - 1.0) > UNIT_TOLERANCE:
         raise InputError(f"{what}: quaternion has the norm {norm:.4g}, not 1")
+    _require_near(numbers[:3], what)
     return turn @ Rotation.from_quat(numbers[3:]).as_matrix(), turn @ numbers[:3] + origin
 
 
@@ -93,7 +97,8 @@ def pose_of_markers(
     FrameError
         If the frame is neither `wrist_base` nor mapped to it.
     InputError
-        If another number of points comes, or fewer than three that are not on a line are seen.
+        If another number of points comes, fewer than three that are not on a line are seen, or a
+        coordinate is infinite or beyond reason.
     """
     turn, origin = frames.in_base(frame_id, "measured markers")
     places = np.reshape(np.asarray(points, dtype=float), (-1, 3))
@@ -102,8 +107,16 @@ def pose_of_markers(
             f"measured markers: {len(places)} came, the geometry names {len(nominal)} readout "
             "points; both must be in the same order"
         )
+    _require_near(places, "measured markers")
     fit = fit_markers(nominal, places @ turn.T + origin)
     return fit.rotation, fit.shift
+
+
+def _require_near(places: Array, what: str) -> None:
+    """Refuse coordinates that are out of any proportion; NaN are not looked at."""
+    farthest = float(np.max(np.abs(places), initial=0.0, where=~np.isnan(places)))
+    if farthest > FARTHEST_M:
+        raise InputError(f"{what}: a coordinate of {farthest:.4g} m is beyond {FARTHEST_M:g} m")
 
 
 class FrameMotion:
