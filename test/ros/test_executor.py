@@ -1,11 +1,12 @@
 """Data first, in their order, and services and timers all the same."""
 
 import time
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 
@@ -128,6 +129,38 @@ def test_a_subscription_that_comes_while_running_is_heard(rig):
     rig.until(late.get_subscription_count)
     late.publish(Int64(data=3))
     rig.until(lambda: [each.data for each in heard] == [3])
+
+
+def test_a_service_that_waits_for_a_thread_answers_while_data_go_on(rig):
+    heard, release = [], Event()
+
+    def work(done):
+        release.wait(DEADLINE_S)
+        done.set_result(None)
+
+    async def on_ask(request, response):
+        done = Future(executor=rig.executor)
+        Thread(target=work, args=(done,)).start()
+        await done
+        response.message = "done"
+        return response
+
+    rig.hear("data", heard.append)
+    rig.node.create_service(Trigger, "ask", on_ask)
+    client = rig.asker.create_client(Trigger, "ask")
+    data = rig.asker.create_publisher(Int64, "data", 10)
+    rig.thread.start()
+    beside = SingleThreadedExecutor(context=rig.context)
+    beside.add_node(rig.asker)
+    assert client.wait_for_service(DEADLINE_S)
+    rig.until(data.get_subscription_count)
+    answer = client.call_async(Trigger.Request())
+    data.publish(Int64(data=7))
+    rig.until(lambda: heard)
+    assert not answer.done()
+    release.set()
+    beside.spin_until_future_complete(answer, DEADLINE_S)
+    assert answer.result().message == "done"
 
 
 def test_what_a_data_callback_raises_ends_the_spin(rig):
