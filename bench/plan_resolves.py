@@ -69,13 +69,12 @@ HIDDEN = (
     "bushing_hardening",
     "joint_friction",
     "creep",
-    "load_scale",
     "load_misalignment",
     "load_point",
     "encoder_eccentricity",
     "cable_wrench",
 )
-"""What poses and loads at rest can show; a flange's gap has no tangent that holds far enough."""
+"""What poses and loads at rest can show, and no diagnosis refits anyway."""
 
 VISIBLE = 6.0
 """Discrimination from nothing that the hidden effect has in the paper's design."""

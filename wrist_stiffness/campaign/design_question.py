@@ -29,6 +29,8 @@ WRIST = (
     *(f"axis_misalignment@joint_{i}" for i in range(1, 6)),
     *(f"link_stiffness@link_{i}" for i in range(1, 4)),
     *(f"bushing_stiffness@joint_{i}" for i in range(1, 6)),
+    *(f"flange_contact@joint_{i}" for i in range(2, 5)),
+    "load_scale@load_sensor",
 )
 """Known to their plausible sizes."""
 
