@@ -12,10 +12,11 @@ from wrist_stiffness.errors import InputError, TableError
 from wrist_stiffness.model import registry
 from wrist_stiffness.model.block import Load, Sample
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.model.parameters import Estimate, si_factor
-from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.shipped import shipped_file
 
 TABLE = str(shipped_file("precomputed/palmieri2015.npz"))
@@ -326,3 +327,26 @@ def test_other_packages_offer_laws_by_entry_point(monkeypatch, tmp_path):
     finally:
         monkeypatch.undo()
         registry.catalogue.cache_clear()
+
+
+def test_joint_uncertainty_counts_once_and_survives_writing(tmp_path):
+    """Two twins that a fit told only together: their own uncertainties would say 40 mdeg."""
+    sigma = np.array([1e-7, 2e-7, 3e-7, 1e-5, 2e-5, 3e-5])
+    twins = (
+        Effect(find_law("encoder_offset"), "motor_1", {"offset_mdeg": Estimate(3.0, 40.0)}),
+        Effect(find_law("backlash"), "motor_2", {"width_mdeg": Estimate(10.0, 1.0)}),
+    )
+    plain = load_model(shipped_file("config/palmieri2015_model.yaml")).with_effects(*twins)
+    fitted = replace(plain, joint=JointUncertainty((twins[0].name,), sigma))
+    save_model(fitted, tmp_path / "m.yaml")
+    again = load_model(tmp_path / "m.yaml")
+    assert again.joint.effects == (twins[0].name,)
+    assert np.allclose(again.joint.sigma, sigma, rtol=1e-12)
+    assert [len(each.variations) for each in (plain, again)] == [2, 1]
+    sample = Sample(0.0, np.radians([10.0, 5.0]), Load(np.zeros(6)))
+    covariance = again.session().advance(sample).covariance
+    certain = Effect(find_law("encoder_offset"), "motor_1", {"offset_mdeg": Estimate(3.0)})
+    other = again.with_effects(certain, twins[1])
+    without = replace(other, joint=None).session().advance(sample).covariance
+    assert np.allclose(covariance - without, np.diag(sigma**2), rtol=1e-9, atol=1e-22)
+    assert plain.session().advance(sample).covariance[3, 3] > np.radians(0.03) ** 2

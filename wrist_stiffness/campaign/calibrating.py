@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 
 NEGLIGIBLE = 0.01
 """Of a prior's standard deviation: a smaller move of a parameter that the data do not tell is none.
@@ -158,4 +159,8 @@ def told_model(found: Fit, keep: Sequence[str] = ()) -> ErrorModel:
         plain = Effect(free.effect.law, free.effect.component)
         if fitted.name in (*told, *keep) or free.effect.si != plain.si:
             effects.append(fitted)
-    return problem.model.with_effects(*effects)
+    names = {effect.name for effect in effects}
+    joint = found.joint
+    kept = tuple(name for name in joint.effects if name in names)
+    model = problem.model.with_effects(*effects)
+    return replace(model, joint=JointUncertainty(kept, joint.sigma))

@@ -25,6 +25,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.parameters import Estimate
 
 MOST_STEPS = 40
@@ -105,6 +106,8 @@ class Fit:
         Steps of the unknowns from the means of their priors.
     covariance : (p, p) float
         Of `z`; the colour of the noise and a misfit beyond it are in it.
+    columns : (u, 6, p) float
+        Change of the residual by a step of each unknown [m, rad].
     residual : (u, 6) float
         Of the units of `problem.table`, NaN where not measured or lost [m, rad].
     used : (u,) bool
@@ -122,6 +125,7 @@ class Fit:
     problem: FitProblem
     z: Array
     covariance: Array
+    columns: Array
     residual: Array
     used: Mask
     noise: NoiseModel
@@ -184,6 +188,16 @@ class Fit:
             replace(each.effect, estimates=own)
             for each, own in zip(problem.free, estimates, strict=True)
         )
+
+    @property
+    def joint(self) -> JointUncertainty:
+        """What the uncertainties of all parameters make of a prediction together."""
+        rows = self.columns[self.used]
+        variance = np.einsum("uij,jk,uik->ui", rows, self.covariance, rows)
+        measured = self.problem.table.measured[self.used]
+        mean = (variance * measured).sum(axis=0) / np.maximum(measured.sum(axis=0), 1)
+        names = tuple(free.effect.name for free in self.problem.free)
+        return JointUncertainty(names, np.sqrt(mean))
 
     def model(self, session: int = -1) -> ErrorModel:
         """Return the model with the fitted effects, as a session has them."""
@@ -303,6 +317,7 @@ def _settled(
         problem,
         z,
         linear.covariance,
+        columns,
         np.where(lost[:, None], np.nan, residual),
         ~unseen,
         linear.noise,

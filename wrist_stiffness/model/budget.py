@@ -57,8 +57,8 @@ class Budget:
         Pose error of the platform [m, rad].
     measured : (6,) float
         What the pose sensor would say of it: the sum of all shares and `second_order` [m, rad].
-    table_covariance : (6, 6) float
-        Of the table's stated error and the encoder step.
+    covariance : (6, 6) float
+        Of the twist: the table's stated error, the encoder step and the effects' parameters.
     platform : (3, 3) float
         Rotation U -> F of the rigid platform.
     warnings : tuple of str
@@ -70,7 +70,7 @@ class Budget:
     second_order: Array
     twist: Array
     measured: Array
-    table_covariance: Array
+    covariance: Array
     platform: Array
     warnings: tuple[str, ...]
 
@@ -123,13 +123,20 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
         effects.append(Share(effect.name, twist, np.reshape(spread, (-1, 6))))
     elastic = [Share(name, twists[k], np.empty((0, 6))) for k, name in enumerate(ELASTIC)]
     total = twists.sum(axis=0) + sum((share.twist for share in effects), np.zeros(6))
+    covariance = model.table_covariance(configuration, result.twist[0])
+    together: tuple[str, ...] = ()
+    if model.joint is not None:
+        together, covariance = model.joint.effects, covariance + model.joint.covariance
+    for share in effects:
+        if share.name not in together:
+            covariance = covariance + share.spread.T @ share.spread
     return Budget(
         tuple(elastic),
         tuple(effects),
         result.measured[0] - total,
         result.twist[0],
         result.measured[0],
-        model.table_covariance(configuration, result.twist[0]),
+        covariance,
         configuration.platform,
         result.warnings,
     )

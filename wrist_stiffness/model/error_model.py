@@ -18,6 +18,7 @@ from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import Memory, evaluate
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.situation import lengths
@@ -44,6 +45,8 @@ class ErrorModel:
         Where the table was read.
     lineage : tuple of Step
         How the model came about, oldest first.
+    joint : JointUncertainty, optional
+        Of the effects that a fit estimated together.
 
     Raises
     ------
@@ -57,6 +60,7 @@ class ErrorModel:
     effects: tuple[Effect, ...] = ()
     table_file: Path | None = None
     lineage: tuple[Step, ...] = ()
+    joint: JointUncertainty | None = None
 
     def __post_init__(self) -> None:
         """Check that the effects go together and with the evaluation."""
@@ -92,10 +96,15 @@ class ErrorModel:
 
     @cached_property
     def variations(self) -> tuple[ErrorModel, ...]:
-        """The model with each uncertain parameter moved by its standard uncertainty."""
+        """The model with each uncertain parameter moved by its standard uncertainty.
+
+        Those of effects in `joint` are left out.
+        """
+        together = () if self.joint is None else self.joint.effects
         return tuple(
             self.with_effects(*self.effects[:number], other, *self.effects[number + 1 :])
             for number, effect in enumerate(self.effects)
+            if effect.name not in together
             for other in effect.varied
         )
 
@@ -325,7 +334,7 @@ class Session:
         model.table.check_load(sample.load.wrench)
         result, later = evaluate(model, sample.block, memory)
         twist = result.twist[0]
-        covariance = np.zeros((6, 6))
+        covariance = np.zeros((6, 6)) if model.joint is None else model.joint.covariance
         others = []
         for number, other in enumerate(model.variations):
             before = None if self._others is None else self._others[number]

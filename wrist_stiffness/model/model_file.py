@@ -17,6 +17,7 @@ from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.joint_uncertainty import KEYS, JointUncertainty
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.parameters import Estimate
@@ -70,9 +71,10 @@ def load_model(path: str | Path) -> ErrorModel:
         evaluation = root.text("evaluation", EVALUATIONS)  # type: ignore[assignment]
     lineage = _blocks(root, "lineage") if "lineage" in root.values else []
     steps = tuple(_step(block) for block in lineage)
+    joint = _joint(root.block("joint_uncertainty")) if "joint_uncertainty" in root.values else None
     root.no_more_keys()
     try:
-        return ErrorModel(name, table, evaluation, effects, table_file, steps)
+        return ErrorModel(name, table, evaluation, effects, table_file, steps, joint)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -106,6 +108,11 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
         "evaluation": model.evaluation,
         "effects": [_entry(effect, path.parent) for effect in model.effects],
     }
+    if model.joint is not None:
+        content["joint_uncertainty"] = {
+            "effects": list(model.joint.effects),
+            **model.joint.as_values(),
+        }
     if model.lineage:
         content["lineage"] = [step.as_values() for step in model.lineage]
     text = yaml.safe_dump(
@@ -206,6 +213,18 @@ def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
         for key, estimate in effect.estimates.items()
     }
     return own
+
+
+def _joint(block: Block) -> JointUncertainty:
+    names = block.take("effects")
+    if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+        raise InputError(f"{block.place}.effects: {names!r} is not a list of names")
+    values = {key: block.number(key) for key in KEYS}
+    for key, value in values.items():
+        if value < 0.0:
+            raise InputError(f"{block.place}.{key}: {value:g} is below 0")
+    block.no_more_keys()
+    return JointUncertainty.of_values(tuple(names), values)
 
 
 def _step(block: Block) -> Step:

@@ -228,9 +228,7 @@ def _explained(
     # Rounding only, unless effects of the pose sensor are in the model.
     if np.linalg.norm(parts.second_order) > 1e-12 * np.linalg.norm(parts.measured):
         rows.append(row("composition", "second order", parts.second_order, none))
-    covariance = parts.table_covariance + sum(
-        (share.spread.T @ share.spread for share in parts.effects), np.zeros((6, 6))
-    )
+    covariance = parts.covariance
     sigma = np.sqrt(np.einsum("ki,ij,kj->k", directions, covariance, directions))
     if measured:
         rest = total - parts.measured

@@ -1,0 +1,52 @@
+"""How uncertain a fit leaves predictions, its parameters together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.vector_keys import AXES
+
+KEYS = {
+    **{f"{axis}_um": 1e-6 for axis in AXES},
+    **{f"turn_{axis}_mdeg": float(np.radians(1e-3)) for axis in AXES},
+}
+"""Names in the model file and their SI sizes."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointUncertainty:
+    """What the uncertainties of fitted parameters make of a prediction together.
+
+    One by one they tell too much: an axis and a registration may each be uncertain by 40 mdeg where
+    only their sum shows, and that is known to one.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Effects that were fitted; their own uncertainties are not counted again.
+    sigma : (6,) float
+        Standard uncertainty of what the pose sensor would say, at O in F, root mean square over the
+        recordings of the fit [m, rad].
+    """
+
+    effects: tuple[str, ...]
+    sigma: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Of a predicted twist, (6, 6)."""
+        return np.diag(self.sigma**2)
+
+    def as_values(self) -> dict[str, float]:
+        """Return the sigma as the model file holds it, with units in the names."""
+        sizes = zip(KEYS.items(), self.sigma.tolist(), strict=True)
+        return {key: value / size for (key, size), value in sizes}
+
+    @classmethod
+    def of_values(cls, effects: tuple[str, ...], values: Mapping[str, float]) -> JointUncertainty:
+        """Return what `as_values` told."""
+        return cls(effects, np.array([values[key] * size for key, size in KEYS.items()]))
