@@ -288,7 +288,7 @@ class _Clock:
             return
         start, way, begin = self._theta, target - self._theta, self._time_s
         seen = number is not None and self._pace.in_motion
-        for part in SEEN_IN_MOVES:
+        for part in SEEN_IN_MOVES if seen else (0.5,):
             for back in (BEFORE_S / duration, 0.0) if seen else (0.0,):
                 u = max(part - back, 0.0)
                 self._time_s = begin + u * duration
