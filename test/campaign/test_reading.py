@@ -73,7 +73,7 @@ def test_the_load_is_the_one_that_the_nodes_would_use():
     for stamp, wrench in zip(stamps.tolist(), wrenches, strict=True):
         history.add(stamp, Load(wrench))
     signal = in_order(stamps, wrenches)
-    asked = np.sort(rng.integers(1, 60 * SECOND // 10, 200))
+    asked = np.sort(np.append(rng.integers(1, 60 * SECOND // 10, 200), stamps))
     newest = signal.newest(asked)
     for stamp, row in zip(asked.tolist(), newest, strict=True):
         try:
