@@ -30,12 +30,14 @@ from wrist_stiffness.campaign.design_information import (
     Layout,
     MeasurementNoise,
     beyond_nuisances,
+    carried_over,
     discrimination,
     information,
 )
 from wrist_stiffness.campaign.design_pool import draw_settings
 from wrist_stiffness.campaign.design_question import (
     SESSION,
+    TARE,
     WRIST,
     Question,
     between,
