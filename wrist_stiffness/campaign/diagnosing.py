@@ -121,7 +121,7 @@ def seek_point(
             break
         best = max(fits, key=lambda each: each.gain)
         trial = fit_base(model, units, (*extras, best.effect), base)
-        if base.cost - trial.cost < WORTH:
+        if base.cost - trial.cost < WORTH + screen.price(len(best.effect.parameters)):
             break
         base, extras = trial, _fitted_extras(trial)
         candidates = wrist_candidates(_point(base), absent, _near(model, extras), progress)

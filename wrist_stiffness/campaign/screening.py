@@ -18,10 +18,10 @@ from wrist_stiffness.campaign.candidates import Point, WristCandidate
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 
-MOST_FITTED = 8
+MOST_FITTED = 6
 """So many leaders are fitted with their own law."""
 
-MOST_TRIALS = 12
+MOST_TRIALS = 7
 """Steps of each of these fits."""
 
 
@@ -36,7 +36,7 @@ class Fitted:
     values : dict of str to float
         Of the law's parameters.
     gain : float
-        Fall of the weighted sum of squares against the base alone.
+        Fall of the weighted sum of squares against the base alone, less the parameters' price.
     """
 
     candidate: WristCandidate
@@ -73,11 +73,6 @@ class Screen:
         """Weighted sum of squares that the base leaves."""
         return float(self.left @ self.left)
 
-    @property
-    def freedom(self) -> int:
-        """Numbers measured, less those of the base that have no prior."""
-        return int(self._base.problem.table.measured.sum())
-
     def beyond(self, rows: Array) -> Array:
         """Return the part of rows (N,) or (N, k) that the base cannot imitate."""
         return rows - self._basis @ (self._basis.T @ rows)
@@ -88,17 +83,22 @@ class Screen:
         priors = np.zeros((len(self.left) - len(white), white.shape[1]))
         return self.beyond(np.vstack([white, priors]))
 
+    def price(self, parameters: int) -> float:
+        """Return the sum of squares that chance gives to so many parameters (BIC)."""
+        return float(parameters * np.log(self._base.problem.table.measured.sum()))
+
     def leaders(
         self, candidates: Sequence[WristCandidate]
     ) -> list[tuple[float, WristCandidate, tuple[float, ...]]]:
-        """Return the gain by columns of each candidate at its best shape, largest first."""
+        """Return what each candidate gains by its columns, at its best shape, largest first."""
         found = []
         for candidate in candidates:
             best = max(
                 ((self._gain(candidate.at(shape)), shape) for shape in candidate.shapes),
                 key=lambda pair: pair[0],
             )
-            found.append((best[0], candidate, best[1]))
+            free = len(candidate.candidate().parameters) + len(best[1])
+            found.append((best[0] - self.price(free), candidate, best[1]))
         return sorted(found, key=lambda each: -each[0])
 
     def _gain(self, columns: Array) -> float:
@@ -151,4 +151,5 @@ class Screen:
             xtol=1e-4,
             max_nfev=MOST_TRIALS,
         )
-        return Fitted(candidate, values(found.x), self.energy - 2.0 * float(found.cost))
+        gain = self.energy - 2.0 * float(found.cost) - self.price(len(keys))
+        return Fitted(candidate, values(found.x), gain)
