@@ -47,8 +47,17 @@ class StreamExecutor(SingleThreadedExecutor):
     def spin(self) -> None:
         """Execute callbacks until shutdown."""
         while self._context.ok() and not self._is_shutdown:
-            self._serve_others()
-            self._serve_data()
+            data = [
+                subscription
+                for node in self.get_nodes()
+                for subscription in node.subscriptions
+                if isinstance(subscription.callback_group, DataGroup)
+            ]
+            if data:
+                self._serve_data(data)
+                self._serve_others()
+            else:
+                self.spin_once()
 
     def can_execute(self, entity: Any) -> bool:
         """Tell whether rclpy's loop may run an entity: never a data subscription."""
@@ -65,15 +74,9 @@ class StreamExecutor(SingleThreadedExecutor):
             if (error := handler.exception()) is not None:
                 raise error
 
-    def _serve_data(self) -> None:
+    def _serve_data(self, data: Sequence[Subscription]) -> None:
         """Run data callbacks until something else is ready."""
         # Only others, that run in rclpy's loop, make or remove entities: the set stays as it is.
-        data = [
-            subscription
-            for node in self.get_nodes()
-            for subscription in node.subscriptions
-            if isinstance(subscription.callback_group, DataGroup)
-        ]
         waiting = Waiting(self, data)
         while not self._is_shutdown:
             more = take_in_order(data)

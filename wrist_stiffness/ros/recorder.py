@@ -28,6 +28,7 @@ from wrist_stiffness.recording.messages import (
     Temperature,
     WrenchStamped,
 )
+from wrist_stiffness.ros.executor import DataGroup
 from wrist_stiffness.ros.parameters import declare
 from wrist_stiffness.ros.qos import NOTES_QOS, RECORDING_QOS
 from wrist_stiffness.ros.run import run
@@ -97,6 +98,7 @@ class Recorder(Node):
         if not all(self.count_publishers(topic) for topic in self._begin_with):
             return
         self._looking.cancel()
+        group = DataGroup()
         for topic, message_type in TOPICS.items():
             package, kind, name = message_type.ros_type.split("/")
             self.create_subscription(
@@ -105,6 +107,7 @@ class Recorder(Node):
                 partial(self._on_message, channel_of(topic, message_type)),
                 NOTES_QOS if topic == topics.RECORDING_NOTES else RECORDING_QOS,
                 raw=True,
+                callback_group=group,
             )
 
     def _on_message(self, channel: Channel, payload: bytes) -> None:
