@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -242,7 +243,7 @@ class CorrectionStream(Stream):
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
         theta = self.settings.motors.angles(names, positions, COMMAND)
-        if not np.all(np.isfinite(positions)):
+        if not all(map(isfinite, positions)):
             raise InputError(f"{COMMAND}: position {list(positions)} is not finite")
         return theta
 
@@ -282,7 +283,7 @@ class CorrectionStream(Stream):
         objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
         predict = running.preview(stamp_ns, load, theta_dot)
         correction = correct(predict, table.mechanism, theta, objective)
-        largest = float(np.max(np.abs(correction.delta)))
+        largest = max(map(abs, correction.delta.tolist()))
         if largest > self.settings.correction_limit:
             raise InputError(
                 f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
