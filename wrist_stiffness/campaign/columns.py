@@ -99,11 +99,9 @@ class SessionModel:
             Predicted with the trial minus predicted at the point, at O in F [m, rad].
         """
         path = [self.remembers(trial) for trial in trials]
-        base = dict.fromkeys(path)
-        both = self.predicted([self.effects, *trials])
-        base[self.remembers(self.effects)] = both[0]
-        for needs_path in base:
-            if base[needs_path] is None:
-                bare = self.model.with_effects().batch_with(self.session.block, [self.effects])
-                base[needs_path] = self.session.mean(bare[0].measured)
-        return [each - base[own] for each, own in zip(both[1:], path, strict=True)]
+        own, *found = self.predicted([self.effects, *trials])
+        base = {self.remembers(self.effects): own}
+        if True in path and True not in base:
+            bare = self.model.with_effects().batch_with(self.session.block, [self.effects])
+            base[True] = self.session.mean(bare[0].measured)
+        return [each - base[on_path] for each, on_path in zip(found, path, strict=True)]

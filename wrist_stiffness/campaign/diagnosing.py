@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from wrist_stiffness.campaign.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.candidates import Point, WristCandidate, wrist_candidates
@@ -22,6 +23,9 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
 Progress = Callable[[int, int], None]
+
+WANDER_SHARES = (0.7, 0.5, 0.35)
+"""Root mean square of slope, curvature and third order of a wander, against its own."""
 
 MOST_EXTRAS = 3
 """Effects with which the point is sought."""
@@ -145,9 +149,7 @@ def _fitted_extras(base: BaseFit) -> tuple[Effect, ...]:
 def _point(base: BaseFit) -> Point:
     """Return the fitted base, without the effects fitted along."""
     sessions = base.problem.sessions
-    used = tuple(
-        np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1) for each in sessions
-    )
+    used = tuple(each.measured for each in sessions)
     return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
 
 
@@ -203,10 +205,11 @@ def _nuisances(base: BaseFit) -> tuple[Nuisance, ...]:
             name = base.problem.free[unknown.free].effect.name
             group = groups.setdefault((name, unknown.session is not None), {})
             group.setdefault(unknown.key, []).append(place)
-    return tuple(
+    found = [
         _nuisance(base, name, per_session, list(keys.values()))
         for (name, per_session), keys in groups.items()
-    )
+    ]
+    return (*found, _wander(base))
 
 
 def _nuisance(base: BaseFit, name: str, per_session: bool, places: list[list[int]]) -> Nuisance:
@@ -214,3 +217,22 @@ def _nuisance(base: BaseFit, name: str, per_session: bool, places: list[list[int
     columns = -np.stack([base.columns[:, :, each].sum(axis=2) for each in places], axis=-1)
     prior = None if per_session else tuple(base.prior_std[[each[0] for each in places]].tolist())
     return Nuisance(name, lambda units: columns[units.rows], prior, per_session)
+
+
+def _wander(base: BaseFit) -> Nuisance:
+    """Return the instrument's slow wander over a session: it is no drift.
+
+    Legendre polynomials of the time with the sizes that a wander of a minute or so has.
+    """
+    columns = []
+    for session in base.problem.sessions:
+        time = session.mean(session.block.time)[session.measured]
+        span = max(float(np.ptp(time)), 1e-9)
+        wave = legvander(2.0 * (time - time.min()) / span - 1.0, len(WANDER_SHARES))[:, 1:]
+        size = np.where(session.wander > 0.0, session.wander, 0.5 * np.nan_to_num(session.white))
+        rise = np.sqrt(2.0 * np.arange(1, len(WANDER_SHARES) + 1) + 1.0) * WANDER_SHARES
+        each = (wave * rise)[:, None, :, None] * np.diag(size)[None, :, None, :]
+        columns.append(each.reshape(len(time), 6, -1))
+    rows = np.concatenate(columns)
+    prior = (1.0,) * rows.shape[2]
+    return Nuisance("slow wander", lambda units: rows[units.rows], prior, per_session=True)

@@ -68,6 +68,12 @@ class UnitSession:
     wander: Array
 
     @property
+    def measured(self) -> Mask:
+        """Units of which anything was measured, (u,); only these are in the table."""
+        seen = np.isfinite(self.shift).any(axis=1) | np.isfinite(self.turn).any(axis=1)
+        return np.asarray(seen)
+
+    @property
     def block(self) -> Block:
         """Signals at the moments that are kept."""
         return self.cut.block
@@ -78,8 +84,7 @@ class UnitSession:
         used, units = self.cut.unit >= 0, len(self.cut.dwell)
         weighted = flat[used] * self.cut.weight[used, None]
         sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
-        mean: Array = np.stack(sums, axis=1).reshape(units, *values.shape[1:])
-        return mean
+        return np.asarray(np.stack(sums, axis=1).reshape(units, *values.shape[1:]), dtype=float)
 
     def residual(self, twist: Array) -> Array:
         """Return log(T_measured T_predicted^-1) at O in F, (u, 6) [m, rad].
@@ -90,7 +95,7 @@ class UnitSession:
             Predicted pose error of each unit [m, rad].
         """
         rotation, shift = exp_twist(twist)
-        known: Mask = np.isfinite(self.turn).all(axis=1)
+        known = np.asarray(np.isfinite(self.turn).all(axis=1))
         measured = Rotation.from_rotvec(np.where(known[:, None], self.turn, 0.0)).as_matrix()
         # Without a measured rotation the predicted one stands in: then s is compared with s.
         measured = np.where(known[:, None, None], measured, rotation)
@@ -169,7 +174,9 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         )
     session = session.take(accepted)
     parts = cut(
-        session.block, model.table.geometry.limits.encoder_step, session.measured.any(axis=1)
+        session.block,
+        model.table.geometry.limits.encoder_step,
+        np.asarray(session.measured.any(axis=1)),
     )
     nominal = model.table.mechanism.forward(session.block.theta).platform
     error = session.rotation @ np.swapaxes(nominal, -1, -2)
