@@ -72,6 +72,15 @@ def test_what_is_known_already_is_not_told_again():
     assert [each.which for each in found] == [1]
 
 
+def test_what_hardly_differs_from_what_is_known_is_not_asked():
+    rng = np.random.default_rng(9)
+    strong, other = rng.normal(size=(2, N, 1))
+    near = strong + 0.2 * other
+    # The small difference between both would explain a lot, but as a huge slope.
+    found = asked(rng, wander(rng) + 4 * strong + other, [near, strong]).entered
+    assert len(found) == 1
+
+
 def test_a_condition_inside_the_base_says_nothing():
     rng = np.random.default_rng(6)
     answer = asked(rng, wander(rng), [np.full((N, 1), 3.0), rng.normal(size=(N, 1))])

@@ -129,7 +129,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
     instrument, target = (np.eye(3), np.zeros(3)), (np.eye(3), np.zeros(3))
     zero, tare = np.zeros(2), np.zeros(6)
     taken = np.zeros(len(PLAUSIBLE))
-    pointed = np.isfinite(session.turn).all(axis=1)
+    pointed = np.isfinite(session.turn.sum(axis=1))
 
     def said() -> tuple[Array, Array]:
         """Rotation and shift of the platform as the instrument should see it."""

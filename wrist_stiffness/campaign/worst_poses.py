@@ -16,6 +16,9 @@ from wrist_stiffness.mechanism.components import Array
 APART_S = 2.0
 """Moments closer than this in time are one event."""
 
+SAME_DEG, SAME_N = 2.0, 0.1
+"""So are repetitions of one pose under one force."""
+
 
 @dataclass(frozen=True, eq=False)
 class WorstPose:
@@ -75,12 +78,11 @@ def worst_poses(
     load = np.stack([observations.covariate(name) for name in (*FORCES, *MOMENTS)], axis=1)
     chosen: list[int] = []
     for unit in np.argsort(-size).tolist():
-        near = [
-            observations.sessions[unit] == observations.sessions[other]
-            and abs(observations.times[unit] - observations.times[other]) < APART_S
-            for other in chosen
-        ]
-        if not any(near):
+        moment = np.abs(observations.times[chosen] - observations.times[unit]) < APART_S
+        moment &= observations.sessions[chosen] == observations.sessions[unit]
+        pose = (np.abs(np.degrees(theta[chosen] - theta[unit])) < SAME_DEG).all(axis=1)
+        pose &= np.linalg.norm(load[chosen, :3] - load[unit, :3], axis=1) < SAME_N
+        if not (moment | pose).any():
             chosen.append(unit)
         if len(chosen) == most:
             break
