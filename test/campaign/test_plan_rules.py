@@ -36,7 +36,7 @@ def model():
 @pytest.fixture(autouse=True)
 def small_pool(monkeypatch):
     """Fewer settings to choose from, for the time of the tests."""
-    monkeypatch.setattr(design_pool, "POOL", 16)
+    monkeypatch.setattr(design_pool, "POOL", 10)
 
 
 def conditions(model, sources=(WEIGHT, GRIPPER), minutes=None, seed=0, **pace):
@@ -59,7 +59,7 @@ def generator():
 @pytest.fixture(scope="module")
 def longer(model):
     patch = pytest.MonkeyPatch()
-    patch.setattr(design_pool, "POOL", 16)
+    patch.setattr(design_pool, "POOL", 10)
     try:
         return plan(model, rivals(), conditions(model, minutes=25.0))
     finally:

@@ -45,7 +45,7 @@ DIAGNOSIS = {
 def small_pool():
     """Fewer settings to choose from, for the time of the tests."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(design_pool, "POOL", 16)
+    patch.setattr(design_pool, "POOL", 10)
     yield
     patch.undo()
 
