@@ -1,0 +1,101 @@
+"""The page of a diagnosis made by hand: everything of the result is on it, in words."""
+
+from dataclasses import replace
+from html import unescape
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.observing import QUANTITIES
+from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations
+from wrist_stiffness.diagnosis.result import NotExcited, Unexplained
+from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.report.diagnosis_report import report_of_diagnosis, shown_by
+from wrist_stiffness.workflows.report.page import html_of
+
+FINDING = Finding(
+    (("joint_clearance", "joint_3"), ("joint_clearance", "joint_4")),
+    {"clearance_um": (12.1, 0.4)},
+    0.42,
+    123.4,
+    0.001,
+    0.97,
+    {"s_um": (3.2, 0.3), "phi_mdeg": (14.0, 2.0)},
+    "needs_signal",
+    "joint_3 has play",
+    "rock it by hand",
+)
+RESULT = Diagnosis(
+    "effect",
+    "dwell",
+    {"s_um": 1.2, "phi_mdeg": 6.3},
+    {"s_um": 7.5, "phi_mdeg": 20.0},
+    {"s_um": 1.3, "phi_mdeg": 6.5},
+    ("registration: 700 um of s",),
+    (FINDING,),
+    Unexplained((), 0.0, ""),
+    (
+        NotExcited("creep", "joint_2", "hold a load for 60 s"),
+        NotExcited("creep", "joint_5", "hold a load for 60 s"),
+    ),
+    3,
+    "another session",
+)
+
+
+@pytest.fixture(scope="module")
+def observations():
+    rng = np.random.default_rng(0)
+    n = 120
+    names = ("theta_1", "theta_2", "fx", "fy", "fz", "mx", "my", "mz", "held_s", "moment")
+    conditions = {name: rng.uniform(0.1, 1.0, n) for name in names}
+    conditions |= {f"approach_{motor}": rng.choice([-1.0, 1.0], n) for motor in (1, 2)}
+    conditions |= {"speed_1": np.zeros(n), "speed_2": np.zeros(n)}
+    conditions |= {"force": rng.uniform(0, 1, n), "loaded_at_rest": rng.integers(0, 2, n) * 1.0}
+    conditions["time_s"] = 3.0 * np.arange(n)
+    values = np.repeat([1e-6, 1e-4], 3) * rng.normal(size=(n, 6))
+    values[:, 2] += 5e-6 * conditions["approach_1"]
+    return Observations(values, conditions, time_s=conditions["time_s"], quantities=QUANTITIES)
+
+
+def page_of(result, observations, notes=()):
+    shown = shown_by(observations, np.random.default_rng(0), 0.1 * observations.values)
+    provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
+    return unescape(html_of(report_of_diagnosis(result, shown, ["monday"], notes, provenance)))
+
+
+def test_everything_of_a_finding_is_on_the_page(observations):
+    page = page_of(RESULT, observations, ["monday: 5 spikes"])
+    for words in (
+        "Missing in the model: joint_clearance at joint_3 (or joint_clearance at joint_4).",
+        "s from 7.5 to 1.3 µm (noise floor 1.2)",
+        "joint_3 has play",
+        "To be sure: rock it by hand",
+        "12.1 ± 0.4",
+        "3.2 ± 0.3 µm",
+        "only with a signal that the recordings lack",
+        "another session",
+        "registration: 700 µm of s",
+        "3 units were left out",
+        "monday: 5 spikes",
+        "creep at joint_2, creep at joint_5",
+        "hold a load for 60 s",
+        "When motor 1 is approached",
+    ):
+        assert words in page, words
+    # The fall, and the residual against its condition.
+    assert page.count("data:image/svg+xml") == 2
+
+
+def test_nothing_missing_is_said_first(observations):
+    page = page_of(replace(RESULT, verdict="none", findings=()), observations)
+    assert "Nothing is missing at this noise" in page
+    assert "Missing in the model" not in page
+
+
+def test_unknown_tells_on_what_it_depends(observations):
+    rest = Unexplained(("humidity", "T_link_1"), 0.31, "the conditions predict it")
+    page = page_of(replace(RESULT, verdict="unknown", unexplained=rest), observations)
+    assert "31 % of the structure above the noise is explained by no known effect." in page
+    assert "It depends on humidity, T_link_1." in page
+    assert "Missing in the model" in page
