@@ -114,9 +114,10 @@ class Extension:
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
         noise = self.after.fit.noise
-        if refuted(self.before.held_out(noise), self.after.held_out(noise)):
+        without, with_it = self.before.held_out(noise), self.after.held_out(noise)
+        if refuted(without, with_it):
             out.append("the error on the unseen part GROWS: leave this effect out")
-        elif all(gain <= SIGNIFICANT * sigma for gain, sigma in self.bought.values()):
+        elif not refuted(with_it, without):
             out.append("the error on the unseen part does not fall beyond chance")
         return tuple(out)
 
