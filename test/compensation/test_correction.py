@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.correction import correct
-from wrist_stiffness.compensation.objective import OBJECTIVES
+from wrist_stiffness.compensation.objective import OBJECTIVES, Objective
 from wrist_stiffness.errors import LoadRangeError, SingularPoseError, UnreachablePoseError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 
@@ -93,6 +93,31 @@ def test_objective_is_the_derivative_of_the_task(model, objective, name):
         point = objective(name).tool_point
         change = (moved - configuration.platform) @ point + twist[:3]
         assert np.allclose(task, change, rtol=1e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", OBJECTIVES)
+def test_motors_cancel_the_task_by_least_squares(model, objective, name):
+    mechanism = model.table.mechanism
+    for theta, _ in random_cases(model, 10):
+        configuration = mechanism.forward(theta)
+        jacobian = mechanism.jacobian(configuration)
+        task = objective(name).matrix(configuration)
+        wanted = np.linalg.pinv(task[:, 3:] @ jacobian) @ task
+        found = objective(name).cancelling(configuration, jacobian)
+        assert np.allclose(found, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
+
+
+def test_motors_stay_where_they_do_not_reach_the_task(model):
+    """A tool point at O moves with neither motor; along motor 2's axis it moves with one."""
+    mechanism = model.table.mechanism
+    configuration = mechanism.forward(np.zeros(2))
+    jacobian = mechanism.jacobian(configuration)
+    normal = model.table.geometry.platform.normal
+    for point in (np.zeros(3), 0.05 * jacobian[:, 1]):
+        goal = Objective("tool_point", normal, point)
+        task = goal.matrix(configuration)
+        wanted = np.linalg.pinv(task[:, 3:] @ jacobian) @ task
+        assert np.allclose(goal.cancelling(configuration, jacobian), wanted, rtol=0.0, atol=1e-9)
 
 
 def test_residuals_are_actual_minus_desired(model, objective):
