@@ -24,7 +24,7 @@ AT_REST = (
 )
 """Effects whose laws need no motion: those that the exact path can hide."""
 
-RECORDED_ONE_IN = 25
+SAMPLED_ONE_IN = 25
 
 Place = tuple[str, str, str]
 
@@ -83,9 +83,9 @@ class Case:
         return "ordinary" if self.ordinary else ("single", "double")[len(self.effects) - 1]
 
     @property
-    def recorded(self) -> bool:
-        """Whether this case belongs to the sample that is solved from MCAP files as well."""
-        return crc32(self.key.encode()) % RECORDED_ONE_IN == 0
+    def sampled(self) -> bool:
+        """Whether this case belongs to the sample that slow solvers are asked."""
+        return crc32(f"sample {self.key}".encode()) % SAMPLED_ONE_IN == 0
 
     @property
     def static(self) -> bool:

@@ -34,6 +34,7 @@ from typing import Any
 
 from bench_wrist import PROJECT, TRUTH, code_version
 from cases import Case, full_cases, quick_cases
+from ceiling import knows_the_laws
 from diagnosis_core import diagnosis_core
 from dictionary import Dictionary, design_of, dictionary
 from elastic_net import elastic_net
@@ -64,9 +65,10 @@ SOLVERS: dict[str, Solver] = {
     "diagnosis_core": diagnosis_core,
     "own_diagnosis": own_diagnosis,
     "own_diagnosis_mcap": own_diagnosis_mcap,
+    "knows_the_laws": knows_the_laws,
 }
-SAMPLED = "own_diagnosis_mcap"
-"""Is asked a sample of the cases only."""
+SAMPLED = ("own_diagnosis_mcap", "knows_the_laws")
+"""Are slow and asked a sample of the cases only."""
 
 TRUTH_FILES = (
     *("bench_wrist.py", "cases.py", "observe.py", "units.py", "registered.py", "dictionary.py"),
@@ -76,7 +78,8 @@ FILES = {
     "elastic_net": ("solvers.py", "elastic_net.py"),
     "diagnosis_core": ("solvers.py", "diagnosis_core.py"),
     "own_diagnosis": ("own_diagnosis.py",),
-    SAMPLED: ("own_diagnosis.py",),
+    "own_diagnosis_mcap": ("own_diagnosis.py",),
+    "knows_the_laws": ("solvers.py", "ceiling.py"),
 }
 
 LONGEST_S = 600
@@ -91,7 +94,7 @@ def version_of(solver: str) -> str:
     rooms = {
         "diagnosis_core": (*TRUTH, "diagnosis"),
         "own_diagnosis": PROJECT,
-        SAMPLED: PROJECT,
+        "own_diagnosis_mcap": PROJECT,
     }.get(solver, TRUTH)
     return code_version(rooms, (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
@@ -135,7 +138,7 @@ def _without(case: Case, solver: str, why: str, text: str) -> dict[str, Any]:
 
 def asked(case: Case, solvers: Sequence[str]) -> list[str]:
     """Return those of the solvers that are asked this case."""
-    return [name for name in solvers if name != SAMPLED or case.recorded]
+    return [name for name in solvers if name not in SAMPLED or case.sampled]
 
 
 class time_limit:
