@@ -1,0 +1,94 @@
+"""Commissioning: what was set up anew, what is this wrist's own, and the lineage."""
+
+import json
+
+import pytest
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.cell import CellSettings
+from wrist_stiffness.workflows import simulate
+from wrist_stiffness.workflows.fit_report import plus_minus
+from wrist_stiffness.workflows.simulate import simulate_recording
+
+DAY_NS = 86_400 * 10**9
+
+
+def recorded(folder, monkeypatch, session, seconds, **settings):
+    """Write a session of the virtual wrist on a day of its own."""
+    path = folder / f"day_{session}.mcap"
+    monkeypatch.setattr(simulate, "START_NS", 1_700_000_000_000_000_000 + session * DAY_NS)
+    table = load_table(shipped_file("precomputed/palmieri2015.npz"))
+    settings = CellSettings(
+        rate_hz=10.0,
+        program_seconds=seconds,
+        program_seed=40 + session,
+        base_seed=9,
+        session=session,
+        **settings,
+    )
+    simulate_recording(path, table, settings, seconds, session)
+    return path
+
+
+@pytest.mark.slow
+def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, monkeypatch, capsys):
+    """Stiffness +-30 %, axes +-30 um and 0.05 deg, registrations of 1 mm and 0.2 deg each day."""
+    days = [recorded(tmp_path, monkeypatch, day, 150.0, base="wrong") for day in (0, 1)]
+    output, report = tmp_path / "mine.yaml", tmp_path / "mine.json"
+    # Named in the wrong order: the stamps tell which was last.
+    fit = ["--fit", str(days[1]), str(days[0]), "--hold-out"]
+    assert main(["calibrate", *fit, "-o", str(output), "--json", str(report)]) == 0
+    told = json.loads(report.read_text())
+    assert told["judged_by"] == "another session"
+    assert told["before"]["rmse_s_um"] > 500.0
+    for key in ("s_um", "phi_mdeg"):
+        assert told["after"][f"rmse_{key}"] < 1.2 * told["noise_floor"][key]
+    assert [session["name"] for session in told["sessions"]] == ["day_0.mcap", "day_1.mcap"]
+    text = capsys.readouterr().out
+    assert "set up in day_0.mcap:" in text
+    assert "not told by these recordings:" in text
+
+    model = load_model(output)
+    (step,) = model.lineage
+    assert step.recordings == {path.name: file_sha256(path) for path in days}
+    assert step.parent_sha256 == file_sha256(shipped_file("config/palmieri2015_model.yaml"))
+    newest = {
+        each["parameter"]: each["value"]
+        for each in told["parameters"]
+        if each["effect"] == "measurement_frame" and each["session"] == "day_1.mcap"
+    }
+    effects = {effect.name: effect for effect in model.effects}
+    written = effects["measurement_frame@pose_sensor"].estimates
+    assert {key: estimate.value for key, estimate in written.items()} == pytest.approx(newest)
+    # All were fitted together, so a node evaluates the model once for a sample.
+    assert model.variations == ()
+    assert 0.0 < model.joint.sigma[:3].max() < 1e-6
+
+
+def test_the_output_folder_is_looked_for_before_the_work(tmp_path, capsys):
+    missing = tmp_path / "nowhere" / "m.yaml"
+    assert main(["calibrate", "--fit", str(tmp_path / "x.mcap"), "-o", str(missing)]) == 2
+    assert "there is no folder" in capsys.readouterr().err
+
+
+def test_a_recording_that_is_not_there_is_one_line(tmp_path, capsys):
+    arguments = ["--fit", str(tmp_path / "x.mcap"), "-o", str(tmp_path / "m.yaml")]
+    assert main(["calibrate", *arguments]) == 2
+    assert "does not exist" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "text"),
+    [
+        (12.345, 0.42, "12.35 +- 0.42"),
+        (-1013.7, 20.4, "-1014 +- 20"),
+        (5.0, 0.0, "5.000 +- 0.000"),
+        (0.00123, 0.000021, "0.001230 +- 0.000021"),
+    ],
+)
+def test_two_digits_of_the_uncertainty_are_shown(value, sigma, text):
+    assert plus_minus(value, sigma) == text
