@@ -1,0 +1,70 @@
+"""Tools of bench/hidden_effects on which its scores rest."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, kstest
+
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.simulation.residual import BasePose
+
+BENCH = Path(__file__).parents[2] / "bench" / "hidden_effects"
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """Return a function that imports a file of the benchmark."""
+    sys.path.insert(0, str(BENCH))
+    yield importlib.import_module
+    sys.path.remove(str(BENCH))
+
+
+@pytest.mark.parametrize("sees", ["pose", "points", "pointing"])
+def test_registration_of_a_badly_placed_sensor_is_found_to_rounding(sees, bench):
+    tools = bench("registered")
+    rng = np.random.default_rng(3)
+    rotation, _ = exp_twist(np.concatenate([np.zeros((60, 3)), rng.normal(size=(60, 3))], axis=1))
+    base = BasePose(rotation, 2e-5 * rng.normal(size=(60, 3)))
+    size = np.repeat([1e-3, np.radians(0.2)], 3)
+    (x, x_shift), (y, y_shift) = (exp_twist(size * rng.uniform(-1, 1, 6)) for _ in range(2))
+    seen = tools.Registration((x, y), (x_shift, y_shift)).seen(base)
+    turned, moved = seen.rotation.copy(), seen.shift.copy()
+    if sees == "points":
+        turned[:] = np.nan
+    if sees == "pointing":
+        moved[:] = np.nan
+    moved[7], turned[7] = np.nan, np.nan
+    found = tools.register(turned, moved, base).seen(base)
+    left = tools.difference(turned, moved, found)
+    assert np.isnan(left[7]).all()
+    assert np.nanmax(np.abs(left)) < 1e-10
+
+
+@pytest.mark.parametrize(("hits", "trials"), [(0, 6), (3, 10), (97, 100), (20, 20)])
+def test_interval_of_a_rate_is_wilsons(hits, trials, bench):
+    low, high = binomtest(hits, trials).proportion_ci(0.95, method="wilson")
+    assert bench("score").wilson(hits, trials) == pytest.approx((low, high), abs=1e-4)
+
+
+def test_proposed_numbers_spread_as_a_generators_do(bench):
+    numbers = bench("ceiling").Numbers(np.random.default_rng(5).standard_normal(3000))
+    even = np.array([numbers.uniform(2.0, 4.0) for _ in range(1000)])
+    assert kstest(even, "uniform", (2.0, 2.0)).pvalue > 1e-3
+    whole = [numbers.integers(5, 8) for _ in range(1000)]
+    assert sorted(set(whole)) == [5, 6, 7]
+    assert numbers.normal(size=(2, 3)).shape == (2, 3)
+    assert numbers.used == 2006
+
+
+def test_cases_have_names_of_their_own_and_cover_the_catalogue(bench):
+    cases = bench("cases").full_cases()
+    assert len({case.key for case in cases}) == len(cases)
+    assert sum(case.kind == "none" for case in cases) >= 150
+    sizes = {case.size for case in cases if case.kind == "single"}
+    assert {0.05, 0.5, 1.0, 3.0, 30.0, 100.0} <= sizes
+    hidden = {place for case in cases if case.kind == "single" for place in case.effects}
+    assert hidden == set(bench("cases").searched(bench("cases").CATALOGUE))
+    assert sum(case.path == "exact" for case in cases) >= 60
