@@ -192,7 +192,7 @@ def test_what_no_data_tell_stays_and_is_said(model):
 
 
 def test_a_noisy_load_does_not_bias_a_stiffness(model):
-    noisy = LoadSensor(Noise(2e-2, 0.0), Noise(5e-4, 0.0))
+    noisy = LoadSensor(Noise(0.1, 0.0), Noise(2e-3, 0.0))
     session = simulated(
         model,
         HiddenEffect("bushing_stiffness", "joint_1", "plain", 0.4, 0),
