@@ -9,9 +9,11 @@ from itertools import product
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
+from wrist_stiffness.campaign.free_effects import BUILT
 from wrist_stiffness.campaign.recipes import Recipe, Shape, Values, effect_at, recipe
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
+from wrist_stiffness.diagnosis import Parameter as Factor
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import Law
@@ -19,6 +21,9 @@ from wrist_stiffness.model.registry import catalogue
 
 LARGE = 5.0
 """An effect so many times its usual size would still surprise nobody who looks for a fault."""
+
+TOLERANCES = {*(law for law, _ in BUILT), "load_scale"}
+"""Laws of the base: what they do within their priors is no finding, however well it shows."""
 
 SET_UP = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias")
 """Refitted in every session before any search; there is nothing to find."""
@@ -111,7 +116,7 @@ class WristCandidate:
         return Candidate(
             law.id,
             self.place,
-            tuple(replace(f, plausible=LARGE * (f.plausible or np.inf)) for f in factors),
+            tuple(replace(f, plausible=self._noticed(f)) for f in factors),
             self.columns,
             self.recipe.shape,
             needs=law.excited_by,
@@ -119,6 +124,12 @@ class WristCandidate:
             check=law.check,
             compensable=compensable(law, self.place),
         )
+
+    def _noticed(self, factor: Factor) -> float | None:
+        """Return the size at which a factor must show to be testable, None for any."""
+        if self.law.id in TOLERANCES or factor.plausible is None:
+            return None
+        return LARGE * factor.plausible
 
 
 def compensable(law: Law, place: str) -> str:
