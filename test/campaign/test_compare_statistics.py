@@ -247,6 +247,14 @@ def test_verdict_says_whether_it_is_noise():
     assert "no more than the noise" in found.verdict[1]
 
 
+def test_without_a_known_floor_nothing_is_called_noise():
+    found = compared((1.0,), 1.0)
+    unknown = replace(found, noise=replace(found.noise, source="unpredictable"))
+    assert "the noise is not known" in unknown.verdict[0]
+    none = replace(found, noise=NoiseFloor(np.zeros((N, 6)), "instrument"))
+    assert "the instrument has no noise" in none.verdict[0]
+
+
 def test_worst_poses_are_apart_and_in_order():
     rng = np.random.default_rng(14)
     observations = table(rng)

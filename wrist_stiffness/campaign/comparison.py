@@ -154,9 +154,21 @@ class Comparison:
             return None
         return (before.rms - model.after[key].rms) / possible
 
-    def at_floor(self, model: ComparedModel, key: str) -> bool:
-        """Whether a model's error is no more than noise."""
-        return model.after[key].rms <= AT_THE_FLOOR * self.floor[key]
+    def over_floor(self, model: ComparedModel) -> float:
+        """Error of a model over the noise floor, the larger of the quantities'."""
+        ratios = [
+            model.after[q.key].rms / self.floor[q.key] if self.floor[q.key] > 0.0 else np.inf
+            for q in self.quantities
+        ]
+        return max(ratios)
+
+    def _against_floor(self, model: ComparedModel) -> str:
+        ratio = self.over_floor(model)
+        if self.noise.source == "unpredictable":
+            return f"{ratio:.1f} x what the conditions do not predict; the noise is not known."
+        if ratio <= AT_THE_FLOOR:
+            return "no more than the noise."
+        return "the instrument has no noise." if np.isinf(ratio) else f"{ratio:.1f} x the noise."
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -164,11 +176,8 @@ class Comparison:
         lines = []
         for model in self.models:
             parts = [f"{model.after[q.key].rms:.3g} {q.unit} of {q.name}" for q in self.quantities]
-            noisy = all(self.at_floor(model, q.key) for q in self.quantities)
-            ratios = [model.after[q.key].rms / self.floor[q.key] for q in self.quantities]
             lines.append(
-                f"{model.name} is off by {' and '.join(parts)} (RMS): "
-                + ("no more than the noise." if noisy else f"{max(ratios):.1f} x the noise.")
+                f"{model.name} is off by {' and '.join(parts)} (RMS): {self._against_floor(model)}"
             )
         if len(self.models) > 1:
             lines += [self._fall(q) for q in self.quantities]

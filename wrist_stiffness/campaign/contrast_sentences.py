@@ -265,7 +265,7 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     statements = [each for each in statements if each.share >= LEAST_SHARE]
     silent: dict[str, float] = {}
     for condition, p_value in zip(asked, chances.tolist(), strict=True):
-        if condition.topic not in told and np.isfinite(p_value):
+        if condition.topic not in told | too_short.keys() and np.isfinite(p_value):
             silent[condition.topic] = min(p_value, silent.get(condition.topic, 1.0))
     return Told(
         tuple(sorted(statements, key=lambda each: -each.share)),

@@ -64,7 +64,8 @@ def noise_floor(observations: Observations) -> NoiseFloor:
         )
     apart = by_side(observations)
     variance, freedom = scatter_of_repeats(apart)
-    if freedom >= FEWEST_REPLICATE_DOF and apart.replicate is not None:
+    enough = FEWEST_REPEATS if observations.covariance is None else FEWEST_REPLICATE_DOF
+    if freedom >= enough and apart.replicate is not None:
         known = stated[apart.replicate >= 0].mean(axis=0)
         return NoiseFloor(stated + np.maximum(variance - known, 0.0), "replicates")
     if observations.covariance is not None:

@@ -116,7 +116,7 @@ class Compared:
         out = [f"{'time [s]':>10}{'motors [deg]':>18}{'force [N]':>24}{titles}  session"]
         for pose in self.worst(model):
             motors = " ".join(f"{angle:.1f}" for angle in pose.theta_deg)
-            force = " ".join(f"{value:.2f}" for value in pose.load[:3])
+            force = " ".join(f"{value:.2f}" for value in np.round(pose.load[:3], 2) + 0.0)
             errors = "".join(f"{pose.errors[key]:13.3g}" for key in keys)
             out.append(f"{pose.time_s:10.1f}{motors:>18}{force:>24}{errors}  {pose.session}")
         return out

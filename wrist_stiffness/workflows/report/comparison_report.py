@@ -193,7 +193,7 @@ def _worst(compared: Compared, model: ComparedModel) -> Table:
             pose.session,
             f"{pose.time_s:.1f}",
             *(f"{angle:.2f}" for angle in pose.theta_deg),
-            *(f"{value:.3f}" for value in pose.load[:3]),
+            *(f"{value:.3f}" for value in np.round(pose.load[:3], 3) + 0.0),
             *(number(pose.errors[q.key]) for q in quantities),
         )
         for pose in compared.worst(model)
