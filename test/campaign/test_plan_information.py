@@ -229,6 +229,10 @@ def test_questions_leave_rivals_out_of_the_nuisances():
     assert soft.name not in names
     assert other.name in names
     assert other.name in asked.free
+    friction = effect_named("joint_friction@joint_3")
+    asked = between([], [effect_named("link_stiffness@link_1"), friction], rng)
+    assert asked.goals == (Goal(friction.name, ""),)
+    assert "link_stiffness@link_1" in {effect.name for effect in asked.nuisances}
     whole = commissioning(rng)
     assert not {e.name for e in whole.nuisances} & {sets[0].name for sets in whole.effects}
 

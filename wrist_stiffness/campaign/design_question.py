@@ -103,7 +103,7 @@ def between(
         Rivals; the first of each class with the values that the diagnosis found, or at its prior
         means where it found them in other coordinates.
     silent : sequence of Effect
-        What the diagnosis could not have seen.
+        What the diagnosis could not have seen; what is always refitted is no question of its own.
     rng : numpy.random.Generator
         Draws plausible values.
 
@@ -128,12 +128,14 @@ def between(
                 rivals.setdefault(effect.name, drawn(effect, rng))
             goals += [Goal(a.name, b.name) for a in members for b in members if a is not b]
     for effect in silent:
+        if effect.name in (*SESSION, *WRIST):
+            continue
         rivals.setdefault(effect.name, drawn(effect, rng))
         goals.append(Goal(effect.name, ""))
     if not goals:
         raise InputError(
             "plan: the diagnosis leaves nothing to separate: every class has one member, and "
-            "every effect was excited"
+            "every effect was excited but those that are always refitted (plan --commissioning)"
         )
     found = [members[0] for members in classes if members and members[0].name not in rivals]
     known = [name for name in (*SESSION, *WRIST) if name not in rivals]
