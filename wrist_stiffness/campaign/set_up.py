@@ -70,11 +70,11 @@ class SetUp:
         """What was taken up, for a technician."""
         x, y, zero, tare = (self.values[columns] for columns in GROUPS.values())
         parts = [
-            f"{name} {1e6 * np.linalg.norm(six[:3]):.3g} um and "
-            f"{1e3 * np.degrees(np.linalg.norm(six[3:])):.3g} mdeg"
+            f"{name} {1e6 * np.linalg.norm(six[:3]):.1f} um and "
+            f"{1e3 * np.degrees(np.linalg.norm(six[3:])):.1f} mdeg"
             for name, six in (("instrument", x), ("target", y))
         ]
-        angles = " and ".join(f"{1e3 * angle:.3g}" for angle in np.degrees(zero))
+        angles = " and ".join(f"{1e3 * angle:.1f}" for angle in np.degrees(zero))
         parts.append(f"zeros of the motors {angles} mdeg")
         parts.append(
             f"tare {np.linalg.norm(tare[:3]):.2g} N and {1e3 * np.linalg.norm(tare[3:]):.2g} mN m"

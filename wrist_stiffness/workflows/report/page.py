@@ -28,7 +28,7 @@ figure img { max-width: 100%; height: auto; }
 figcaption, caption { color: #444; font-size: 0.9rem; text-align: left; }
 .wide { overflow-x: auto; margin: 1rem 0; }
 table { border-collapse: collapse; font-size: 0.9rem; }
-caption { padding-bottom: 0.3rem; }
+caption { padding-bottom: 0.3rem; break-after: avoid; }
 th, td { border-bottom: 1px solid #ddd; padding: 0.25rem 0.6rem; text-align: left;
   vertical-align: top; }
 th { border-bottom: 2px solid #888; }
