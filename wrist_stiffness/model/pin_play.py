@@ -110,13 +110,16 @@ class Play:
             step = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
             slope = np.einsum("ni,ni->n", gradient, step)
             size = np.ones(len(rows))
+            far = np.arange(len(rows))
             for _ in range(MAX_HALVINGS):
-                tried = left._state(x[rows] + size[:, None] * step, wall, active)[0]
+                tried = x[rows[far]] + size[far, None] * step[far]
+                reached = left.take(far)._state(tried, wall, active[far])[0]
                 # Rounding of the energy is no reason to stay.
-                short = tried > energy + ARMIJO * size * slope + 1e-14 * np.abs(energy)
-                if not short.any():
+                enough = energy[far] + ARMIJO * size[far] * slope[far] + 1e-14 * np.abs(energy[far])
+                far = far[reached > enough]
+                if len(far) == 0:
                     break
-                size[short] *= 0.5
+                size[far] *= 0.5
             x[rows] += size[:, None] * step
         return x, False
 
