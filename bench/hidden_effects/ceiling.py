@@ -30,14 +30,14 @@ from wrist_stiffness.simulation.makers import Draw
 from wrist_stiffness.simulation.residual import base_pose, departure
 from wrist_stiffness.simulation.wrist import TrueWrist
 
-PLACES = 4
+PLACES = 3
 """Likeliest places by linear words, which are fitted with their laws."""
 
 DRAWS = 6
 """Random shapes of which the best one begins a fit."""
 
 MOST_EFFECTS = 2
-EVALUATIONS = 12
+EVALUATIONS = 40
 """Of a fit, the differences for its slopes aside."""
 
 SMALL_STEP = 3e-3
