@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
-from wrist_stiffness.campaign.fitting import Fit, Fitted, fit, start_of
+from wrist_stiffness.campaign.fit_result import Fit, Fitted
+from wrist_stiffness.campaign.fitting import fit, start_of
 from wrist_stiffness.campaign.free_effects import commissioning
 from wrist_stiffness.campaign.judging import Judged, judged, judged_by_itself
 from wrist_stiffness.campaign.measured_session import MeasuredSession

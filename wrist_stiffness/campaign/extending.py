@@ -10,7 +10,8 @@ import numpy as np
 
 from wrist_stiffness.campaign.calibrating import said_calibrated, told_model
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
-from wrist_stiffness.campaign.fitting import Fit, Fitted, fit, start_of
+from wrist_stiffness.campaign.fit_result import Fit, Fitted
+from wrist_stiffness.campaign.fitting import fit, start_of
 from wrist_stiffness.campaign.free_effects import FreeEffect, commissioning
 from wrist_stiffness.campaign.judging import Judged, judged
 from wrist_stiffness.campaign.measured_session import MeasuredSession

@@ -169,35 +169,36 @@ class FitProblem:
         (u, 6, p or number of places) array
             In the order of `places`.
         """
-        asked = range(len(self.unknowns)) if places is None else places
+        asked = list(range(len(self.unknowns)) if places is None else places)
+        return self.rows([self._columns(number, z, asked) for number in range(len(self.sessions))])
+
+    def _columns(self, number: int, z: Array, asked: list[int]) -> Array:
+        """Return the columns of one session's units, (u, 6, number asked)."""
+        model, session = self._models[number], self.sessions[number]
+
+        def memoryless(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+            return tuple(effect for effect in effects if not model.remembers((effect,)))
+
+        whole = (*self.model.effects, *self.effects(z, number))
         step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
-        blocks = []
-        for number, model in enumerate(self._models):
-            base = (*self.model.effects, *self.effects(z, number))
-            quick = tuple(effect for effect in base if not model.remembers((effect,)))
-            moved = [p for p in asked if self.unknowns[p].session in (None, number)]
-            tried, reference = [base, quick], []
-            for place in moved:
-                other = z.copy()
-                other[place] += step[place]
-                trial = (*self.model.effects, *self.effects(other, number))
-                own = self.free[self.unknowns[place].free].effect
-                needs_path = model.remembers((own,))
-                reference.append(0 if needs_path else 1)
-                tried.append(
-                    trial
-                    if needs_path
-                    else tuple(effect for effect in trial if not model.remembers((effect,)))
-                )
-            references, others = (predicted := model.predicted(tried))[:2], predicted[2:]
-            session = self.sessions[number]
-            first = session.residual(references[0])
-            block = np.zeros((*first.shape, len(z)))
-            for place, which, other in zip(moved, reference, others, strict=True):
-                twist = references[0] + (other - references[which])
-                block[:, :, place] = np.nan_to_num((session.residual(twist) - first) / step[place])
-            blocks.append(block[:, :, list(asked)])
-        return self.rows(blocks)
+        moved, trials, by_path = [], [], []
+        for place in asked:
+            unknown = self.unknowns[place]
+            if unknown.session not in (None, number):
+                continue
+            other = z.copy()
+            other[place] += step[place]
+            trial = (*self.model.effects, *self.effects(other, number))
+            by_path.append(model.remembers((self.free[unknown.free].effect,)))
+            trials.append(trial if by_path[-1] else memoryless(trial))
+            moved.append(place)
+        path, quick, *changed = model.predicted([whole, memoryless(whole), *trials])
+        first = session.residual(path)
+        block = np.zeros((*first.shape, len(z)))
+        for place, on_path, twist in zip(moved, by_path, changed, strict=True):
+            change = session.residual(path + twist - (path if on_path else quick)) - first
+            block[:, :, place] = np.nan_to_num(change / step[place])
+        return block[:, :, asked]
 
     @cached_property
     def table(self) -> Observations:

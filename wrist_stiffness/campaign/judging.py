@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
-from wrist_stiffness.campaign.fitting import Fit, fit, start_of
+from wrist_stiffness.campaign.fit_result import Fit
+from wrist_stiffness.campaign.fitting import fit, start_of
 from wrist_stiffness.diagnosis.observations import Labels, Observations
 from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
 from wrist_stiffness.diagnosis.settings import Settings

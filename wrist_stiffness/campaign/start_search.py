@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting import Fit
+from wrist_stiffness.campaign.fit_result import Fit
 from wrist_stiffness.campaign.recipes import Shape, recipe
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting import Fit, Fitted
+from wrist_stiffness.campaign.fit_result import Fit, Fitted
 from wrist_stiffness.campaign.judging import SEEN, THIS_SESSION, Judged
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 
