@@ -3,7 +3,7 @@
 A virtual cell hides an effect (laws of the simulation, not of the model) and is measured as in the
 paper: 25 poses, one load, one approach.  The effects that fit these measurements about as well as
 the true one are its class of twins.  `plan` chooses extra settings, each visited from both sides;
-where these do not suffice it plans once more, and no third time.  The others are random: poses,
+where these do not suffice it plans again, five times at most.  The others are random: poses,
 sides, and loads of the same list.  Both are performed by the virtual cell, with instruments set up
 anew.  Counted are poses (one approach each; the other side is another pose) and measurements at
 rest (a planned pose with a load is two, as it is measured without it as well; a random one is one).
@@ -85,7 +85,7 @@ MOST_TWINS = 5
 EXTRA = 40
 """Extra poses at most."""
 
-PLANS = 2
+PLANS = 5
 design_pool.POOL = 40
 """Fewer settings than the command has to choose from, to save time."""
 

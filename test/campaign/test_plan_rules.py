@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign import design_pool
+from wrist_stiffness.campaign import design_pool, design_question
 from wrist_stiffness.campaign.design_information import MeasurementNoise
 from wrist_stiffness.campaign.design_question import between, effect_named
 from wrist_stiffness.campaign.design_timeline import PEAK, Pace
@@ -14,6 +14,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.backlash import Backlash
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 
 WEIGHT = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
@@ -164,6 +165,25 @@ def test_a_pose_sensor_that_needs_rest_is_not_asked_in_motion(model):
     found = plan(model, rivals(), conditions(model, minutes=6.0, in_motion=False, dwell_s=8.0))
     assert not found.timeline.moving.any()
     assert {d.hold_s for d in found.timeline.dwells} == {8.0, 60.0}
+
+
+def test_a_commissioning_calibrates_and_tells_apart(model, monkeypatch):
+    """With a catalogue of three laws, one of which needs a thermometer."""
+    names = ("backlash", "drive_compliance", "thermal_softening")
+    few = {name: find_law(name) for name in names}
+    monkeypatch.setattr(design_question, "catalogue", lambda: few)
+    found = plan(model, design_question.commissioning(generator()), conditions(model, minutes=8.0))
+    assert found.timeline.duration_s <= 480.0
+    assert found.cannot.keys() == {f"thermal_softening@joint_{i}" for i in range(1, 6)}
+    motors = [f"{name}@motor_{i}" for name in names[:2] for i in (1, 2)]
+    pairs = {(answer.goal.truth, answer.goal.rival) for answer in found.answers}
+    assert pairs == {(a, b) for a in motors for b in ("", *motors) if a != b}
+    assert all(answer.reachable for answer in found.answers)
+    assert all(answer.settled for answer in found.answers if not answer.goal.rival)
+    always = {*design_question.SESSION, *design_question.WRIST}
+    assert found.calibration.keys() == always
+    assert min(found.calibration.values()) >= 1.0
+    assert found.calibration["axis_misalignment@joint_2"] > 3.0
 
 
 def test_exact_twins_get_no_plan_but_a_clear_answer(model):
