@@ -1,6 +1,7 @@
 """A steady stream through predictor and corrector: `python bench/ros_endurance.py --seconds 60`.
 
-Both are processes of their own.  A load, a joint state and a command of the same stamp go out at
+They are processes of their own, and beside them is a bare node that only answers: what it loses
+the machine loses.  A load, a joint state and a command of the same stamp go out at
 every tick, all three at the full rate; every answer is waited for.  Lost are stamps that were not
 answered, on the way in by what the node itself says that it took, else on the way out; the time of
 an answer is from sending its tick to hearing it.
@@ -15,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import rclpy
+import ros_round_trip
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped, WrenchStamped
 from rclpy.subscription import Subscription
@@ -28,7 +30,9 @@ from wrist_stiffness.ros.qos import RELIABLE_QOS
 NODES = {
     "pose_error_predictor": ("/joint_states", "/pose_error_predicted", PoseWithCovarianceStamped),
     "angle_corrector": ("/motor_commands", "/motor_commands_corrected", JointState),
+    "echo": ("/echo/in", "/echo/out", PoseWithCovarianceStamped),
 }
+HEAR_LOADS = 2
 START_S = 30.0
 LAST_ANSWER_S = 3.0
 WARM_UP_S = 2.0
@@ -78,7 +82,7 @@ class Source:
 
     def ready(self) -> bool:
         """Tell whether both nodes hear and are heard."""
-        return self.load.get_subscription_count() == len(NODES) and all(
+        return self.load.get_subscription_count() == HEAR_LOADS and all(
             self.inputs[name].get_subscription_count() and self.node.count_publishers(topics[1])
             for name, topics in NODES.items()
         )
@@ -114,6 +118,7 @@ def main() -> None:
     with (
         process("-m", module + "pose_error_predictor") as predictor,
         process("-m", module + "angle_corrector", *corrects) as corrector,
+        process(ros_round_trip.__file__, "--echo", "echo") as echo,
     ):
         source = Source()
         end = time.perf_counter() + START_S
@@ -121,7 +126,7 @@ def main() -> None:
             source.hear_until(time.perf_counter() + 0.1)
             if time.perf_counter() > end:
                 raise SystemExit("the nodes did not come up")
-        pids = dict(zip(NODES, (predictor.pid, corrector.pid), strict=True))
+        pids = dict(zip(NODES, (predictor.pid, corrector.pid, echo.pid), strict=True))
         stream(source, pids, options.seconds, options.rate)
 
 
@@ -162,12 +167,12 @@ def stream(source: Source, pids: dict[str, int], seconds: float, rate_hz: float)
         share = 100.0 * (cpu_seconds(pid) - cpu[name]) / wall
         said = source.said.get(name, {})
         taken = sum(int(n) for key, n in said.items() if key.split()[0] in ("samples", "refused"))
-        lost, way_in = count - len(times), warm + count - taken
+        lost, way_in = count - len(times), warm + count - taken if said else "?"
         print(
-            f"{name:20} {lost:6d} {way_in:7d} {np.median(times):12.0f}  "
+            f"{name:20} {lost:6d} {way_in:>7} {np.median(times):12.0f}  "
             f"{high_percentile(times):24} {share:3.0f} %  "
             f"{memory[name][0]:.1f}, {memory[name][1]:.1f}, {memory[name][-1]:.1f}; "
-            f"{said.get('loads that came late')}"
+            f"{said.get('loads that came late', '')}"
         )
 
 
