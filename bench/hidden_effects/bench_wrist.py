@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 from functools import cache
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import wrist_stiffness
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.shipped import shipped_file
@@ -18,13 +20,17 @@ Mask = NDArray[np.bool_]
 
 RATE_HZ = 10.0
 
-TRUTH = ("mechanism", "lookup", "simulation")
-"""Rooms of the package that make a riddle."""
+TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.residual")
+"""Modules that make a riddle, with all that they import."""
 
-PROJECT = (*TRUTH, "recording", "model", "compensation", "diagnosis", "campaign")
-"""Rooms that the project's own diagnosis is made of as well."""
+PACKAGE = Path(wrist_stiffness.__file__).parent
 
-PACKAGE = Path(shipped_file("precomputed/palmieri2015.npz")).parents[1] / "wrist_stiffness"
+OWN = (
+    "wrist_stiffness.campaign.diagnosing",
+    # The registry finds the laws by their files, no import names them.
+    *(f"wrist_stiffness.model.effects.{p.stem}" for p in (PACKAGE / "model/effects").glob("*.py")),
+)
+"""Modules of the project's own diagnosis."""
 
 
 @cache
@@ -34,11 +40,45 @@ def wrist() -> Table:
 
 
 @cache
-def code_version(rooms: tuple[str, ...], files: tuple[str, ...]) -> str:
-    """Return a short digest of the table and of the code in rooms and in files of this folder."""
+def code_version(modules: tuple[str, ...], files: tuple[str, ...]) -> str:
+    """Return a short digest of the table and of code.
+
+    Parameters
+    ----------
+    modules : tuple of str
+        Of the package, with all of the package that they import.
+    files : tuple of str
+        Of this folder.
+    """
     digest = hashlib.sha256(Path(shipped_file("precomputed/palmieri2015.npz")).read_bytes())
     here = Path(__file__).parent
-    paths = [path for room in rooms for path in sorted((PACKAGE / room).rglob("*.py"))]
-    for path in [*paths, *(here / name for name in files)]:
+    for path in [*_sources(modules), *(here / name for name in files)]:
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
+
+
+def _sources(modules: tuple[str, ...]) -> list[Path]:
+    """Return the files of modules and of all that they import from the package, in order."""
+    found: set[Path] = set()
+    waiting = list(modules)
+    while waiting:
+        path = _file(waiting.pop())
+        if path is None or path in found:
+            continue
+        found.add(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                waiting += [node.module, *(f"{node.module}.{name.name}" for name in node.names)]
+    return sorted(found)
+
+
+def _file(module: str) -> Path | None:
+    """Return the file of a module of the package, None for any other."""
+    package, *parts = module.split(".")
+    if package != "wrist_stiffness":
+        return None
+    place = PACKAGE.joinpath(*parts)
+    for path in (place / "__init__.py", place.with_suffix(".py")):
+        if path.is_file():
+            return path
+    return None

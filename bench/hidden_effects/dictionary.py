@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from bench_wrist import Array, code_version, wrist
+from bench_wrist import TRUTH, Array, code_version, wrist
 from cases import ABSORBED, Case
 from observe import day_of, run_cell, settings_of, times
 from units import unit_labels, unit_means
@@ -40,8 +40,7 @@ unknown, 60 leave 0.4."""
 FIRST_BASE = 50_000
 """Seeds of these bases, which no case has."""
 
-LAWS = ("mechanism", "simulation")
-SOURCES = ("dictionary.py", "observe.py", "units.py", "registered.py", "bench_wrist.py")
+SOURCES = ("dictionary.py", "observe.py", "units.py", "registered.py")
 
 
 @dataclass(frozen=True)
@@ -170,7 +169,7 @@ def dictionary(
         for effect, entry in CATALOGUE.items()
         for component in (entry.components[:1] if quick else entry.components)
     ]
-    version = code_version(LAWS, SOURCES)
+    version = code_version(TRUTH, SOURCES)
     kind = f"{design[0]}{'_rests' if design[1] else ''}{'_quick' if quick else ''}"
     path = folder / f"words_{kind}_{version}.npz"
     if not path.exists():

@@ -32,7 +32,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from bench_wrist import PROJECT, TRUTH, code_version
+from bench_wrist import OWN, TRUTH, code_version
 from cases import Case, full_cases, quick_cases
 from ceiling import knows_the_laws
 from diagnosis_core import diagnosis_core
@@ -71,7 +71,7 @@ SAMPLED = ("own_diagnosis_mcap", "knows_the_laws")
 """Are slow and asked a sample of the cases only."""
 
 TRUTH_FILES = (
-    *("bench_wrist.py", "cases.py", "observe.py", "units.py", "registered.py", "dictionary.py"),
+    *("cases.py", "observe.py", "units.py", "registered.py", "dictionary.py"),
     *("whitened.py", "score.py"),
 )
 FILES = {
@@ -91,12 +91,16 @@ RESTARTS = 5
 
 def version_of(solver: str) -> str:
     """Return the digest of all code that an answer and its score depend on."""
-    rooms = {
-        "diagnosis_core": (*TRUTH, "diagnosis"),
-        "own_diagnosis": PROJECT,
-        "own_diagnosis_mcap": PROJECT,
-    }.get(solver, TRUTH)
-    return code_version(rooms, (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
+    modules = {
+        "diagnosis_core": ("wrist_stiffness.diagnosis",),
+        "own_diagnosis": OWN,
+        "own_diagnosis_mcap": (
+            *OWN,
+            "wrist_stiffness.campaign.reading",
+            "wrist_stiffness.workflows.simulate",
+        ),
+    }.get(solver, ())
+    return code_version((*TRUTH, *modules), (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 
 def solve(case: Case, solvers: Sequence[str], quick: bool, folder: Path) -> list[dict[str, Any]]:
