@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.noise import estimate_noise
+from wrist_stiffness.diagnosis.noise import MOST_BEYOND_STATED, estimate_noise
 
 NOTHING = (60, 2, 0)
 
@@ -66,11 +66,12 @@ def test_a_drift_in_the_catalogue_does_not_widen_the_replicate_floor(rng):
     np.testing.assert_allclose(total_variance(noise, table), 1.0, rtol=0.5)
 
 
-def test_stated_scatter_is_believed_without_replicates(rng):
-    table = Observations(rng.normal(0, 5, (60, 2)), {}, np.eye(2))
+@pytest.mark.parametrize(("scatter", "variance"), [(5.0, MOST_BEYOND_STATED), (0.2, 1.0)])
+def test_stated_scatter_is_believed_but_for_some_wander(rng, scatter, variance):
+    table = Observations(rng.normal(0, scatter, (60, 2)), {}, np.eye(2))
     noise = estimate_noise(table, np.empty(NOTHING), np.empty(NOTHING))
     assert noise.source == "given"
-    np.testing.assert_allclose(total_variance(noise, table), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(total_variance(noise, table), variance, rtol=1e-12)
 
 
 @pytest.mark.parametrize("spacing", [1, 20])

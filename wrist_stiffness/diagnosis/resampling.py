@@ -86,16 +86,6 @@ class BlockGrams:
             ]
         )
 
-    def heldout_gains(self) -> Array:
-        """Give what each hypothesis gains on every block when fitted to the others, (h, b)."""
-        total = self._grams.sum(axis=0) + self._priors
-        gains = np.empty((len(self._members), self.n_blocks))
-        for number, own in enumerate(self._grams):
-            plain = self._loss(total - own, own, self._base)
-            for which, member in enumerate(self._members):
-                gains[which, number] = plain - self._loss(total - own, own, self._with(member))
-        return gains
-
     def _with(self, member: Labels) -> Labels:
         return np.concatenate([self._base, member])
 
@@ -105,12 +95,6 @@ class BlockGrams:
 
     def _energy(self, gram: Array, columns: Labels) -> float:
         return self._scale * float(gram[-1, -1] - gram[columns, -1] @ self._weights(gram, columns))
-
-    def _loss(self, training: Array, own: Array, columns: Labels) -> float:
-        weights = self._weights(training, columns)
-        fit = own[np.ix_(columns, columns)] @ weights
-        loss = own[-1, -1] - 2 * weights @ own[columns, -1] + weights @ fit
-        return self._scale * float(loss)
 
 
 def stability(grams: BlockGrams, inside: Mask, prices: Array, rng: np.random.Generator) -> float:

@@ -1,7 +1,5 @@
 """Classes: effects that these data cannot tell apart."""
 
-import numpy as np
-
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.ranking import Ranked
 from wrist_stiffness.diagnosis.settings import Settings
@@ -43,8 +41,3 @@ def indistinguishable(
         if best.score - each.score <= tolerance:
             members.setdefault(each.name, each)
     return list(members.values())
-
-
-def canonical_correlation(base: Base, one: Ranked, other: Ranked) -> float:
-    """Largest canonical correlation of two candidates beyond the base, in [0, 1]."""
-    return float(np.linalg.svd(one.directions.T @ other.directions, compute_uv=False)[0])

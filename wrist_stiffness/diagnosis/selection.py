@@ -3,7 +3,8 @@
 Forward steps ask one question, is there anything: the best candidate against what the best of all
 candidates would show by chance.  What stays is decided at the end, with every rival in the model:
 an effect must stand out from the structure that is still unexplained, and a small one next to a
-large one must do more than mop up what the large one's law leaves.
+large one must do more than mop up what the large one's law leaves: with enough columns it could
+do that down to the noise.
 """
 
 from dataclasses import dataclass, replace
@@ -201,10 +202,9 @@ def _pruned(
         remaining = lack_of_fit(full.energy, full.freedom, evidence.noise.dof).energy
         gains = marginal_gains(evidence.base, entered)
         explained = evidence.base.energy - full.energy
-        weak = [gain < settings.law_accuracy**2 * explained for gain, _ in gains]
         weakest = int(np.argmin([gain for gain, _ in gains]))
         gain, size = gains[weakest]
-        mops_up = weak[weakest] and (remaining > 0 or sum(weak) > 1)
+        mops_up = gain < settings.law_accuracy**2 * explained
         if not mops_up and _stands_out(gain, size, remaining, dimension, settings):
             break
         entered = entered[:weakest] + entered[weakest + 1 :]

@@ -13,7 +13,7 @@ class Settings:
         Probability with which pure noise may let any one effect of the catalogue in.
     law_accuracy : float
         Share of an effect's size by which its law may be wrong.  What is left of a large effect
-        within this share is no evidence for another one, unless that one explains all of it.
+        within this share is no evidence for another one.
     unexplained_share : float
         Verdict ``unknown`` from this share of the initial excess over the noise.
     sealed_share : float

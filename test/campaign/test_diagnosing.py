@@ -1,0 +1,102 @@
+"""The whole way: a session of the virtual cell, or a recording, to a named effect."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.diagnosing import diagnose_sessions
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.diagnosis import Settings
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import instrument
+
+QUICK = Settings(permutations=299)
+RECORDINGS = Path(__file__).parents[1] / "data"
+SECONDS = 60.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def measured(model, hidden=(), base="wrong", seed=3):
+    """One session of a wrist with a wrong base, ten measurements a second."""
+    settings = CellSettings(
+        rate_hz=10.0,
+        program_seconds=SECONDS,
+        program_seed=41,
+        hidden=hidden,
+        base=base,
+        base_seed=seed,
+    )
+    cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
+    time = np.arange(round(10.0 * SECONDS)) / 10.0
+    sample = cell.run(time, cell.desired(time))
+    warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
+    block = Block(time, sample.encoder, sample.wrench, temperatures=warm)
+    scatter = np.diag(instrument("interferometer").sigma ** 2)
+    return MeasuredSession(
+        "a session", block, sample.measured_shift, sample.measured_rotation, scatter
+    )
+
+
+def answer(model, session, seed=0):
+    return diagnose_sessions(model, [session], np.random.default_rng(seed), QUICK)
+
+
+@pytest.mark.slow
+def test_a_wrong_base_alone_is_no_missing_effect(model):
+    found = answer(model, measured(model))
+    assert found.diagnosis.verdict == "none"
+    assert found.effects == ()
+    # The millimetre and the fifth of a degree of the registrations are told instead.
+    taken = next(line for line in found.diagnosis.absorbed if "measurement_frame" in line)
+    assert float(taken.split(": ")[1].split(" um")[0]) > 100.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("blank", ["nothing", "rotation", "position"])
+def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, blank):
+    width = 1e-3
+    session = measured(model, (HiddenEffect("backlash", "motor_1", "single", width, 5),))
+    if blank == "rotation":
+        session = replace(session, rotation=np.full_like(session.rotation, np.nan))
+    if blank == "position":
+        session = replace(session, shift=np.full_like(session.shift, np.nan))
+    found = answer(model, session)
+    if blank == "rotation":
+        # A turn about O does not move O, so the target alone tells of it.
+        assert found.diagnosis.verdict in ("none", "effect")
+        assert all(f.name != "backlash@motor_2" for f in found.diagnosis.findings)
+        return
+    assert [finding.name for finding in found.diagnosis.findings] == ["backlash@motor_1"]
+    value, error = found.diagnosis.findings[0].parameters["width_mdeg"]
+    assert abs(value - 1e3 * np.degrees(width)) < 4.0 * error < 10.0
+    assert found.effects[0].estimates["width_mdeg"].value == pytest.approx(value)
+    assert found.diagnosis.after["phi_mdeg"] < 0.5 * found.diagnosis.before["phi_mdeg"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "verdict", "effect"),
+    [("wrist_a", "effect", "joint_clearance@joint_3"), ("wrist_d", "unknown", None)],
+)
+def test_the_recordings_that_hide_an_effect(model, name, verdict, effect):
+    session = read_session(RECORDINGS / f"{name}.mcap", model.table)
+    found = answer(model, session).diagnosis
+    assert found.verdict == verdict
+    assert [finding.name for finding in found.findings] == ([effect] if effect else [])
+
+
+def test_no_session_is_refused(model):
+    with pytest.raises(InputError, match="no session to diagnose"):
+        diagnose_sessions(model, [], np.random.default_rng(0))

@@ -1,0 +1,72 @@
+"""Columns from the kept moments agree with those of every sample."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.columns import SessionModel
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import LoadSensor, Noise
+
+SECONDS, RATE_HZ = 30.0, 100.0
+
+QUIET = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def model():
+    table = load_table(shipped_file("precomputed/palmieri2015.npz"))
+    return ErrorModel("shipped", table, "closed_form")
+
+
+@pytest.fixture(scope="module")
+def session(model):
+    settings = CellSettings(
+        rate_hz=RATE_HZ,
+        program_seconds=SECONDS,
+        program_seed=8,
+        instrument="ideal",
+        load_sensor=QUIET,
+    )
+    cell = VirtualCell(model.table, settings, np.random.default_rng(3))
+    time = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+    sample = cell.run(time, cell.desired(time))
+    block = Block(time, sample.encoder, sample.wrench)
+    return MeasuredSession("thirty seconds", block, sample.measured_shift, sample.measured_rotation)
+
+
+def effect(name, **values):
+    law, place = name.split("@")
+    return Effect(find_law(law), place, {k: Estimate(v) for k, v in values.items()})
+
+
+@pytest.mark.parametrize(
+    ("added", "share"),
+    [
+        # Of the largest change.  A load that changes is a mean over some 50 ms.
+        (effect("platform_compliance@platform", z_um_per_N=1.0), 6e-3),
+        (effect("creep@joint_3", delayed_percent=20.0, time_constant_s=5.0), 3e-3),
+        (effect("backlash@motor_1", width_mdeg=50.0), 5e-3),
+        (effect("joint_friction@joint_3", coefficient=0.1), 3e-2),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_kept_moments_tell_what_all_samples_tell(model, session, added, share):
+    units = as_units(model, session)
+    assert len(units.block) < len(session) / 5
+    (column,) = SessionModel(model, units, ()).changes([(added,)])
+    without, with_effect = model.batch_with(session.block, [(), (added,)])
+    change, label = with_effect.twist - without.twist, units.cut.label
+    # An effect that only turns, or only shifts, has nothing but rounding in the other half.
+    scale = np.maximum([np.abs(change[:, :3]).max(), np.abs(change[:, 3:]).max()], [1e-9, 1e-7])
+    full = np.array([change[label == u].mean(axis=0) for u in range(len(column))])
+    off = np.abs(column - full) / np.repeat(scale, 3)
+    assert np.quantile(off, 0.99) < share

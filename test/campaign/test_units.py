@@ -1,0 +1,106 @@
+"""Units of a session: dwells and moments in motion, and the path that is kept of it."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.units import PATH_S, UNIT_EVERY, cut
+from wrist_stiffness.model.block import Block
+
+STEP = np.radians(0.015)
+
+
+def ramp(time, start, end, low, high):
+    return low + (high - low) * np.clip((time - start) / (end - start), 0.0, 1.0)
+
+
+def session(rate=100.0, noise=0.0, seconds=12.0):
+    """Cut a made-up timeline of a move of motor 1, a rest, a load at rest and a rest.
+
+    0    rest    3  move  5      rest      8  load  9     rest     12
+    """
+    time = np.arange(0.0, seconds, 1.0 / rate)
+    theta = np.zeros((len(time), 2))
+    theta[:, 0] = STEP * np.round(ramp(time, 3.0, 5.0, 0.0, 0.5) / STEP)
+    load = np.zeros((len(time), 6))
+    load[:, 2] = ramp(time, 8.0, 9.0, 0.0, -1.0)
+    load += noise * np.random.default_rng(1).normal(size=load.shape)
+    return Block(time, theta, load)
+
+
+def cut_all(block):
+    return cut(block, STEP, np.ones(len(block), dtype=bool))
+
+
+@pytest.mark.parametrize("rate", [10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_rests_are_dwells_and_changes_are_not(rate, noise):
+    block = session(rate, noise)
+    found = cut_all(block)
+    first = [block.time[found.label == u].min() for u in np.flatnonzero(found.dwell)]
+    last = [block.time[found.label == u].max() for u in np.flatnonzero(found.dwell)]
+    slack = 0.15 + 2.0 / rate
+    assert first == pytest.approx([0.0, 5.0, 9.0], abs=slack)
+    assert last == pytest.approx([3.0, 8.0, 12.0], abs=slack)
+
+
+def test_moments_in_motion_are_regular_units():
+    block = session()
+    found = cut_all(block)
+    times = [block.time[found.label == u] for u in np.flatnonzero(~found.dwell)]
+    assert all(len(each) == 1 for each in times)
+    moving = np.array([each[0] for each in times if each[0] < 6.0])
+    assert np.diff(moving)[1:] == pytest.approx(PATH_S * UNIT_EVERY, abs=1e-6)
+
+
+def test_the_path_keeps_a_turning_point():
+    time = np.arange(0.0, 4.0, 1e-3)
+    angle = 0.5 * np.sin(2.0 * np.pi * time / 1.37)
+    block = Block(time, np.stack([angle, angle], axis=1), np.zeros((len(time), 6)))
+    found = cut_all(block)
+    assert np.ptp(found.block.theta[:, 0]) == pytest.approx(np.ptp(angle), rel=1e-4)
+    assert len(found.kept) < len(time) / 50
+
+
+def test_shares_of_a_unit_add_up_and_keep_a_linear_mean():
+    found = cut_all(session())
+    used = found.unit >= 0
+    total = np.bincount(found.unit[used], found.weight[used])
+    assert total == pytest.approx(np.ones(len(found.dwell)))
+    mean = np.bincount(found.unit[used], found.weight[used] * found.block.time[used])
+    times = session().time
+    exact = [times[found.label == u].mean() for u in range(len(found.dwell))]
+    assert mean == pytest.approx(np.array(exact), abs=1e-9)
+
+
+def test_approach_and_order_of_loading_are_told():
+    block = session()
+    found = cut_all(block)
+    last = found.label == np.flatnonzero(found.dwell)[-1]
+    assert (found.sense[last, 0] == 1.0).all()
+    assert found.at_rest[last].all()
+
+
+def test_a_slow_sweep_is_no_rest():
+    time = np.arange(0.0, 60.0, 0.02)
+    theta = STEP * np.round(np.stack([0.002 * time, np.zeros_like(time)], axis=1) / STEP)
+    found = cut_all(Block(time, theta, np.zeros((len(time), 6))))
+    assert not found.dwell.any()
+
+
+def test_poses_measured_one_by_one_are_dwells_of_one():
+    time = 30.0 * np.arange(8.0)
+    theta = np.random.default_rng(2).uniform(-0.5, 0.5, (8, 2))
+    found = cut_all(Block(time, theta, np.zeros((8, 6))))
+    assert found.dwell.tolist() == [True] * 8
+    assert found.label.tolist() == list(range(8))
+    assert (found.block.theta_dot == 0.0).all()
+
+
+def test_rows_without_a_measurement_tell_the_path_but_are_no_unit_in_motion():
+    block = session(1000.0)
+    measured = np.zeros(len(block), dtype=bool)
+    measured[::50] = True
+    found = cut(block, STEP, measured)
+    moving = ~found.dwell[found.label] & (found.label >= 0)
+    assert moving.any()
+    assert measured[moving].all()
