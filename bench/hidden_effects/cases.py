@@ -161,7 +161,8 @@ def full_cases() -> list[Case]:
         if place[0] in AT_REST
     ]
     singles = searched(CATALOGUE)
-    pairs = zip(singles[::2], singles[len(singles) // 2 :: 2], strict=False)
+    partners = singles[len(singles) // 3 :] + singles[: len(singles) // 3]
+    pairs = [pair for pair in zip(singles, partners, strict=True) if pair[0][0] != pair[1][0]]
     cases += [Case(pair, 3.0, seed=2) for pair in pairs]
     cases += [Case(ordinary_wrist(seed), 0.0, seed=seed) for seed in range(1, 21)]
     return sorted(cases, key=lambda case: crc32(case.key.encode()))
