@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.conditions import Condition, conditions
-from wrist_stiffness.campaign.dependence import Dependence, Dependences, dependences, noise_energy
+from wrist_stiffness.campaign.dependence import (
+    Dependence,
+    Dependences,
+    beyond,
+    dependences,
+    noise_energy,
+)
 from wrist_stiffness.campaign.noise_floor import NoiseFloor
 from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.observations import Labels
+from wrist_stiffness.diagnosis.observations import Labels, Mask
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.mechanism.components import Array
 
@@ -227,7 +233,7 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     trend = np.hstack([constant, _slow_motions(observations.times, sessions)])
     variance = np.maximum(floor.variance, np.finfo(float).tiny)
     total = noise_energy(observations.values, variance, constant)
-    slow = np.array([_is_slow(each.columns, constant, trend) for each in asked], dtype=bool)
+    slow = _which_are_slow(asked, constant, trend)
     span = _span(observations.times, sessions)
     slow_blocks = int(span / SLOW_BLOCK_S)
     too_short: dict[str, None] = {}
@@ -304,15 +310,15 @@ FEWEST_PER_MOTION = 6
 """Units for each slow motion that is taken out."""
 
 
-def _is_slow(columns: Array, constant: Array, trend: Array) -> bool:
-    whole, fast = _beyond(constant, columns), _beyond(trend, columns)
-    return bool(np.sum(fast**2) < SLOW * np.sum(whole**2))
-
-
-def _beyond(base: Array, columns: Array) -> Array:
-    """Columns without what least squares on the base explains; NaN count as nothing."""
-    filled = np.nan_to_num(columns)
-    return np.asarray(filled - base @ np.linalg.lstsq(base, filled, rcond=None)[0])
+def _which_are_slow(asked: tuple[Condition, ...], constant: Array, trend: Array) -> Mask:
+    """Tell which conditions change no faster than the wander, (k,)."""
+    every = np.hstack([np.empty((len(constant), 0)), *(each.columns for each in asked)])
+    owner = np.repeat(np.arange(len(asked)), [each.columns.shape[1] for each in asked])
+    whole, fast = (
+        np.bincount(owner, np.sum(beyond(base, every) ** 2, axis=0), len(asked))
+        for base in (constant, trend)
+    )
+    return np.asarray(fast < SLOW * whole)
 
 
 def _changes(
@@ -363,7 +369,7 @@ def _twins(own: Condition, asked: tuple[Condition, ...], constant: Array) -> tup
 
 def _directions(columns: Array, constant: Array) -> Array:
     """Orthonormal basis of columns beyond the constants, (n, r)."""
-    left, size, _ = np.linalg.svd(_beyond(constant, columns), full_matrices=False)
+    left, size, _ = np.linalg.svd(beyond(constant, columns), full_matrices=False)
     return np.asarray(left[:, size > 1e-9 * max(float(size[0]), 1e-300)])
 
 

@@ -34,6 +34,10 @@ ROUNDING = 1e-12
 """A column of which the base leaves less of the square lies inside the base."""
 
 
+DEPENDENT = 1e-10
+"""Share of the largest eigenvalue below which columns of a base depend on each other."""
+
+
 @dataclass(frozen=True, eq=False)
 class Dependence:
     """What one condition does to the residual, beside the other conditions that entered.
@@ -118,7 +122,7 @@ def dependences(
     every, scale = _scaled(np.hstack([np.empty((n, 0)), *conditions]))
     signs = np.ones((REPEATS + 1, int(blocks.max()) + 1))
     signs[1:] = rng.choice([-1.0, 1.0], (REPEATS, signs.shape[1]))
-    free = np.sum(_beyond(base, every) ** 2, axis=0)
+    free = np.sum(beyond(base, every) ** 2, axis=0)
     free[free < ROUNDING * np.sum(every**2, axis=0)] = 0.0
     chosen: list[int] = []
     p_entry: list[float] = []
@@ -127,7 +131,7 @@ def dependences(
     taken = base
     energy = noise_energy(residual, variance, taken)
     while len(chosen) < min(MOST, len(conditions)):
-        new = (free > 0.0) & (np.sum(_beyond(taken, every) ** 2, axis=0) > ALIKE * free)
+        new = (free > 0.0) & (np.sum(beyond(taken, every) ** 2, axis=0) > ALIKE * free)
         asked = np.array([new[owner == which].all() for which in range(len(conditions))])
         fit = _Weighted(residual, variance, taken, every, blocks)
         p_values, gains = np.full(len(conditions), np.nan), fit.gains(owner, signs)
@@ -161,7 +165,7 @@ def dependences(
 def noise_energy(residual: Array, variance: Array, base: Array) -> float:
     """Square of what a base leaves of the measured components, in variances of the noise."""
     known = np.isfinite(residual)
-    left = np.where(known, _beyond(base, np.nan_to_num(residual)), 0.0)
+    left = np.where(known, beyond(base, np.nan_to_num(residual)), 0.0)
     return float(np.sum(left**2 / variance))
 
 
@@ -218,13 +222,13 @@ class _Weighted:
         self._columns, self._values = [], []
         measured = np.isfinite(residual)
         values = np.where(measured, residual, 0.0)
-        left = np.where(measured, _beyond(base if known is None else known, values), 0.0)
+        left = np.where(measured, beyond(base if known is None else known, values), 0.0)
         excess = np.sum(left**2 - variance * measured, axis=0) / np.maximum(measured.sum(axis=0), 1)
         root = np.where(measured, 1.0 / np.sqrt(variance + np.maximum(excess, 0.0)), 0.0)
         for component in range(residual.shape[1]):
             own = root[:, component, None]
             stacked = own * np.hstack([every, values[:, component, None]])
-            stacked = _beyond(own * base, stacked)
+            stacked = beyond(own * base, stacked)
             self._columns.append(stacked[:, :-1])
             self._values.append(stacked[:, -1])
 
@@ -269,12 +273,16 @@ def _inverse(gram: Array) -> Array:
     return np.asarray(np.linalg.pinv(gram, rcond=1e-10, hermitian=True), dtype=np.float64)
 
 
-def _beyond(base: Array, columns: Array) -> Array:
-    """Columns without their part along a base, whatever the scales of the base."""
+def beyond(base: Array, columns: Array) -> Array:
+    """Columns (n, k) without their part along a base (n, p), whatever the scales of the base."""
     norm = np.linalg.norm(base, axis=0)
     base = base[:, norm > 0.0] / norm[norm > 0.0]
     if base.shape[1] == 0:
         return columns
-    left, size, _ = np.linalg.svd(base, full_matrices=False)
-    basis = left[:, size > 1e-9 * size[0]]
-    return np.asarray(columns - basis @ (basis.T @ columns))
+    # By the Gram matrix: a tenth of the time of a decomposition of the tall base.
+    size, vectors = np.linalg.eigh(base.T @ base)
+    kept = size > DEPENDENT * size[-1]
+    basis = base @ (vectors[:, kept] / np.sqrt(size[kept]))
+    left = columns - basis @ (basis.T @ columns)
+    # Once more, against rounding.
+    return np.asarray(left - basis @ (basis.T @ left))

@@ -55,7 +55,7 @@ def draw_bars(every: Sequence[Bars]) -> Any:
         plot.barh(
             places,
             bars.values,
-            xerr=bars.uncertainties,
+            xerr=bars.uncertainties if any(bars.uncertainties) else None,
             color=[colour(place) for place in range(len(places))],
             height=0.6,
             error_kw={"ecolor": "black", "capsize": 3},
