@@ -1,0 +1,34 @@
+"""`wrist-stiffness diagnose` on a recording that hides backlash of motor 2."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from wrist_stiffness.cli.main import main
+
+RECORDING = Path(__file__).parents[1] / "data" / "wrist_b.mcap"
+
+
+@pytest.mark.slow
+def test_the_verdict_comes_first_and_the_file_says_the_same(capsys, tmp_path):
+    result, page = tmp_path / "why.json", tmp_path / "why.html"
+    command = ["diagnose", str(RECORDING), "--json", str(result), "--report", str(page)]
+    assert main(command) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "Missing in the model: backlash@motor_2."
+    assert any("measurement_frame@pose_sensor" in line for line in lines)
+    values = json.loads(result.read_text())
+    assert values["schema"] == 1
+    assert values["verdict"] == "effect"
+    (finding,) = values["findings"]
+    assert finding["class"] == [{"effect": "backlash", "component": "motor_2"}]
+    assert finding["buys_mdeg"][0] > 5 * finding["buys_mdeg"][1] > 0
+    assert values["after"]["rmse_phi_mdeg"] < 1.3 * values["noise_floor"]["phi_mdeg"]
+    assert values["provenance"]["recordings"]
+    assert "backlash at motor_2" in page.read_text()
+
+
+def test_a_recording_that_is_not_there_is_one_line(capsys, tmp_path):
+    assert main(["diagnose", str(tmp_path / "none.mcap")]) == 2
+    assert "none.mcap" in capsys.readouterr().err
