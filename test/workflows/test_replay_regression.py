@@ -12,6 +12,7 @@ import pytest
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.messages import (
     Float64MultiArray,
     Header,
@@ -188,6 +189,16 @@ def test_messages_without_a_stamp_are_matched_by_their_log_time(tmp_path):
     moved = [(topic, Float64MultiArray(data=(0.1, i + (i == 2))), i) for i in range(1, 3)]
     (changes,) = output_changes(old, write(tmp_path / "new", moved))
     assert (changes.common, changes.only_old, changes.changed, changes.first_ns) == (2, 1, 1, 2)
+
+
+def test_a_foreign_type_on_an_output_is_refused(tmp_path):
+    topic, kind = "/pose_error_predicted", "std_msgs/msg/Int64"
+    path = tmp_path / "foreign"
+    with RecordingWriter(path) as writer:
+        own = channel_of(topic, Float64MultiArray)
+        writer.write_raw(replace(own, ros_type=kind), b"\0\1\0\0" + bytes(8), 1)
+    with pytest.raises(RecordingError, match=f"{topic} carries {kind}"):
+        output_changes(path, path)
 
 
 def test_the_stored_recording_holds_the_faults_it_is_there_for():

@@ -15,14 +15,16 @@ import numpy as np
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.messages import (
+    MESSAGE_TYPES,
     Float64MultiArray,
     JointState,
     JointTrajectory,
     Message,
     PoseWithCovarianceStamped,
 )
-from wrist_stiffness.recording.reader import open_recording
+from wrist_stiffness.recording.reader import RawMessage, Recording, open_recording
 from wrist_stiffness.workflows.replay import OUTPUTS
 
 SHIFT, TURN, COVARIANCE = "s [um]", "rotation [mdeg]", "covariance [%]"
@@ -107,37 +109,45 @@ def output_changes(
     Raises
     ------
     RecordingError
-        If a recording cannot be read, or the old one has no outputs.
+        If a recording cannot be read, the old one has no outputs, or one has a foreign type.
     """
-    before, after = _outputs(old, topics), _outputs(new, topics)
-    if not before:
+    first, second = open_recording(old), open_recording(new)
+    present = {topic.name for topic in first.topics}
+    if present.isdisjoint(topics):
         raise RecordingError(f"{old}: holds no output of a replay ({', '.join(topics)})")
-    return tuple(
-        _changes(topic, before.get(topic, {}), after.get(topic, {}))
-        for topic in topics
-        if topic in before or topic in after
-    )
+    present |= {topic.name for topic in second.topics}
+    # One topic at a time, to hold less in memory.
+    return tuple(_changes(first, second, topic) for topic in topics if topic in present)
 
 
-def _outputs(path: str | Path, topics: Sequence[str]) -> dict[str, dict[Key, Message]]:
-    found: dict[str, dict[Key, Message]] = {}
-    seen: Counter[tuple[str, int]] = Counter()
-    for topic, log_time_ns, message in open_recording(path).messages(topics):
-        header = getattr(message, "header", None)
-        stamp_ns = log_time_ns if header is None else header.stamp_ns
-        found.setdefault(topic, {})[stamp_ns, seen[topic, stamp_ns]] = message
-        seen[topic, stamp_ns] += 1
+def _payloads(source: Recording, topic: str) -> dict[Key, RawMessage]:
+    """Return the stored messages of a topic: much smaller than decoded ones."""
+    found: dict[Key, RawMessage] = {}
+    seen: Counter[int] = Counter()
+    for raw in source.raw_messages([topic]):
+        header = getattr(_decoded(raw), "header", None)
+        stamp_ns = raw.log_time_ns if header is None else header.stamp_ns
+        found[stamp_ns, seen[stamp_ns]] = raw
+        seen[stamp_ns] += 1
     return found
 
 
-def _changes(topic: str, before: dict[Key, Message], after: dict[Key, Message]) -> TopicChanges:
+def _decoded(raw: RawMessage) -> Message:
+    kind = raw.channel.ros_type
+    if kind not in MESSAGE_TYPES:
+        raise RecordingError(f"{raw.channel.topic} carries {kind}, which no replay writes")
+    return decode(MESSAGE_TYPES[kind], raw.payload)
+
+
+def _changes(first: Recording, second: Recording, topic: str) -> TopicChanges:
+    before, after = _payloads(first, topic), _payloads(second, topic)
     common = sorted(before.keys() & after.keys())
     changed: list[int] = []
     largest: dict[str, LargestChange] = {}
     for key in common:
-        old, new = before[key], after[key]
-        if old == new:
+        if before[key].payload == after[key].payload:
             continue
+        old, new = _decoded(before[key]), _decoded(after[key])
         if _form(old) != _form(new):
             changed.append(key[0])
             continue
