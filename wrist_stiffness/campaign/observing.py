@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.reading import rigid_rotation
 from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
 from wrist_stiffness.diagnosis import Observations, Quantity
 from wrist_stiffness.errors import InputError
@@ -178,7 +179,7 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         model.table.geometry.limits.encoder_step,
         np.asarray(session.measured.any(axis=1)),
     )
-    nominal = model.table.mechanism.forward(session.block.theta).platform
+    nominal = rigid_rotation(model.table, session.block.theta)
     error = session.rotation @ np.swapaxes(nominal, -1, -2)
     known = np.isfinite(error).all(axis=(1, 2))
     turn = np.full((len(session), 3), np.nan)
