@@ -10,6 +10,8 @@ from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.statics import component_shares
 from wrist_stiffness.model.block import Load
 from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.parameters import si_factor
+from wrist_stiffness.model.spring import COUPLINGS, KEYS
 
 POSE = (20.0, -10.0)
 LOAD = (0.4, -0.3, -1.0, 0.01, -0.02, 0.005)
@@ -114,10 +116,14 @@ def test_drive_winds_up_by_its_torque(weightless, make, motor):
     ],
 )
 def test_springs_store_energy_and_are_reciprocal(weightless, make, name):
-    """Each adds a symmetric positive semi-definite compliance."""
+    """Each adds a symmetric positive semi-definite compliance, whatever its axes and centre."""
     rng = np.random.default_rng(3)
+    root = np.sqrt([1e-6] * 3 + [1e-3] * 3)[:, None] * rng.normal(size=(6, 6))
+    own = root @ root.T
+    places = {key: (i, i) for i, key in enumerate(KEYS)} | COUPLINGS
     effect = make.effect(name)
-    effect = effect.with_values({p.key: rng.uniform(0.1, 2.0) for p in effect.parameters})
+    effect = effect.with_values({key: own[at] / si_factor(key) for key, at in places.items()})
+    assert len(places) == len(effect.parameters) == 21
     columns = [
         make.added(weightless, effect, make.rest(POSE, 0.1 * unit))[0] / 0.1 for unit in np.eye(6)
     ]

@@ -100,7 +100,11 @@ def diagnose_sessions(
     )
     result = replace(result, absorbed=_absorbed(base, [session.name for session in sessions]))
     known = {each.name: each for each in candidates}
-    effects = tuple(_started(known[each.name], each.parameters) for each in result.findings)
+    fitted = _fitted_extras(base)
+    effects = tuple(
+        fitted.get(each.name) or _started(known[each.name], each.parameters)
+        for each in result.findings
+    )
     return WristDiagnosis(result, observed, effects, base)
 
 
@@ -127,7 +131,7 @@ def seek_point(
         trial = fit_base(model, units, (*extras, best.effect), base)
         if base.cost - trial.cost < WORTH + screen.price(len(best.effect.parameters)):
             break
-        base, extras = trial, _fitted_extras(trial)
+        base, extras = trial, tuple(_fitted_extras(trial).values())
         candidates = wrist_candidates(_point(base), absent, _near(model, extras), progress)
     return base, candidates
 
@@ -142,8 +146,9 @@ def _near(model: ErrorModel, extras: tuple[Effect, ...]) -> dict[str, Mapping[st
     }
 
 
-def _fitted_extras(base: BaseFit) -> tuple[Effect, ...]:
-    return tuple(each for each in base.effects(0) if each.name in base.extras)
+def _fitted_extras(base: BaseFit) -> dict[str, Effect]:
+    """Return the effects fitted along with the base, by their names."""
+    return {each.name: each for each in base.effects(0) if each.name in base.extras}
 
 
 def _point(base: BaseFit) -> Point:

@@ -12,7 +12,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.at_point import screw_from, wrench_at
 from wrist_stiffness.model.law import Contribution, Law
-from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.situation import Situation
 
 KEYS = tuple(f"{axis}_um_per_N" for axis in "xyz") + tuple(
@@ -20,8 +20,22 @@ KEYS = tuple(f"{axis}_um_per_N" for axis in "xyz") + tuple(
 )
 
 
+PAIRS = ((0, 1), (0, 2), (1, 2))
+
+COUPLINGS: dict[str, tuple[int, int]] = {
+    **{f"{'xyz'[i]}{'xyz'[j]}_um_per_N": (i, j) for i, j in PAIRS},
+    **{f"turn_{'xyz'[i]}{'xyz'[j]}_mdeg_per_Nm": (3 + i, 3 + j) for i, j in PAIRS},
+    **{f"{'xyz'[i]}_about_{'xyz'[j]}_um_per_Nm": (i, 3 + j) for i in range(3) for j in range(3)},
+}
+"""Places of the couplings in the symmetric compliance: those of a spring whose axes are turned
+against the body's, or whose centre is not the given point."""
+
+
 class Spring(Law):
-    """Compliances along and about x, y and z of the place's body at home, through a point."""
+    """Compliances along and about x, y and z of the place's body at home, through a point.
+
+    Couplings between them are zero for a spring that lies along these axes and through the point.
+    """
 
     stage = "reaction"
 
@@ -30,16 +44,20 @@ class Spring(Law):
         """Return the point at home, (3,) [m]."""
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return six compliances."""
+        """Return six compliances and their couplings."""
         shift = (Parameter(key, 0.0, 1e3, 1.0) for key in KEYS[:3])
         turn = (Parameter(key, 0.0, 1e5, 100.0) for key in KEYS[3:])
-        return (*shift, *turn)
+        size = {"um_per_N": (1e3, 0.5), "mdeg_per_Nm": (1e5, 50.0), "um_per_Nm": (1e5, 20.0)}
+        coupled = (symmetric(key, *size["_".join(key.split("_")[-3:])]) for key in COUPLINGS)
+        return (*shift, *turn, *coupled)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the deflection under the wrench through the place."""
         point = self.centre(at.table.geometry, place)
-        compliance = np.array([values[key] for key in KEYS])
+        compliance = np.diag([values[key] for key in KEYS])
+        for key, (i, j) in COUPLINGS.items():
+            compliance[i, j] = compliance[j, i] = values.get(key, 0.0)
         local = wrench_at(point, at.at_home(place, at.through_place(place)))
-        return at.screw(place, screw_from(point, compliance * local)), None
+        return at.screw(place, screw_from(point, local @ compliance)), None
