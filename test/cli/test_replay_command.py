@@ -45,7 +45,10 @@ def test_summary_is_told_to_people_and_programs(recording, capsys):
         "predictions": 8,
         "commands": 10,
         "corrections": 10,
+        "trajectories": 0,
+        "corrected_trajectories": 0,
         "warnings": {},
+        "changes": [],
         "damage": "",
     }
 
