@@ -35,7 +35,7 @@ CLOSE, SMALL_FALL = 0.05, 0.1
 """A round ends when no parameter moves by more than this share of its uncertainty, or the sum of
 squares falls by less than this, which no parameter can feel."""
 
-SUSPECT = 2.0
+SUSPECT = 1.2
 """Mean square, by the scatter that is known without any fit, from which other ways are tried."""
 
 LOST_COST = 50.0
