@@ -7,7 +7,7 @@ import pytest
 
 from wrist_stiffness.campaign.comparison import ComparedModel, Comparison, sizes
 from wrist_stiffness.campaign.contrast_sentences import Told, tell
-from wrist_stiffness.campaign.headroom import held_out_process
+from wrist_stiffness.campaign.headroom import held_out_process, left_by_others
 from wrist_stiffness.campaign.noise_floor import (
     NoiseFloor,
     by_side,
@@ -147,6 +147,20 @@ def test_a_process_learns_a_law_of_pose_and_load_down_to_the_noise():
     assert before > 3
     # The noise of three components of 1 um.
     assert np.sqrt(3) * 0.97 < after < np.sqrt(3) * 1.15
+
+
+def test_each_block_is_predicted_by_the_others_alone():
+    rng = np.random.default_rng(20)
+    columns, values = rng.normal(size=(40, 5)), rng.normal(size=(40, 2))
+    known, blocks = np.arange(40) % 7 != 0, np.arange(40) // 10
+    left = left_by_others(columns, values, values, known, blocks, 0.3)
+    for block in range(4):
+        own, rest = blocks == block, (blocks != block) & known
+        # Ridge regression as least squares with a row of its own for every prior.
+        rows = np.vstack([columns[rest], np.eye(5) / np.sqrt(0.3)])
+        weights = np.linalg.lstsq(rows, np.vstack([values[rest], np.zeros((5, 2))]), rcond=None)[0]
+        expected = known[own, None] * (values[own] - columns[own] @ weights)
+        np.testing.assert_allclose(left[own], expected, atol=1e-12)
 
 
 def test_a_process_makes_nothing_of_noise():

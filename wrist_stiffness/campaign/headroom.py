@@ -60,7 +60,7 @@ def held_out_process(observations: Observations, rng: np.random.Generator) -> Ar
             left = np.empty_like(flat)
             for pattern in np.unique(measured, axis=1).T:
                 same = np.flatnonzero((measured == pattern[:, None]).all(axis=0))
-                left[:, same] = _left(
+                left[:, same] = left_by_others(
                     columns, flat[:, same], told[:, same], pattern, blocks, signal
                 )
             energy = np.sum(np.clip(left, -10.0, 10.0) ** 2, axis=0)
@@ -69,10 +69,29 @@ def held_out_process(observations: Observations, rng: np.random.Generator) -> Ar
     return np.where(measured, best * scale, np.nan)
 
 
-def _left(
+def left_by_others(
     columns: Array, values: Array, told: Array, known: Mask, blocks: Labels, signal: float
 ) -> Array:
-    """Residuals of ridge regression on all other blocks, (n, m); zero where not known."""
+    """Return what ridge regression on all other blocks leaves of each block.
+
+    Parameters
+    ----------
+    columns : (n, q) float
+        Features.
+    values, told : (n, m) float
+        What is to be predicted, and the same as the regression learns it.
+    known : (n,) bool
+        Rows that were measured.
+    blocks : (n,) int
+        Block of each row.
+    signal : float
+        Prior variance of a weight against the noise.
+
+    Returns
+    -------
+    (n, m) float
+        Zero where not known.
+    """
     seen = columns * known[:, None]
     gram, moment = seen.T @ seen, seen.T @ told
     left = np.zeros_like(values)
@@ -80,7 +99,7 @@ def _left(
         own = blocks == block
         system = gram - seen[own].T @ seen[own] + np.eye(len(gram)) / signal
         weights = np.linalg.solve(system, moment - seen[own].T @ told[own])
-        left[own] = values[own] - seen[own] @ weights
+        left[own] = known[own, None] * (values[own] - seen[own] @ weights)
     return left
 
 
