@@ -64,37 +64,28 @@ def test_a_wrong_base_alone_is_no_missing_effect(model):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("blank", ["nothing", "rotation", "position"])
+@pytest.mark.parametrize("blank", ["nothing", "position"])
 def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, blank):
     width = 1e-3
     session = measured(model, (HiddenEffect("backlash", "motor_1", "single", width, 5),))
-    if blank == "rotation":
-        session = replace(session, rotation=np.full_like(session.rotation, np.nan))
     if blank == "position":
         session = replace(session, shift=np.full_like(session.shift, np.nan))
     found = answer(model, session)
-    if blank == "rotation":
-        # A turn about O does not move O, so the target alone tells of it.
-        assert found.diagnosis.verdict in ("none", "effect")
-        assert all(f.name != "backlash@motor_2" for f in found.diagnosis.findings)
-        return
     assert [finding.name for finding in found.diagnosis.findings] == ["backlash@motor_1"]
     value, error = found.diagnosis.findings[0].parameters["width_mdeg"]
-    assert abs(value - 1e3 * np.degrees(width)) < 4.0 * error < 10.0
+    assert abs(value - 1e3 * np.degrees(width)) < 3.0 * error
+    # A hidden encoder count is 4 mdeg, and a minute has some ten dwells for each side.
+    assert error < 5.0
     assert found.effects[0].estimates["width_mdeg"].value == pytest.approx(value)
     assert found.diagnosis.after["phi_mdeg"] < 0.5 * found.diagnosis.before["phi_mdeg"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "verdict", "effect"),
-    [("wrist_a", "effect", "joint_clearance@joint_3"), ("wrist_d", "unknown", None)],
-)
-def test_the_recordings_that_hide_an_effect(model, name, verdict, effect):
-    session = read_session(RECORDINGS / f"{name}.mcap", model.table)
+def test_a_recording_of_something_outside_the_catalogue_is_unknown(model):
+    session = read_session(RECORDINGS / "wrist_d.mcap", model.table)
     found = answer(model, session).diagnosis
-    assert found.verdict == verdict
-    assert [finding.name for finding in found.findings] == ([effect] if effect else [])
+    assert found.verdict == "unknown"
+    assert found.findings == ()
 
 
 def test_no_session_is_refused(model):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -21,6 +21,9 @@ from wrist_stiffness.model.registry import catalogue
 
 LARGE = 5.0
 """An effect so many times its usual size would still surprise nobody who looks for a fault."""
+
+FAR = 10.0
+"""What an estimate may be against the bounds of its law; at zero they stay."""
 
 TOLERANCES = {*(law for law, _ in BUILT), "load_scale"}
 """Laws of the base: what they do within their priors is no finding, however well it shows."""
@@ -52,6 +55,8 @@ class WristCandidate:
         Columns on the grid [m, rad].
     exact : callable, optional
         shape -> columns, where they are known between the points of the grid.
+    seen : bool
+        Whether a fit has found it before, whatever its size.
     """
 
     law: Law
@@ -59,6 +64,7 @@ class WristCandidate:
     recipe: Recipe
     known: Mapping[Shape, Array]
     exact: Callable[[Shape], Array] | None = None
+    seen: bool = False
 
     @property
     def name(self) -> str:
@@ -116,7 +122,7 @@ class WristCandidate:
         return Candidate(
             law.id,
             self.place,
-            tuple(replace(f, plausible=self._noticed(f)) for f in factors),
+            tuple(self._testable(f) for f in factors),
             self.columns,
             self.recipe.shape,
             needs=law.excited_by,
@@ -125,11 +131,14 @@ class WristCandidate:
             compensable=compensable(law, self.place),
         )
 
-    def _noticed(self, factor: Factor) -> float | None:
-        """Return the size at which a factor must show to be testable, None for any."""
-        if self.law.id in TOLERANCES or factor.plausible is None:
-            return None
-        return LARGE * factor.plausible
+    def _testable(self, factor: Factor) -> Factor:
+        """Return a factor with the size at which it must show to be tested, and its far bounds."""
+        plausible = factor.plausible
+        if self.seen or self.law.id in TOLERANCES or plausible is None:
+            size = None
+        else:
+            size = LARGE * plausible
+        return Factor(factor.name, FAR * factor.lower, FAR * factor.upper, size)
 
 
 def compensable(law: Law, place: str) -> str:
@@ -232,7 +241,8 @@ def wrist_candidates(
     found = []
     for law, place, own in plans:
         if law.id == WAVE:
-            found.append(WristCandidate(law, place, own, {}, _wave(point, place)))
+            wave = _wave(point, place)
+            found.append(WristCandidate(law, place, own, {}, wave, f"{law.id}@{place}" in near))
             continue
         known = {}
         for shape in _points(own):
@@ -243,7 +253,7 @@ def wrist_candidates(
                     change = change - changes[index(law, place, column.origin)]
                 stack.append(change / column.size)
             known[shape] = np.stack(stack, axis=-1)
-        found.append(WristCandidate(law, place, own, known))
+        found.append(WristCandidate(law, place, own, known, seen=f"{law.id}@{place}" in near))
     return tuple(found)
 
 

@@ -1,0 +1,88 @@
+"""Residuals of units: exact poses, blanks, lost beams, replicates."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import observe
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+
+POSES_DEG = ((0, 0), (20, 10), (-15, 25), (20, 10))
+ADDED = np.array([3e-6, -2e-6, 5e-6, 2e-4, -1e-4, 3e-4])
+"""Twist by which the platform is measured off its prediction [m, rad]."""
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+@pytest.fixture
+def session(model):
+    """Four poses held for two seconds each, moves of a second between them, 10 Hz."""
+    time = np.arange(0.0, 12.0, 0.1)
+    knots = np.concatenate([[3.0 * i, 3.0 * i + 2.0] for i in range(4)])
+    values = np.radians(np.repeat(POSES_DEG, 2, axis=0))
+    theta = np.stack([np.interp(time, knots, each) for each in values.T], axis=1)
+    block = Block(time, theta, np.tile([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], (len(time), 1)))
+    off, moved = exp_twist(ADDED)
+    bent, shift = exp_twist(model.batch(block).measured)
+    nominal = model.table.mechanism.forward(theta).platform
+    return MeasuredSession(
+        "four poses", block, moved + shift @ off.T, off @ bent @ nominal, np.diag([1e-12] * 6)
+    )
+
+
+def blanked(session, shift=(), rotation=False):
+    """Return the session with some components of the position, or the rotation, not measured."""
+    position = session.shift.copy()
+    position[:, list(shift)] = np.nan
+    turned = np.full_like(session.rotation, np.nan) if rotation else session.rotation
+    return MeasuredSession(session.name, session.block, position, turned, session.covariance)
+
+
+def test_the_residual_is_the_twist_between_measured_and_predicted(model, session):
+    values = observe(model, [session]).observations.values
+    # Within a dwell the residual is exact; in motion the moment is the sample itself.
+    assert values == pytest.approx(np.tile(ADDED, (len(values), 1)), abs=1e-11)
+
+
+def test_one_dial_gauge_gives_one_component(model, session):
+    seen = observe(model, [blanked(session, shift=(0, 1), rotation=True)]).observations
+    assert np.isnan(seen.values[:, [0, 1, 3, 4, 5]]).all()
+    # The unknown rotation is taken as predicted: 4e-4 rad of a few um are nanometres.
+    assert seen.values[:, 2] == pytest.approx(ADDED[2], abs=1e-8)
+
+
+def test_pointing_alone_leaves_the_position_blank(model, session):
+    seen = observe(model, [blanked(session, shift=(0, 1, 2))]).observations
+    assert np.isnan(seen.values[:, :3]).all()
+    assert seen.values[:, 3:] == pytest.approx(np.tile(ADDED[3:], (len(seen.values), 1)), abs=1e-11)
+
+
+def test_a_pose_held_twice_is_a_replicate(model, session):
+    found = observe(model, [session]).observations
+    dwells = found.samples > 3
+    labels = found.replicate[dwells]
+    assert labels[1] == labels[3] >= 0
+    assert labels[0] == labels[2] == -1
+
+
+def test_a_lost_beam_in_a_dwell_is_left_out(model, session):
+    shift = session.shift + 1e-7 * np.random.default_rng(1).normal(size=session.shift.shape)
+    shift[5] += 1e-3
+    turned = Rotation.from_rotvec([0.0, 0.0, 0.0]).as_matrix() @ session.rotation
+    seen = observe(model, [MeasuredSession("a glitch", session.block, shift, turned)])
+    assert seen.sessions[0].lost == 1
+    assert np.abs(seen.observations.values[0, :3] - ADDED[:3]).max() < 2e-7
+
+
+def test_poses_beyond_the_table_are_refused_only_if_nothing_is_left(model, session):
+    far = Block(session.block.time, session.block.theta + 2.0, session.block.load)
+    with pytest.raises(InputError, match="four poses: none of 120 measurements"):
+        observe(model, [MeasuredSession("four poses", far, session.shift, session.rotation)])
