@@ -27,6 +27,9 @@ PATH_S = 0.1
 UNIT_EVERY = 5
 """One kept moment in so many counts as a unit in motion."""
 
+MOST_MOVING, MOST_ON_PATH = 300, 2500
+"""So many units in motion, and moments that tell the path, are enough of however long a session."""
+
 SPARSE_S = 1.0
 """Samples further apart than this are poses measured one by one, each at rest."""
 
@@ -213,7 +216,8 @@ def _moments(
     keep[start], keep[end] = True, True
     turned = np.diff(np.sign(speed), axis=0, prepend=np.sign(speed[:1])) != 0.0
     keep |= turned.any(axis=1) & ~resting
-    grid = np.floor((time - time[0]) / PATH_S + 1e-6)
+    inside = np.diff(time, append=time[-1])[~resting]
+    grid = np.floor((time - time[0]) / max(PATH_S, inside.sum() / MOST_ON_PATH) + 1e-6)
     keep |= (np.diff(grid, prepend=-1.0) > 0.0) & ~resting
     seen = np.flatnonzero(measured & ~resting)
     regular[seen] = np.diff(grid[seen], prepend=-1.0) > 0.0
@@ -227,7 +231,8 @@ def _moments(
 def _units(stretch: Labels, resting: Mask, kept: Labels, regular: Mask) -> tuple[Labels, Mask]:
     """Return the unit of each sample and which units are dwells."""
     chosen = np.zeros(len(stretch), dtype=bool)
-    chosen[np.flatnonzero(regular)[::UNIT_EVERY]] = True
+    moments = np.flatnonzero(regular)
+    chosen[moments[:: max(UNIT_EVERY, -(-len(moments) // MOST_MOVING))]] = True
     starts = chosen | (resting & (np.diff(stretch, prepend=-1) != 0))
     label = np.where(chosen | resting, np.cumsum(starts) - 1, -1)
     return label, resting[starts]
