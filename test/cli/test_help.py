@@ -26,7 +26,7 @@ LEAVES = dict(leaves(PARSER))
 
 
 def examples(text):
-    joined = text.replace("\\\n", " ")
+    joined = re.sub(r"\\\n +", "", text)
     return re.findall(rf"^ +({PROG} .+?)(?:   .*)?$", joined, re.MULTILINE)
 
 
