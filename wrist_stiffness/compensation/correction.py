@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import copysign
 
 import numpy as np
 
@@ -17,7 +18,10 @@ from wrist_stiffness.model.error_model import Prediction
 TOLERANCE = 1e-10
 """The search ends where the angles are known to this [rad]; 1e-6 of an encoder step."""
 
-MAX_ITERATIONS = 20
+MAX_ITERATIONS = 40
+
+ANSWERS = 0.5
+"""A motor whose error changes by less than this share of its step is crossing a lost motion."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +49,17 @@ def correct(
     mechanism: Mechanism,
     command: Array,
     objective: Objective,
+    held: Array | None = None,
+    play: float = 0.0,
 ) -> Correction:
     """Find the angles at which the predicted pose meets the objective of the commanded one.
 
     The error depends on the corrected angles, so this is a fixed point: task(T_pred(theta + delta)
     FK(theta + delta)) = task(FK(theta)), stepped by the pseudo-inverse of the task's Jacobian.
+
+    The hysteresis is one of the error: a motor moves when it would otherwise leave more than
+    `play`.  For most effects that is the same as a hysteresis of the correction; but the error of a
+    motor with backlash at its reversal grows from nothing, while the correction must jump.
 
     Parameters
     ----------
@@ -62,6 +72,10 @@ def correct(
         Commanded motor angles [rad].
     objective : Objective
         What to make right.
+    held : (2,) float, optional
+        The correction so far; zero if None [rad].
+    play : float
+        What a motor may leave before its correction moves [rad].
 
     Returns
     -------
@@ -81,22 +95,41 @@ def correct(
     # Where the command itself is driven, what remains is the error.
     before = prediction.twist
     reached = Correction(np.zeros(2), before, before, prediction)
-    size = np.inf
-    for _ in range(MAX_ITERATIONS):
-        step = -cancelling.dot(reached.after)
-        last, size = size, max(map(abs, step.tolist()))
-        # The steps shrink by a constant factor, so the last two of them bound what is missing.
-        if size < TOLERANCE or (size < last < np.inf and size**2 < TOLERANCE * (last - size)):
-            return as_applied(mechanism, reached, reached.delta + step)
-        delta = reached.delta + step
+
+    def at(delta: Array) -> Correction:
         prediction = predict(command + delta)
-        reached = Correction(
-            delta, before, residual_twist(prediction, desired.platform), prediction
-        )
+        after = residual_twist(prediction, desired.platform)
+        return Correction(delta, before, after, prediction)
+
+    if held is not None and any(held.tolist()):
+        reached = at(held)
+    size = np.inf
+    steps, missing = [0.0, 0.0], [0.0, 0.0]
+    for _ in range(MAX_ITERATIONS):
+        last_missing, missing = missing, cancelling.dot(reached.after).tolist()
+        steps = list(map(_step, missing, last_missing, steps, (play, play)))
+        last, size = size, max(map(abs, steps))
+        if size < TOLERANCE:
+            return reached
+        # The steps shrink by a constant factor, so the last two of them bound what is missing.
+        if size < last < np.inf and size**2 < TOLERANCE * (last - size):
+            return as_applied(mechanism, reached, reached.delta + steps)
+        reached = at(reached.delta + steps)
     raise InputError(
         f"correction: no fixed point after {MAX_ITERATIONS} steps, last step "
         f"{np.degrees(size):.2e} deg"
     )
+
+
+def _step(missing: float, last_missing: float, last_step: float, play: float) -> float:
+    """Return by how much a motor should go on, given what is missing before and after a step [rad].
+
+    Inside a lost motion the error does not answer: there the steps grow until it does.
+    """
+    beyond = missing - min(max(missing, -play), play)
+    if beyond and abs(missing - last_missing) < ANSWERS * abs(last_step):
+        return -copysign(max(abs(missing), 2.0 * abs(last_step)), missing)
+    return -beyond
 
 
 def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Correction:

@@ -95,6 +95,7 @@ class CorrectionStream(Stream):
         super().__init__(model, settings)
         self.contact = ContactGuard()
         self._applied = AppliedCorrection()
+        self._held = np.zeros(2)
         self._enabled = enabled
 
     @property
@@ -148,18 +149,22 @@ class CorrectionStream(Stream):
         sent = np.array(positions, dtype=float)
         if frame_id == CORRECTED_FRAME:
             self._applied.reset()
+            self._held = np.zeros(2)
             self._remember(stamp_ns, theta, None, theta_dot)
             twice = InputError(TWICE) if self.enabled else None
             return CorrectedCommand(frame_id, sent, theta, None, twice)
         correction: Correction | None = None
         fault: WristError | None = None
         load: Load | None = None
+        held = np.zeros(2)
         if self.enabled:
             try:
                 load = self._load(stamp_ns)
-                correction = self._correction(stamp_ns, load, theta, theta_dot)
+                found = self._found(stamp_ns, load, theta, theta_dot, self._held, self._play)
+                held, correction = found.delta, self._faded(found)
             except WristError as error:
                 fault = error
+        self._held = held
         delta = self._advance(stamp_ns, theta, correction)
         if correction is not None:
             mechanism = self.running_model().model.table.mechanism
@@ -273,22 +278,38 @@ class CorrectionStream(Stream):
         self.running_model().model.table.check_load(measured.wrench)
         return self.contact.load(stamp_ns, measured, self.settings.contact)
 
-    def _correction(
-        self, stamp_ns: int, load: Load, theta: Array, theta_dot: Array | None = None
+    @property
+    def _play(self) -> float:
+        limits = self.running_model().model.table.geometry.limits
+        return self.settings.safety.deadband_steps * limits.encoder_step
+
+    def _found(
+        self,
+        stamp_ns: int,
+        load: Load,
+        theta: Array,
+        theta_dot: Array | None,
+        held: Array | None = None,
+        play: float = 0.0,
     ) -> Correction:
-        """Return the correction that is wanted: faded by the guards, refused beyond the limit."""
+        """Return the correction that meets the objective; refused beyond the limit."""
         running = self.running_model()
         table = running.model.table
         platform = table.geometry.platform
         objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
         predict = running.preview(stamp_ns, load, theta_dot)
-        correction = correct(predict, table.mechanism, theta, objective)
+        correction = correct(predict, table.mechanism, theta, objective, held, play)
         largest = max(map(abs, correction.delta.tolist()))
         if largest > self.settings.correction_limit:
             raise InputError(
                 f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
                 f"{np.degrees(self.settings.correction_limit):g} deg"
             )
+        return correction
+
+    def _faded(self, correction: Correction) -> Correction:
+        """Return the correction as the guards let it through."""
+        table = self.running_model().model.table
         weight = guard_weight(
             table.workspace, correction.prediction.configuration, self.settings.safety
         )
@@ -309,7 +330,7 @@ class CorrectionStream(Stream):
         theta_dot = point.velocities[list(places)] if len(point.velocities) else None
 
         def corrected(theta: Array) -> Array:
-            delta = self._correction(stamp_ns, load, theta, theta_dot).delta
+            delta = self._faded(self._found(stamp_ns, load, theta, theta_dot)).delta
             return within_joint_limits(theta, delta, limits)
 
         return corrected

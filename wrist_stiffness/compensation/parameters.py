@@ -135,7 +135,7 @@ CORRECTION = (
     ParameterEntry(
         "deadband_steps",
         0.15,
-        "half width of the correction's hysteresis [encoder steps]",
+        "error that a motor may leave before its correction moves [encoder steps]",
         lower=0.0,
         upper=10.0,
     ),

@@ -1,4 +1,4 @@
-"""How a correction may reach the motors: fading guards, hysteresis, slew and joint limits."""
+"""How a correction may reach the motors: fading guards, slew and joint limits."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class SafetySettings:
     slew : float
         Largest change of a motor's correction [rad/s].
     deadband_steps : float
-        Half width of the hysteresis [encoder steps]; at 0.15 the error that it leaves adds at most
-        13 % to the RMS of the rounding to whole steps.
+        Error that a motor may leave before its correction moves [encoder steps]; at 0.15 it adds at
+        most 13 % to the RMS of the rounding to whole steps.
     domain_fade : float
         Within this distance from the border of the table's domain the correction fades [rad].
     singularity_fade : float
@@ -89,13 +89,12 @@ class AppliedCorrection:
     """
 
     def __init__(self) -> None:
-        self._held = np.zeros(2)
         self._applied = np.zeros(2)
         self._stamp_ns: int | None = None
 
     def reset(self) -> None:
         """Begin at zero again."""
-        self._held, self._applied = np.zeros(2), np.zeros(2)
+        self._applied = np.zeros(2)
 
     def advance(
         self, stamp_ns: int, theta: Array, wanted: Array, limits: Limits, settings: SafetySettings
@@ -111,19 +110,17 @@ class AppliedCorrection:
         wanted : (2,) float
             Correction that would meet the objective; zero where there shall be none [rad].
         limits : Limits
-            Joint limits and encoder step.
+            Of the joints.
         settings : SafetySettings
-            Slew and hysteresis.
+            Slew.
 
         Returns
         -------
         (2,) float
             To be added to the command [rad].
         """
-        play = settings.deadband_steps * limits.encoder_step if any(wanted.tolist()) else 0.0
-        self._held = between(self._held, wanted - play, wanted + play)
         reach = settings.slew * self._seconds_since_last(stamp_ns)
-        self._applied = self._applied + between(self._held - self._applied, -reach, reach)
+        self._applied = self._applied + between(wanted - self._applied, -reach, reach)
         self._applied = within_joint_limits(theta, self._applied, limits) - theta
         return self._applied
 
