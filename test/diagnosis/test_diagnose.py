@@ -209,3 +209,21 @@ def test_a_table_of_blanks_is_refused(rng):
     table = plain(rng)
     with pytest.raises(InputError, match="nothing was measured"):
         diagnose(table.with_values(np.full((120, 2), np.nan)), (line("x"),), (offset(),), rng)
+
+
+def test_a_crowd_of_lookalikes_names_nothing(rng):
+    table = plain(rng)
+    table = table.with_values(table.values + np.outer(2 * table.covariate("x"), [1, 1]))
+
+    def twin(number):
+        def columns(t, _):
+            return (1.0 + number) * np.stack([t.covariate("x")] * 2, axis=1)[:, :, None]
+
+        return Candidate("twin", f"x_{number}", (Parameter("slope"),), columns)
+
+    few = Settings(permutations=999, most_members=3)
+    twins = tuple(twin(number) for number in range(4))
+    crowd = diagnose(table, (line("z"), *twins), (offset(),), rng, few)
+    assert (crowd.verdict, crowd.findings) == ("unknown", ())
+    (named,) = diagnose(table, (line("z"), *twins[:3]), (offset(),), rng, few).findings
+    assert len(named.names) == 3

@@ -8,7 +8,7 @@ from wrist_stiffness.diagnosis.candidates import Candidate, remembered
 from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
 from wrist_stiffness.diagnosis.errors_in_variables import without_attenuation
 from wrist_stiffness.diagnosis.estimates import joint_fit
-from wrist_stiffness.diagnosis.findings import Model, describe, with_values
+from wrist_stiffness.diagnosis.findings import Model, describe, members_of, with_values
 from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
@@ -90,13 +90,18 @@ def diagnose(
     sealed, n_lost_aside = _cleaned(observations.take(aside), candidates, nuisances, settings)
     kept, stages, broken = _opened(evidence, chosen.entered, sealed, nuisances)
     blocks = time_blocks(training.sessions, settings.blocks)
+    model = Model(evidence, testable, kept, tuple(stages), blocks, dimension, settings)
+    crowd = [which for which in range(len(kept)) if _crowded(model, which)]
+    if crowd:
+        named = tuple(each for which, each in enumerate(kept) if which not in crowd)
+        kept, stages, _ = _opened(evidence, named, sealed, nuisances)
+        model = replace(model, effects=kept, stages=tuple(stages))
     base = base_with(evidence.base, kept)
     excess = lack_of_fit(base.energy, base.freedom, evidence.noise.dof)
     flexible = find_discrepancy(
         evidence, base, blocks, settings.permutations, CHANCE_OF_STRUCTURE, rng
     )
     unexplained = _unexplained(evidence, base.energy, excess, flexible, broken)
-    model = Model(evidence, testable, kept, tuple(stages), blocks, dimension, settings)
     findings = tuple(describe(model, which, rng) for which in range(len(kept)))
     if observations.covariate_std and kept:
         effects = [(original[each.name], each.hypothesis.shape) for each in kept]
@@ -120,6 +125,11 @@ def diagnose(
         n_lost + n_lost_aside,
         "another session" if len(np.unique(observations.sessions)) > 1 else "this session only",
     )
+
+
+def _crowded(model: Model, which: int) -> bool:
+    """Tell whether so many effects could stand in one's place that none of them is named."""
+    return len(members_of(model, which)) > model.settings.most_members
 
 
 def _refuse_unusable(observations: Observations, candidates: tuple[Candidate, ...]) -> None:

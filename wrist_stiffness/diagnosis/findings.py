@@ -63,12 +63,8 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
     """
     entered = model.effects[which]
     candidate = entered.hypothesis.candidate
-    others = base_with(model.evidence.base, model.effects[:which] + model.effects[which + 1 :])
-    rivals = rivals_of(model.evidence, model.catalogue, model.effects, which, model.dimension)
-    hypotheses = [entered.hypothesis, *(r.hypothesis for r in rivals if r.name != entered.name)]
-    ranked = scored(others, hypotheses, model.dimension, model.evidence.noise.dof)
-    own = next(each for each in ranked if each.hypothesis is entered.hypothesis)
-    ranked = [own, *(each for each in ranked if each is not own)]
+    others, ranked = _in_its_place(model, which)
+    own = ranked[0]
     members = indistinguishable(others, ranked, model.dimension, model.settings)
     scale = float(background(own.remaining, model.dimension))
     fitted = estimate(model.evidence, others, own.hypothesis, scale)
@@ -89,6 +85,24 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
         _told(own),
         candidate.check,
     )
+
+
+def members_of(model: Model, which: int) -> tuple[str, ...]:
+    """Return the names of all effects that could stand in one's place."""
+    others, ranked = _in_its_place(model, which)
+    found = indistinguishable(others, ranked, model.dimension, model.settings)
+    return tuple(each.name for each in found)
+
+
+def _in_its_place(model: Model, which: int) -> tuple[Base, list[Ranked]]:
+    """Return the rest of the model, and the effect ahead of all that could stand in its place."""
+    entered = model.effects[which]
+    others = base_with(model.evidence.base, model.effects[:which] + model.effects[which + 1 :])
+    rivals = rivals_of(model.evidence, model.catalogue, model.effects, which, model.dimension)
+    hypotheses = [entered.hypothesis, *(r.hypothesis for r in rivals if r.name != entered.name)]
+    ranked = scored(others, hypotheses, model.dimension, model.evidence.noise.dof)
+    own = next(each for each in ranked if each.hypothesis is entered.hypothesis)
+    return others, [own, *(each for each in ranked if each is not own)]
 
 
 def with_values(finding: Finding, values: Array) -> Finding:

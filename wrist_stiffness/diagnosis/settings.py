@@ -24,6 +24,9 @@ class Settings:
         Random rearrangements of each permutation test.
     most_findings : int
         The search ends after so many effects.
+    most_members : int
+        A class of more effects than these names nothing: they are not told from each other, nor
+        from what nobody thought of.
     outlier_limit : float
         Distance from the rich model, in robust standard deviations, of a lost beam.
     """
@@ -35,4 +38,5 @@ class Settings:
     blocks: int = 10
     permutations: int = 999
     most_findings: int = 8
+    most_members: int = 8
     outlier_limit: float = 7.0
