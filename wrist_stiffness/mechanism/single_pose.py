@@ -53,6 +53,9 @@ _IN_LIMB_1, _IN_LIMB_2_BASE = np.eye(3, 9), np.eye(3, 9, 6)
 _LIMB_1, _LIMB_2_BASE, _PAST_LINK_2 = slice(0, 6), slice(6, 12), slice(12, 15)
 _MOTOR_1, _MOTOR_2 = slice(0, 3), slice(6, 9)
 
+_FRAME_1, _FRAME_2 = (np.add.outer([0, 15], start + np.arange(3)).ravel() for start in (0, 6))
+"""Six-vectors of the groups on the frame, whose axes are those of F at every pose."""
+
 
 class SinglePoseKinematics:
     """Forward kinematics of one wrist, a pose at a time (see `Mechanism.forward`).
@@ -141,9 +144,19 @@ class SinglePoseStatics:
         Condensed parts.
     gravity : (3,) float
         Acceleration of gravity in F [m/s^2].
+    screws : (5, 6) float, optional
+        Constant screws of `GROUPS`, at O in the home frames of their bodies [m, rad].
+    opening : (m,) float, optional
+        Of the sectors beyond the components' gaps [m].
     """
 
-    def __init__(self, components: ElasticComponents, gravity: Array) -> None:
+    def __init__(
+        self,
+        components: ElasticComponents,
+        gravity: Array,
+        screws: Array | None = None,
+        opening: Array | None = None,
+    ) -> None:
         self._gravity = gravity
         self._sectors = sectors = components.sectors
         m, n = len(sectors.gap), len(GROUPS)
@@ -171,9 +184,19 @@ class SinglePoseStatics:
         self._by_force = np.ascontiguousarray(self._by_wrench[:, :15])
         by_field = (weight_screw.reshape(6 * n, 15), weight_gap.reshape(m, 15))
         self._by_field = np.concatenate([*by_field, total.reshape(30, 15)])
+        self._constant = np.zeros(6 * n + m)
+        if screws is not None:
+            self._constant[: 6 * n] = screws.reshape(n, 2, 3).swapaxes(0, 1).ravel()
+        self._constant[6 * n :] = sectors.gap if opening is None else sectors.gap + opening
 
     def respond(
-        self, configuration: Configuration, wrench: Array, active: NDArray[np.bool_] | None = None
+        self,
+        configuration: Configuration,
+        wrench: Array,
+        active: NDArray[np.bool_] | None = None,
+        limb_1: Array | None = None,
+        limb_2: Array | None = None,
+        opening: Array | None = None,
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Solve for the platform's twist under a load, with contact and own weight.
 
@@ -185,6 +208,10 @@ class SinglePoseStatics:
             Load on the platform at O in F [N, N m].
         active : (m,) bool, optional
             First guess of the sectors in contact; leaves no trace in the result.
+        limb_1, limb_2 : (6,) float, optional
+            Further screws in the limbs at O in F [m, rad].
+        opening : (m,) float, optional
+            Further opening of the sectors [m].
 
         Returns
         -------
@@ -222,9 +249,14 @@ class SinglePoseStatics:
         carried += weight[_LINK_2]
         bent = self._by_wrench.dot(u.ravel())
         bent += own[:-30]
+        bent += self._constant
+        for screw, frame in ((limb_1, _FRAME_1), (limb_2, _FRAME_2)):
+            if screw is not None:
+                bent[frame] += screw
 
         to_slides, delta, gap = t[:, 3:6], bent[:30], bent[30:]
-        gap += sectors.gap
+        if opening is not None:
+            gap += opening
         gap += sectors.slide.dot(delta[:15].dot(to_slides))
         by_slide = self._by_force.dot(to_slides)
         half = by_slide[30:] + sectors.slide.dot(0.5 * to_slides.T.dot(by_slide[:15]))

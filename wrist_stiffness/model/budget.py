@@ -114,6 +114,8 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
             nominal = twists[k] / effect.law.part_factor(effect.si)
             twist, twists[k] = twists[k] - nominal, nominal
         else:
+            if effect.law.constant:
+                added, _ = effect.law.advance(at, effect.component, effect.si, None)
             twist = _felt(at, added, result.active)
         spread = [
             evaluate(model.with_effects(*before, other, *after), block, None, result)[0].measured[0]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +15,11 @@ from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.model.block import Block, Load, Sample
+from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import Memory, evaluate
+from wrist_stiffness.model.evaluation import Memory, constants_of, evaluate
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
@@ -90,6 +92,24 @@ class ErrorModel:
             parts = effect.law.changed(parts, self.table.geometry, effect.component, effect.si)
         return parts
 
+    @cached_property
+    def constants(self) -> Constants:
+        """What the constant effects add together."""
+        return constants_of(self.effects, self.table, self.parts)
+
+    @cached_property
+    def changing(self) -> tuple[Effect, ...]:
+        """Effects that are neither constant nor part of the elastic parts."""
+        return tuple(e for e in self.effects if not (e.law.constant or e.stage == "parts"))
+
+    @cached_property
+    def single_pose(self) -> SinglePoseStatics:
+        """The closed form for one pose at a time, with the constants' screws and gaps."""
+        own = self.constants
+        if self.parts is self.table.components and own.screws is None and own.gap is None:
+            return self.table.single_pose
+        return SinglePoseStatics(self.parts, self.table.geometry.gravity, own.screws, own.gap)
+
     @property
     def _changes_of_parts(self) -> list[Effect]:
         return [effect for effect in self.effects if effect.stage == "parts"]
@@ -151,18 +171,41 @@ class ErrorModel:
         LoadRangeError
             If the load is outside the table's range.
         """
-        if self.effects:
+        if not self.stateless:
             return self.session().advance(Sample(0.0, theta, load))
         configuration = self.table.workspace.configuration(theta)
         wrench = load.in_base(configuration)
         self.table.check_load(wrench)
+        added = self.constants
         if self.evaluation == "closed_form":
-            twist, _, active = self.table.single_pose.respond(configuration, wrench, active)
+            if added.wrench is not None:
+                wrench = wrench + added.wrench
+            twist, _, active = self.single_pose.respond(configuration, wrench, active)
         else:
             operators = self.table.operators_at(configuration, self.evaluation)
             response = respond(operators, wrench, active=active)
             twist, active = response.twist, response.active
-        return Prediction(twist, configuration, active, twist, self)
+
+        def of_parameters() -> Array:
+            moved = [other.predict(theta, load, active).twist for other in self.variations]
+            return self._spread(twist, moved)
+
+        sensor = added.sensor(configuration)
+        return Prediction(
+            twist, configuration, active, self, sensor, of_parameters, warnings=added.warnings
+        )
+
+    @cached_property
+    def stateless(self) -> bool:
+        """Whether no sample depends on another, nor an effect on what others do."""
+        return not (self.changing if self.evaluation == "closed_form" else self.effects)
+
+    def _spread(self, twist: Array, moved: Sequence[Array]) -> Array:
+        """Covariance (6, 6) from the parameters: those fitted together, and the variations."""
+        covariance = np.zeros((6, 6)) if self.joint is None else self.joint.covariance
+        for other in moved:
+            covariance += np.outer(other - twist, other - twist)
+        return covariance
 
     def batch(self, block: Block) -> BlockPrediction:
         """Predict the pose error of a whole recording, in bounded memory.
@@ -294,7 +337,9 @@ class Session:
             If the sample is out of range, not finite or earlier than the one before; it is not
             remembered.
         """
-        prediction, self._memory, self._others = self._predicted(sample)
+        prediction, self._memory, varied = self._predicted(sample)
+        if self.model.variations:
+            self._others = varied()[1]
         return prediction
 
     def preview(self, sample: Sample) -> Prediction:
@@ -317,7 +362,9 @@ class Session:
         """
         return self._predicted(sample)[0]
 
-    def _predicted(self, sample: Sample) -> tuple[Prediction, Memory, list[Memory]]:
+    def _predicted(
+        self, sample: Sample
+    ) -> tuple[Prediction, Memory, Callable[[], tuple[Array, list[Memory]]]]:
         model, memory = self.model, self._memory
         if not np.isfinite(sample.time):
             raise InputError(f"sample: time {sample.time} is not finite")
@@ -327,30 +374,42 @@ class Session:
             raise InputError(
                 f"sample: time {sample.time:.6f} s is before the last one, {memory.time:.6f} s"
             )
-        if not model.effects:
+        if model.stateless:
             plain = model.predict(sample.theta, sample.load, memory.active if memory else None)
-            return plain, Memory((), sample.time, sample.theta, plain.active), []
+            later = Memory((), sample.time, sample.theta, plain.active)
+            return plain, later, lambda: (plain.covariance, [])
         configuration = model.table.workspace.configuration(sample.theta)
         model.table.check_load(sample.load.wrench)
-        result, later = evaluate(model, sample.block, memory)
-        twist = result.twist[0]
-        covariance = np.zeros((6, 6)) if model.joint is None else model.joint.covariance
-        others = []
-        for number, other in enumerate(model.variations):
-            before = None if self._others is None else self._others[number]
-            moved, after = evaluate(other, sample.block, before, result)
-            others.append(after)
-            covariance += np.outer(moved.twist[0] - twist, moved.twist[0] - twist)
+        pose = configuration if model.evaluation == "closed_form" else None
+        result, later = evaluate(model, sample.block, memory, pose=pose)
+        twist, others = result.twist[0], self._others
+
+        @cache
+        def varied() -> tuple[Array, list[Memory]]:
+            before: list[Memory | None] = [*others] if others else [None] * len(model.variations)
+            found = [
+                evaluate(other, sample.block, own, result)
+                for other, own in zip(model.variations, before, strict=True)
+            ]
+            covariance = model._spread(twist, [moved.twist[0] for moved, _ in found])
+            return covariance, [after for _, after in found]
+
+        left, right = result.situation.sensor
         prediction = Prediction(
             twist,
             configuration,
             result.active[0],
-            result.measured[0],
             model,
-            covariance,
-            result.warnings,
+            (_only(left), _only(right)),
+            lambda: varied()[0],
+            warnings=result.warnings,
         )
-        return prediction, later, others
+        return prediction, later, varied
+
+
+def _only(rows: Array | None) -> Array | None:
+    """Return the only row of (1, 6), or what is (6,) already."""
+    return None if rows is None else rows.reshape(6)
 
 
 __all__ = ["BlockPrediction", "ErrorModel", "Load", "Prediction", "Session"]

@@ -6,30 +6,71 @@ xi = C W + sum_k G_k delta_k + B lambda
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
-from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.contacts import Held, solve_contacts
+from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.law import NOTHING, STAGES, Contribution, MissingSignalError
+from wrist_stiffness.model.law import STAGES
 from wrist_stiffness.model.situation import Situation, lengths
-
-if TYPE_CHECKING:
-    from wrist_stiffness.model.error_model import ErrorModel
 
 FIRST_ORDER_LIMIT = 2e-3
 """A screw that turns by more than this has left first order [rad]."""
 
 SAMPLE_STAGES = STAGES[1:]
+
+_SHARED = (
+    "operators",
+    "influence",
+    "_turned_flexibility",
+    "speed",
+    "own_weight",
+    "jacobian",
+    "told",
+)
+"""What of a situation does not depend on what effects add."""
+
+
+class Evaluable(Protocol):
+    """What an evaluation must know of a model."""
+
+    @property
+    def table(self) -> Table:
+        """Elastic lookup of the wrist."""
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """`closed_form` or `spline`."""
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """In the order in which they entered."""
+
+    @property
+    def parts(self) -> ElasticComponents:
+        """Elastic parts with the effects that change them."""
+
+    @property
+    def constants(self) -> Constants:
+        """What the constant effects add together."""
+
+    @property
+    def single_pose(self) -> SinglePoseStatics:
+        """The closed form for one pose at a time, with the constants' screws and gaps."""
 
 
 @dataclass(frozen=True)
@@ -64,25 +105,27 @@ class Evaluated:
         As the reaction stage saw it.
     twist : (n, 6) float
         Pose error of the platform, first order in every screw [m, rad].
-    measured : (n, 6) float
-        What the pose sensor says of it, composed exactly [m, rad].
     force : (n, m) float
         Contact forces [N].
     active : (n, m) bool
         Contact state.
     contributions : tuple of Contribution
-        What each effect added.
+        What each effect added; nothing for constant ones, which were put together before.
     warnings : tuple of str
         Effects without their signals, and effects past first order.
     """
 
     situation: Situation
     twist: Array
-    measured: Array
     force: Array
     active: NDArray[np.bool_]
     contributions: tuple[Contribution, ...]
     warnings: tuple[str, ...]
+
+    @cached_property
+    def measured(self) -> Array:
+        """What the pose sensor says of the twist, composed exactly, (n, 6) [m, rad]."""
+        return seen(self.situation, self.twist)
 
     @cached_property
     def held(self) -> Held:
@@ -91,13 +134,17 @@ class Evaluated:
 
 
 def evaluate(
-    model: ErrorModel, block: Block, memory: Memory | None, like: Evaluated | None = None
+    model: Evaluable,
+    block: Block,
+    memory: Memory | None,
+    like: Evaluated | None = None,
+    pose: Configuration | None = None,
 ) -> tuple[Evaluated, Memory]:
     """Evaluate a model over a block.
 
     Parameters
     ----------
-    model : ErrorModel
+    model : Evaluable
         Table and effects.
     block : Block
         n > 0 samples inside the table's domain and load range.
@@ -105,6 +152,8 @@ def evaluate(
         What the block before left, None at the start.
     like : Evaluated, optional
         Of another model at the same block: what they have in common is not computed again.
+    pose : Configuration, optional
+        The configuration of a block of one sample, where it is known.
 
     Returns
     -------
@@ -114,17 +163,18 @@ def evaluate(
         For the next block.
     """
     if like is not None and like.situation.parts is model.parts:
-        at = advanced(replace(like.situation, guess=like.held), NOTHING, like.situation)
+        base = replace(like.situation, guess=like.held, constants=model.constants)
+        at = advanced(base, NOTHING, like.situation)
     else:
         block = with_speeds(block, memory)
-        at = situation_of(model, block, None if memory is None else memory.active)
+        at = situation_of(model, block, None if memory is None else memory.active, pose)
     states = list(memory.states) if memory else [None] * len(model.effects)
     added = [NOTHING] * len(model.effects)
-    warnings = []
+    warnings = list(model.constants.warnings)
     for stage in SAMPLE_STAGES:
         total = at.given
         for number, effect in enumerate(model.effects):
-            if effect.stage != stage:
+            if effect.law.constant or effect.stage != stage:
                 continue
             try:
                 added[number], states[number] = _advanced_by(effect, at, states[number])
@@ -134,31 +184,77 @@ def evaluate(
             warnings += _first_order(effect, added[number])
         if total is not at.given:
             at = advanced(at, total)
-    twist, gap = at.free
-    force, active = solve_contacts(at.operators.approach, gap, at.guess)
-    twist = twist + (at.operators.force_twist @ force[..., None])[..., 0]
-    result = Evaluated(at, twist, seen(at, twist), force, active, tuple(added), tuple(warnings))
+    if pose is not None and at.given.through is None and "operators" not in at.__dict__:
+        twist, force, active = _settled_one(model.single_pose, pose, at)
+    else:
+        twist, gap = at.free
+        force, active = solve_contacts(at.operators.approach, gap, at.guess)
+        twist = twist + (at.operators.force_twist @ force[..., None])[..., 0]
+    result = Evaluated(at, twist, force, active, tuple(added), tuple(warnings))
     return result, Memory(tuple(states), float(block.time[-1]), block.theta[-1], active[-1])
 
 
-def situation_of(model: ErrorModel, block: Block, guess: NDArray[np.bool_] | None) -> Situation:
-    """Return a block at its configurations, before any effect but those on the elastic parts."""
-    configuration = model.table.mechanism.forward(block.theta)
-    if model.evaluation == "spline":
-        operators = model.table.operators_at(configuration, "spline")
+def situation_of(
+    model: Evaluable,
+    block: Block,
+    guess: NDArray[np.bool_] | None,
+    pose: Configuration | None = None,
+) -> Situation:
+    """Return a block at its configurations, before any effect that is not constant."""
+    if pose is None:
+        configuration = model.table.mechanism.forward(block.theta)
     else:
-        operators = contact_operators(configuration, model.parts, model.table.geometry.gravity)
+        configuration = Configuration(*(value[None] for value in vars(pose).values()))
     load = block.load
     if block.load_on_platform:
         halves = load.reshape(-1, 2, 3) @ np.swapaxes(configuration.platform, -1, -2)
         load = halves.reshape(-1, 6)
-    return Situation(block, load, configuration, operators, model.table, model.parts, guess=guess)
+    return Situation(
+        block,
+        load,
+        configuration,
+        model.evaluation,
+        model.table,
+        model.parts,
+        model.constants,
+        guess=guess,
+    )
+
+
+def constants_of(effects: Sequence[Effect], table: Table, parts: ElasticComponents) -> Constants:
+    """Put the constant ones of some effects together, as they are at home."""
+    constants = Constants()
+    chosen = [effect for effect in effects if effect.law.constant]
+    if chosen:
+        block = Block(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 6)), np.zeros((1, 2)))
+        home = table.mechanism.forward(block.theta)
+        at = Situation(block, block.load, home, "closed_form", table, parts)
+        for effect in chosen:
+            added, _ = _advanced_by(effect, at, None)
+            warnings = _first_order(effect, added)
+            constants = constants.with_home(effect.component, added, warnings)
+    return constants
+
+
+def _settled_one(
+    statics: SinglePoseStatics, pose: Configuration, at: Situation
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return twist (1, 6), force (1, m) and contact state (1, m) of one sample."""
+    given = at.given
+    guess = None if at.guess is None else np.asarray(at.guess)
+    limb_1, limb_2, gap = (
+        None if value is None else value[0] for value in (given.limb_1, given.limb_2, given.gap)
+    )
+    twist, force, active = statics.respond(pose, at.wrench[0], guess, limb_1, limb_2, gap)
+    if given.both is not None:
+        twist = twist + given.both[0]
+    return twist[None], force[None], active[None]
 
 
 def advanced(at: Situation, given: Contribution, known: Situation | None = None) -> Situation:
     """Return the situation with what another stage added; its projectors need no new work."""
     later = replace(at, given=given)
-    for name in ("influence", "_turned_flexibility", "speed", "own_weight", "jacobian", "told"):
+    for name in _SHARED:
         if name in (known or at).__dict__:
             later.__dict__[name] = (known or at).__dict__[name]
     return later
@@ -166,7 +262,7 @@ def advanced(at: Situation, given: Contribution, known: Situation | None = None)
 
 def seen(at: Situation, twist: Array) -> Array:
     """Return the twist that the pose sensor reports, log(exp(X) exp(xi) exp(Y)), (n, 6)."""
-    left, right = at.given.sensor_left, at.given.sensor_right
+    left, right = at.sensor
     if left is None and right is None:
         return twist
     rotation, shift = exp_twist(twist)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Configuration
-from wrist_stiffness.mechanism.single_motion import exp_one
+from wrist_stiffness.mechanism.single_motion import exp_one, log_one
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -29,12 +30,14 @@ class Prediction:
         The rigid wrist.
     active : (m,) bool
         Flange sectors in contact.
-    measured : (6,) float
-        What the pose sensor would say of the twist; the same without effects of the sensor.
     model : ErrorModel
         Made the prediction.
+    sensor : pair of (6,) float
+        X and Y of the pose sensor in F [m, rad]; None for nothing.
+    of_parameters : callable, optional
+        Returns the covariance (6, 6) from the effects' parameters.
     added_covariance : (6, 6) float, optional
-        Covariance beyond the model's table: of the effects' parameters, of the load.
+        Covariance beyond the model: of the load.
     warnings : tuple of str
         Effects that were left out or have left first order.
     """
@@ -42,16 +45,36 @@ class Prediction:
     twist: Array
     configuration: Configuration
     active: NDArray[np.bool_]
-    measured: Array
     model: ErrorModel = field(repr=False)
+    sensor: tuple[Array | None, Array | None] = (None, None)
+    of_parameters: Callable[[], Array] | None = field(default=None, repr=False)
     added_covariance: Array | None = None
     warnings: tuple[str, ...] = ()
 
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the twist, (6, 6); made where it is asked for, as a search does not."""
-        own = self.model.table_covariance(self.configuration, self.twist)
-        return own if self.added_covariance is None else own + self.added_covariance
+        covariance = self.model.table_covariance(self.configuration, self.twist)
+        if self.of_parameters is not None:
+            covariance = covariance + self.of_parameters()
+        if self.added_covariance is not None:
+            covariance = covariance + self.added_covariance
+        return covariance
+
+    @cached_property
+    def measured(self) -> Array:
+        """What the pose sensor would say of the twist, (6,) [m, rad]."""
+        left, right = self.sensor
+        if left is None and right is None:
+            return self.twist
+        rotation, shift = exp_one(self.twist)
+        if right is not None:
+            turned, moved = exp_one(right)
+            rotation, shift = rotation @ turned, shift + rotation @ moved
+        if left is not None:
+            turned, moved = exp_one(left)
+            rotation, shift = turned @ rotation, moved + turned @ shift
+        return log_one(rotation, shift)
 
     @property
     def motion(self) -> tuple[Array, Array]:

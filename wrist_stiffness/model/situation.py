@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.influence import Influence, influence
@@ -16,14 +16,16 @@ from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
 from wrist_stiffness.mechanism.statics import (
     ContactOperators,
     component_rotations,
+    contact_operators,
     slides,
     turned_flexibilities,
     weight_response,
 )
 from wrist_stiffness.mechanism.vectors import block_diagonal, dot
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.contacts import Held, forces_of, solve_contacts
-from wrist_stiffness.model.law import NOTHING, Contribution, MissingSignalError
+from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 _TURNING = {"joint_2": ("link_1", "platform"), "joint_3": ("link_3", "platform")}
@@ -43,14 +45,16 @@ class Situation:
         What the load sensor says, in F at O [N, N m].
     configuration : Configuration
         Of shape (n,).
-    operators : ContactOperators
-        Of shape (n,), of the parts as they are with the model's effects.
+    evaluation : str
+        `closed_form` or `spline`.
     table : Table
         Geometry and mechanism.
     parts : ElasticComponents
         Elastic parts as they are with the model's effects.
+    constants : Constants
+        Sum of what the model's constant effects add.
     given : Contribution
-        Sum of what earlier stages added.
+        Sum of what its other effects added in earlier stages.
     guess : (m,) bool or Held or None
         First guess of the contact state.
     """
@@ -58,11 +62,24 @@ class Situation:
     block: Block
     load: Array
     configuration: Configuration
-    operators: ContactOperators
+    evaluation: Evaluation
     table: Table
     parts: ElasticComponents
+    constants: Constants = Constants()
     given: Contribution = NOTHING
     guess: NDArray[np.bool_] | Held | None = None
+
+    @cached_property
+    def operators(self) -> ContactOperators:
+        """Elastic operators of shape (n,), of the parts as they are with the model's effects."""
+        if self.evaluation == "spline":
+            return self.table.operators_at(self.configuration, "spline")
+        return contact_operators(self.configuration, self.parts, self.table.geometry.gravity)
+
+    @cached_property
+    def acting(self) -> Contribution:
+        """All that constant effects and earlier stages added."""
+        return self.given + self.constants.at(self.configuration)
 
     @cached_property
     def influence(self) -> Influence:
@@ -82,7 +99,16 @@ class Situation:
     @property
     def wrench(self) -> Array:
         """Wrench on the platform at O in F with all that earlier stages added, (n, 6) [N, N m]."""
-        return self.load if self.given.wrench is None else self.load + self.given.wrench
+        wrench = self.load
+        for added in (self.constants.wrench, self.given.wrench):
+            wrench = wrench if added is None else wrench + added
+        return wrench
+
+    @property
+    def sensor(self) -> tuple[Array | None, Array | None]:
+        """X and Y of the pose sensor with all that earlier stages added, (n, 6) or (6,) in F."""
+        left, right = self.constants.sensor(self.configuration)
+        return _sum(left, self.given.sensor_left), _sum(right, self.given.sensor_right)
 
     def temperature(self, name: str) -> Array:
         """Return the temperature of a component or of `ambient` above reference, (n,) [K]."""
@@ -131,7 +157,7 @@ class Situation:
     @cached_property
     def free(self) -> tuple[Array, Array]:
         """Twist and gaps under all that earlier stages added, slides free, (n, 6), (n, m)."""
-        (twist, gap), added = self.told, self.carried(self.given)
+        (twist, gap), added = self.told, self.carried(self.acting)
         return twist + added[0], gap + added[1]
 
     @cached_property
@@ -148,7 +174,7 @@ class Situation:
         through = self.own_weight + component_wrenches(
             self.configuration, self.parts, self.wrench, self.contact_force
         )
-        return through if self.given.through is None else through + self.given.through
+        return through if self.acting.through is None else through + self.acting.through
 
     def through_place(self, place: str) -> Array:
         """Return the wrench through a joint, link, motor, the frame or the platform, (n, 6).
@@ -193,7 +219,7 @@ class Situation:
         """Slides of joint_2 to joint_4 under all that earlier stages added, (n, 3) [m]."""
         bent = self.screws_under(self.through, self.contact_force)
         moved = slides(self.influence, bent)
-        relative = _difference(self.given.limb_1, self.given.limb_2)
+        relative = _difference(self.acting.limb_1, self.acting.limb_2)
         if relative is not None:
             moved = moved + (self.influence.slides_limb_1 @ relative[:, :3, None])[..., 0]
         return moved
@@ -321,6 +347,12 @@ def _halves(matrix: Array, six: Array) -> Array:
     """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
     halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
     return halves.reshape(six.shape)
+
+
+def _sum(first: Array | None, second: Array | None) -> Array | None:
+    if first is None or second is None:
+        return second if first is None else first
+    return first + second
 
 
 def _difference(first: Array | None, second: Array | None) -> Array | None:

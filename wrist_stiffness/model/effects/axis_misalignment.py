@@ -37,6 +37,7 @@ class AxisMisalignment(Law):
     sentence = "the axis of {place} misses the centre or is tilted"
     check = "indicate the pin against its neighbours' axes on a coordinate measuring machine"
     excited_by = "poses all over the workspace, without load"
+    constant = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return shifts and tilts along and about the felt directions."""

@@ -22,6 +22,7 @@ class EncoderOffset(Law):
     sentence = "the zero of {place}'s encoder is off"
     check = "drive to the reference mark or a gauge block and compare"
     excited_by = "poses all over the workspace"
+    constant = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the true angle minus the encoder's."""

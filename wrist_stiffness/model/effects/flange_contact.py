@@ -22,6 +22,7 @@ class FlangeContact(Law):
     sentence = "the axial gap of {place} is not as modelled, so its flange touches later or sooner"
     check = "measure the axial play of the joint with a feeler gauge"
     excited_by = "axial forces of both signs at the joint"
+    constant = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the change of the gap."""

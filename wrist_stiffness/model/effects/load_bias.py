@@ -22,6 +22,7 @@ class LoadBias(Law):
     sentence = "the load sensor does not read zero without load"
     check = "tare the sensor; read it with the platform free"
     excited_by = "loads of several directions, and none"
+    constant = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return what the sensor reads without load."""

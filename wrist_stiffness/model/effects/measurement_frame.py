@@ -22,6 +22,7 @@ class MeasurementFrame(Law):
     sentence = "the tracker is registered wrongly to the base"
     check = "register again on the base's datum points"
     excited_by = "poses all over the workspace"
+    constant = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the screw."""

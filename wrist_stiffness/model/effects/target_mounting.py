@@ -20,6 +20,7 @@ class TargetMounting(Law):
     sentence = "the target sits on the platform otherwise than believed"
     check = "measure the target against the platform's datum; look whether it is loose"
     excited_by = "poses all over the workspace"
+    constant = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the screw."""
