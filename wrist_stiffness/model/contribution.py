@@ -1,0 +1,85 @@
+"""What one effect adds at every sample, and the word for a signal that it lacks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one effect adds at n samples; everything at O in F, None for nothing.
+
+    Parameters
+    ----------
+    limb_1, limb_2 : (n, 6) float, optional
+        Screw in a limb, carried by its G and its rows of the slides [m, rad].
+    both : (n, 6) float, optional
+        Screw under or behind both limbs [m, rad].
+    wrench : (n, 6) float, optional
+        On the platform [N, N m].
+    through : (n, 8, 6) float, optional
+        Further wrench through the elastic components, in the order of `ELASTIC` [N, N m].
+    gap : (n, m) float, optional
+        Opening of the flange sectors [m].
+    sensor_left, sensor_right : (n, 6) float, optional
+        Twists X and Y of the pose sensor, T_measured = exp(X) T_err exp(Y) T_nominal [m, rad].
+    """
+
+    limb_1: Array | None = None
+    limb_2: Array | None = None
+    both: Array | None = None
+    wrench: Array | None = None
+    through: Array | None = None
+    gap: Array | None = None
+    sensor_left: Array | None = None
+    sensor_right: Array | None = None
+
+    def __add__(self, other: Contribution) -> Contribution:
+        """Return both together; to first order they do not know of each other."""
+        return Contribution(
+            *(_added(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        )
+
+    def check(self, samples: int, sectors: int) -> None:
+        """Refuse arrays of other shapes than n samples and m sectors ask for, or not finite.
+
+        Raises
+        ------
+        InputError
+            The message names the field.
+        """
+        shapes = {"through": (samples, 8, 6), "gap": (samples, sectors)}
+        for name in (f.name for f in fields(self)):
+            value, shape = getattr(self, name), shapes.get(name, (samples, 6))
+            if value is not None and np.shape(value) != shape:
+                raise InputError(f"{name} has shape {np.shape(value)}, not {shape}")
+            if value is not None and not np.isfinite(value).all():
+                raise InputError(f"{name} is not finite")
+
+
+def _added(a: Array | None, b: Array | None) -> Array | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return a + b
+
+
+NOTHING = Contribution()
+
+
+class MissingSignalError(Exception):
+    """A law asks for a signal that the samples do not have; the evaluation turns it to a warning.
+
+    Parameters
+    ----------
+    signal : str
+        What is missing.
+    """
+
+    def __init__(self, signal: str) -> None:
+        super().__init__(signal)
+        self.signal = signal
