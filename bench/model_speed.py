@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from wrist_stiffness.campaign.free_effects import commissioning
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -65,16 +66,25 @@ def main(samples: int) -> None:
     block = recording(samples)
     theta, load = block.theta[7], Load(block.load[7])
     sample = Sample(0.0, theta, load, temperatures={"ambient": 21.0})
+    free, _ = commissioning(plain)
+    calibrated = plain.with_effects(*(plausible(each.effect.name) for each in free))
+    extended = calibrated.with_effects(*calibrated.effects, plausible("backlash@motor_1"))
     session, bare = typical.session(), plain.session()
     one = microseconds(lambda: plain.predict(theta, load))
-    print(f"{'':44}{'us':>9}{'ratio':>8}")
+    print(f"{'':48}{'us':>9}{'ratio':>8}")
 
     def line(name: str, value: float) -> None:
-        print(f"{name:44}{value:9.1f}{value / one:8.2f}", flush=True)
+        print(f"{name:48}{value:9.1f}{value / one:8.2f}", flush=True)
 
     line("one sample without effects, predict", one)
     line("one sample without effects, session", microseconds(lambda: bare.advance(sample)))
     line("one sample with three effects, session", microseconds(lambda: session.advance(sample)))
+    for name, model in (
+        (f"one sample with the {len(free)} of a calibration", calibrated),
+        ("the same and backlash", extended),
+    ):
+        own = model.session()
+        line(f"{name}, session", microseconds(lambda own=own: own.advance(sample)))
     line(f"recording of {samples}, per sample", batch_microseconds(plain, block))
     line("the same with three effects", batch_microseconds(typical, block))
     few = block.take(slice(0, CANDIDATES))

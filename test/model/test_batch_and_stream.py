@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wrist_stiffness.errors import InputError, LoadRangeError, UnreachablePoseError
 from wrist_stiffness.mechanism.contact import solve_contact
-from wrist_stiffness.model import error_model
+from wrist_stiffness.model import batch
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.contacts import solve_contacts
 from wrist_stiffness.model.effect import Effect
@@ -72,6 +72,29 @@ def test_session_is_the_batch_sample_by_sample(model, make, name, place):
     assert np.linalg.eigvalsh(prediction.covariance).min() > -1e-20
 
 
+def test_constant_effects_are_the_same_together_as_one_by_one(model, make, monkeypatch):
+    """Screws, wrench, gaps and sensor, put together at home, beside laws that see them."""
+    constant = [place for place in PLACED if catalogue()[place[0]].constant]
+    assert {name for name, _ in constant} > {"load_bias", "flange_contact", "target_mounting"}
+    beside = (("backlash", "motor_1"), ("joint_clearance", "joint_3"), ("drift", "pose_sensor"))
+    block = make.block(10)
+    for others in ((), beside[:1], beside):
+        loaded = model.with_effects(*(plausible(*place) for place in (*constant, *others)))
+        session, found = loaded.session(), loaded.batch(block)
+        streamed = [session.advance(sample_of(block, row)) for row in range(len(block))]
+        with monkeypatch.context() as patch:
+            for name, _ in constant:
+                patch.setattr(type(catalogue()[name]), "constant", False)
+            apart = loaded.with_effects(*loaded.effects).batch(block)
+        for key in ("twist", "measured"):
+            expected = getattr(apart, key)
+            scale = np.abs(expected).max(axis=0)
+            assert np.all(np.abs(getattr(found, key) - expected) <= 1e-12 * scale)
+            live = np.array([getattr(each, key) for each in streamed])
+            assert np.all(np.abs(live - expected) <= 1e-12 * scale)
+        assert set(apart.warnings) == set(found.warnings) == set(streamed[-1].warnings)
+
+
 def test_preview_leaves_no_trace(model, make):
     loaded = model.with_effects(
         make.effect("backlash@motor_1", width_mdeg=(50.0, 1.0)),
@@ -101,7 +124,7 @@ def sample_of(block, row):
 
 def test_chunks_do_not_show(whole, monkeypatch):
     loaded, block, at_once = whole
-    monkeypatch.setattr(error_model, "CHUNK", 7)
+    monkeypatch.setattr(batch, "CHUNK", 7)
     in_chunks = loaded.batch(block)
     scale = np.abs(at_once.twist).max(axis=0)
     assert np.all(np.abs(in_chunks.twist - at_once.twist) <= 1e-12 * scale)

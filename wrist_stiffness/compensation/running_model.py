@@ -20,7 +20,7 @@ JUMP_S = 1.0
 class RunningModel:
     """One model and one stream of samples.
 
-    Without effects there is nothing to remember, and samples may come in any order.
+    Where effects are constant there is nothing to remember, and samples may come in any order.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class RunningModel:
         self.model = model
         self._temperatures = temperatures
         self._covariates = covariates
-        self._session: Session | None = model.session() if model.effects else None
+        self._session: Session | None = None if model.stateless else model.session()
         self._last_ns = 0
         self._active: NDArray[np.bool_] | None = None
 

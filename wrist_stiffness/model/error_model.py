@@ -16,6 +16,7 @@ from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
+from wrist_stiffness.model.batch import predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.effect import Effect
@@ -24,9 +25,6 @@ from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.situation import lengths
-
-CHUNK = 2048
-"""Samples evaluated at a time: about 150 MB of operators with 24 flange sectors."""
 
 
 @dataclass(frozen=True)
@@ -246,23 +244,7 @@ class ErrorModel:
         for model in models[1:]:
             if model._changes_of_parts == models[0]._changes_of_parts:
                 model.__dict__["parts"] = models[0].parts
-        accepted = self.accepts(block)
-        usable, rows = block.take(accepted), np.flatnonzero(accepted)
-        twists, measured = np.full((2, len(models), len(block), 6), np.nan)
-        memories: list[Memory | None] = [None] * len(models)
-        warnings: list[dict[str, None]] = [{} for _ in models]
-        for start in range(0, len(usable), CHUNK):
-            part = slice(start, start + CHUNK)
-            first = None
-            for i, model in enumerate(models):
-                result, memories[i] = evaluate(model, usable.take(part), memories[i], first)
-                first = first or result
-                twists[i, rows[part]], measured[i, rows[part]] = result.twist, result.measured
-                warnings[i].update(dict.fromkeys(result.warnings))
-        return [
-            BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]))
-            for i in range(len(models))
-        ]
+        return predicted(models, block, self.accepts(block))
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
         """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""
