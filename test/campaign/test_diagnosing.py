@@ -20,7 +20,7 @@ from wrist_stiffness.simulation.instrument import instrument
 
 QUICK = Settings(permutations=299)
 RECORDINGS = Path(__file__).parents[1] / "data"
-SECONDS = 60.0
+SECONDS = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, blank):
     fitted = found.effects[0].estimates["width_mdeg"].value
     assert abs(value - 1e3 * np.degrees(width)) < 3.0 * error
     assert abs(fitted - 1e3 * np.degrees(width)) < 3.0 * error
-    # A hidden encoder count is 4 mdeg, and a minute has some ten dwells for each side.
+    # A hidden encoder count is 4 mdeg, and two minutes have some ten dwells for each side.
     assert error < 5.0
     assert found.diagnosis.after["phi_mdeg"] < 0.5 * found.diagnosis.before["phi_mdeg"]
 
