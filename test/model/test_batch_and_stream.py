@@ -79,12 +79,13 @@ def test_constant_effects_are_the_same_together_as_one_by_one(model, make, monke
     far = Effect(catalogue()["encoder_offset"], "motor_1", {"offset_mdeg": Estimate(300.0)})
     beside = (
         ("encoder_eccentricity", "motor_1"),
-        ("backlash", "motor_2"),
+        ("thermal_expansion", "link_1"),
+        ("thermal_expansion", "link_2"),
         ("drift", "pose_sensor"),
         ("joint_clearance", "joint_3"),
     )
     block = make.block(10)
-    for others in ((), beside[:3], beside):
+    for others in ((), beside[:4], beside):
         rest = [plausible(*place) for place in (*constant, *others)]
         loaded = model.with_effects(far, *(each for each in rest if each.name != far.name))
         session, found = loaded.session(), loaded.batch(block)
