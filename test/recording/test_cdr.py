@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
+from wrist_stiffness.recording.fixed_layout import FixedLayout, FixedReader
 from wrist_stiffness.recording.messages import (
     MESSAGE_TYPES,
     DiagnosticArray,
@@ -295,3 +296,83 @@ def test_equal_sizes_with_other_lengths_inside_are_kept_apart():
     assert len(encode(first)) == len(encode(second))
     batches, _ = decode_batches(JointState, [encode(first), encode(second)])
     assert [batch.first for batch in batches] == [first, second]
+
+
+def numbers_of(value):
+    """Return all numbers of a message in the order of the wire, a time as two of them."""
+    if dataclasses.is_dataclass(value):
+        found = []
+        for item in fields_of(value.ros_type):
+            part = getattr(value, item.attribute)
+            of_time = item.element in SECONDS_NANOSECONDS
+            found += divmod(part, 10**9) if of_time else numbers_of(part)
+        return found
+    if isinstance(value, tuple):
+        return [number for item in value for number in numbers_of(item)]
+    return [] if isinstance(value, str) else [value]
+
+
+@BY_NAME
+@pytest.mark.parametrize("little_endian", [True, False], ids=["little", "big"])
+def test_a_reader_gives_the_texts_and_numbers_of_decode(ros_type, little_endian):
+    message_type = MESSAGE_TYPES[ros_type]
+
+    @FEW
+    @given(st.lists(messages(ros_type), min_size=1, max_size=12), st.integers(1, 3))
+    def check(several, repeats):
+        reader = FixedReader(message_type)
+        for message in several * repeats:
+            original = foreign(message, rosbags_message)
+            payload = TYPESTORE.serialize_cdr(original, ros_type, little_endian=little_endian)
+            like, numbers = reader.read(bytes(payload))
+            assert structure(like) == structure(message)
+            np.testing.assert_array_equal(numbers, numbers_of(message))
+
+    check()
+
+
+@BY_NAME
+def test_a_layout_writes_what_encode_writes(ros_type):
+    @FEW
+    @given(messages(ros_type), st.randoms(use_true_random=False))
+    def check(message, random):
+        layout = FixedLayout.of(message)
+        assert layout.payload(*numbers_of(message)) == encode(message)
+        other = [type(each)(random.getrandbits(7)) for each in numbers_of(message)]
+        assert list(layout.numbers(layout.payload(*other))) == other
+        assert layout.matches(layout.payload(*other))
+
+    check()
+
+
+@BY_NAME
+def test_a_layout_matches_nothing_whose_texts_or_lengths_differ(ros_type):
+    @FEW
+    @given(messages(ros_type), messages(ros_type))
+    def check(one, other):
+        same = structure(one) == structure(other)
+        assert FixedLayout.of(one).matches(encode(other)) == same
+
+    check()
+
+
+def test_a_payload_in_which_only_padding_differs_is_no_new_layout():
+    payload = bytearray(encode(JointState(Header(1, "ab"), ("m",), (1.5,))))
+    layout = FixedLayout(JointState, bytes(payload))
+    assert payload[15 + 4] == 0
+    payload[15 + 4] = 0xAA
+    assert layout.matches(bytes(payload))
+
+
+def test_senders_that_take_turns_are_laid_out_once_each():
+    reader = FixedReader(JointState)
+    payloads = [encode(JointState(Header(i, f"f{i % 8}"), ("a",), (float(i),))) for i in range(40)]
+    firsts = {id(reader.read(payload)[0]) for payload in payloads}
+    assert len(firsts) == FixedReader.LAYOUTS
+
+
+@pytest.mark.parametrize("numbers", [(), (1, 2, 3.0, 4.0), (2**31, 0, 1.0), (0, 0, "x")], ids=str)
+def test_numbers_that_do_not_fit_a_layout_are_refused(numbers):
+    layout = FixedLayout.of(JointState(Header(0, "f"), ("m",), (1.0,)))
+    with pytest.raises(RecordingError, match="sensor_msgs/msg/JointState cannot be encoded"):
+        layout.payload(*numbers)

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, WrenchStamped
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -23,6 +24,7 @@ from wrist_stiffness.ros import wrist_node
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, nanoseconds, time_message
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
+from wrist_stiffness.ros.qos import RELIABLE_QOS
 
 SECOND = 1_000_000_000
 THETA = (0.1, -0.2)
@@ -289,3 +291,20 @@ def test_a_message_without_a_stamp_has_no_load(graph, predictor):
     graph.publish("/joint_states", joint_message(0, "", NAMES, np.array(THETA)))
     _, values = graph.status(PREDICTOR, lambda status, values: "refused StaleLoadError" in values)
     assert "has no stamp" in values["last fault"]
+
+
+@pytest.mark.parametrize("topic", ["/joint_states", "/load_estimate"])
+def test_a_payload_that_cannot_be_read_is_told_and_the_next_one_is_answered(
+    graph, predictor, topic
+):
+    kind = {"/joint_states": JointState, "/load_estimate": WrenchStamped}[topic]
+    damaged = graph.probe.create_publisher(kind, topic, RELIABLE_QOS)
+    graph.until(damaged.get_subscription_count, "subscription")
+    damaged.publish(serialize_message(kind())[:14])
+    graph.until(lambda: predictor.health.faults == 1, "fault")
+    graph.status(
+        PREDICTOR, lambda status, values: kind.__name__ in values.get("last RecordingError", "")
+    )
+    send_load(graph, predictor, SECOND)
+    graph.joints("/joint_states", SECOND)
+    wait_for(graph, PREDICTED, 1)

@@ -83,7 +83,7 @@ def decode_batches(
             undecodable.append(int(remaining[0]))
             remaining = remaining[1:]
             continue
-        layout = _layout_of(message_type, template)
+        layout = layout_of(message_type, template)
         same_length = remaining[lengths[remaining] == len(template)]
         if len(batches) >= _MAX_LAYOUTS:
             same_length = remaining[:1]
@@ -101,26 +101,44 @@ def decode_batches(
 
 
 @dataclass(frozen=True)
-class _Leaf:
+class Leaf:
+    """A number, a time or a run of numbers: dotted path, type, byte in the body, how many."""
+
     path: str
     element: str
     offset: int
     count: int | None
 
 
-class _Layout:
-    """Where the numbers are in a payload, and which bytes say that they are there."""
+class Layout:
+    """Where the numbers are in a payload, and which bytes say that they are there.
+
+    Parameters
+    ----------
+    byte_order : str
+        ``<`` or ``>``.
+    size : int
+        Of the payload.
+
+    Attributes
+    ----------
+    fixed : (size,) bool array
+        Bytes of the encapsulation, of texts and of lengths; the others are numbers or padding.
+    leaves : list[Leaf]
+        The numbers in the order of the wire.
+    """
 
     def __init__(self, byte_order: ByteOrder, size: int):
         self.byte_order = byte_order
         self.fixed = np.zeros(size, dtype=bool)
         self.fixed[:ENCAPSULATION_SIZE] = True
-        self.leaves: list[_Leaf] = []
+        self.leaves: list[Leaf] = []
 
     def columns(self, rows: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+        """Return the numbers of payloads (m, size) by path."""
         return {leaf.path: self._column(rows, leaf) for leaf in self.leaves}
 
-    def _column(self, rows: NDArray[np.uint8], leaf: _Leaf) -> NDArray[Any]:
+    def _column(self, rows: NDArray[np.uint8], leaf: Leaf) -> NDArray[Any]:
         if leaf.element in SECONDS_NANOSECONDS:
             seconds = self._numbers(rows, leaf.offset, "i", 4, 1)[:, 0].astype(np.int64)
             nanoseconds = self._numbers(rows, leaf.offset + 4, "I", 4, 1)[:, 0]
@@ -140,14 +158,14 @@ class _Layout:
         return numbers.astype(numbers.dtype.newbyteorder("="))
 
 
-def _layout_of(message_type: type[Message], payload: bytes) -> _Layout:
+def layout_of(message_type: type[Message], payload: bytes) -> Layout:
     """Return the layout of a payload that `decode` accepts."""
-    layout = _Layout(byte_order_of(message_type, payload), len(payload))
+    layout = Layout(byte_order_of(message_type, payload), len(payload))
     _add_message(layout, message_type.ros_type, payload[ENCAPSULATION_SIZE:], 0, "")
     return layout
 
 
-def _add_message(layout: _Layout, ros_type: str, body: bytes, offset: int, prefix: str) -> int:
+def _add_message(layout: Layout, ros_type: str, body: bytes, offset: int, prefix: str) -> int:
     for field in fields_of(ros_type):
         path = prefix + field.attribute
         if not field.is_sequence and not field.count:
@@ -162,12 +180,12 @@ def _add_message(layout: _Layout, ros_type: str, body: bytes, offset: int, prefi
         elif count:
             size = PRIMITIVES[field.element].size
             offset += padding(offset, size)
-            layout.leaves.append(_Leaf(path, field.element, offset, count))
+            layout.leaves.append(Leaf(path, field.element, offset, count))
             offset += size * count
     return offset
 
 
-def _add_element(layout: _Layout, element: str, body: bytes, offset: int, path: str) -> int:
+def _add_element(layout: Layout, element: str, body: bytes, offset: int, path: str) -> int:
     if element == "string":
         length, offset = _add_length(layout, body, offset)
         begin = ENCAPSULATION_SIZE + offset
@@ -176,12 +194,12 @@ def _add_element(layout: _Layout, element: str, body: bytes, offset: int, path: 
     if element in PRIMITIVES or element in SECONDS_NANOSECONDS:
         align, size = (4, 8) if element in SECONDS_NANOSECONDS else (PRIMITIVES[element].size,) * 2
         offset += padding(offset, align)
-        layout.leaves.append(_Leaf(path, element, offset, None))
+        layout.leaves.append(Leaf(path, element, offset, None))
         return offset + size
     return _add_message(layout, element, body, offset, path + ".")
 
 
-def _add_length(layout: _Layout, body: bytes, offset: int) -> tuple[int, int]:
+def _add_length(layout: Layout, body: bytes, offset: int) -> tuple[int, int]:
     offset += padding(offset, 4)
     begin = ENCAPSULATION_SIZE + offset
     layout.fixed[begin : begin + 4] = True

@@ -19,9 +19,16 @@ from wrist_stiffness.compensation.parameters import CORRECTION, correction_setti
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.ros.conversions import error_message, nanoseconds
+from wrist_stiffness.ros.conversions import nanoseconds
 from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.stream_messages import (
+    JointSample,
+    angles_payload,
+    error_payload,
+    joint_payload,
+    joint_reader,
+)
 from wrist_stiffness.ros.wrist_node import WristNode
 
 
@@ -93,27 +100,25 @@ class AngleCorrector(WristNode):
     def make_inputs(self) -> list[Subscription]:
         """Listen to commands."""
         return [
-            self.hear(JointState, "/motor_commands", self._on_command, COMMAND_QOS),
+            self.hear_bytes(
+                JointState, "/motor_commands", joint_reader(), self._on_command, COMMAND_QOS
+            ),
             self.hear(JointTrajectory, "/motor_trajectory", self._on_trajectory, COMMAND_QOS),
         ]
 
-    def _on_command(self, message: JointState) -> None:
-        stamp_ns = nanoseconds(message.header.stamp)
+    def _on_command(self, joints: JointSample) -> None:
+        stamp_ns = joints.stamp_ns
         try:
             command = self.stream.on_command(
-                stamp_ns,
-                message.header.frame_id,
-                message.name,
-                message.position,
-                message.velocity,
+                stamp_ns, joints.frame_id, joints.names, joints.positions, joints.velocities
             )
         except WristError as error:
             self.warn(error)
             return
-        message.header.frame_id = command.frame_id
-        message.position = command.positions
-        self._command.publish(message)
-        self._positions.publish(Float64MultiArray(data=command.theta))
+        positions = tuple(command.positions.tolist())
+        sent = joints._replace(frame_id=command.frame_id, positions=positions)
+        self._command.publish(joint_payload(sent))
+        self._positions.publish(angles_payload(command.theta))
         if command.fault is not None:
             self.warn(command.fault)
             return
@@ -124,10 +129,10 @@ class AngleCorrector(WristNode):
 
     def _publish_residual(self, stamp_ns: int, correction: Correction) -> None:
         twist, prediction = correction.after, correction.prediction
-        self._residual.publish(error_message(stamp_ns, twist, prediction.covariance))
+        self._residual.publish(error_payload(stamp_ns, twist, prediction.covariance))
         at_task_point = self.stream.residual_at_task_point(correction)
         if at_task_point is not None:
-            self._task_residual.publish(error_message(stamp_ns, *at_task_point))
+            self._task_residual.publish(error_payload(stamp_ns, *at_task_point))
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         # A zero stamp says "at once".

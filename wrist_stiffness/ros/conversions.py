@@ -9,7 +9,6 @@ from geometry_msgs.msg import (
     Point,
     Pose,
     PoseStamped,
-    PoseWithCovarianceStamped,
     Quaternion,
     Vector3,
     WrenchStamped,
@@ -19,7 +18,6 @@ from sensor_msgs.msg import JointState
 
 from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.mechanism.components import Array
 
 
@@ -50,21 +48,6 @@ def pose_message(position: Array, quaternion: Array) -> Pose:
     x, y, z = position.tolist()
     a, b, c, w = quaternion.tolist()
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=w))
-
-
-def error_message(stamp_ns: int, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
-    """Return a pose error in `wrist_base` from a twist (6,) and its covariance (6, 6)."""
-    message = PoseWithCovarianceStamped()
-    header, pose = message.header, message.pose.pose
-    # Filled in place: new parts would be made, checked and copied for each sample.
-    header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, NANOSECONDS)
-    header.frame_id = BASE_FRAME
-    place, turn = pose_of_twist(twist)
-    to, by = pose.position, pose.orientation
-    to.x, to.y, to.z = place.tolist()
-    by.x, by.y, by.z, by.w = turn.tolist()
-    message.pose.covariance = covariance.ravel()
-    return message
 
 
 def pose_message_stamped(stamp_ns: int, rotation: Array, position: Array) -> PoseStamped:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from sensor_msgs.msg import JointState
-
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.ros.conversions import nanoseconds
+from wrist_stiffness.ros.stream_messages import JointSample
 
 
 class LoadWait:
@@ -28,17 +26,17 @@ class LoadWait:
     def __init__(self, limit_s: float, clock_ns: Callable[[], int]) -> None:
         self._limit_ns = round(limit_s * NANOSECONDS)
         self._clock_ns = clock_ns
-        self._waiting: deque[tuple[int, JointState]] = deque()
+        self._waiting: deque[tuple[int, JointSample]] = deque()
 
     def __len__(self) -> int:
         """Return how many wait."""
         return len(self._waiting)
 
-    def put(self, message: JointState) -> None:
+    def put(self, joints: JointSample) -> None:
         """Add a joint state."""
-        self._waiting.append((self._clock_ns() + self._limit_ns, message))
+        self._waiting.append((self._clock_ns() + self._limit_ns, joints))
 
-    def ready(self, newest_load_ns: int | None) -> Iterator[JointState]:
+    def ready(self, newest_load_ns: int | None) -> Iterator[JointSample]:
         """Take out and yield what need not wait any longer.
 
         Parameters
@@ -48,16 +46,14 @@ class LoadWait:
 
         Yields
         ------
-        JointState
+        JointSample
             In order of arrival.
         """
         now_ns = self._clock_ns()
         while self._waiting:
-            deadline_ns, message = self._waiting[0]
-            has_load = (
-                newest_load_ns is not None and nanoseconds(message.header.stamp) <= newest_load_ns
-            )
+            deadline_ns, joints = self._waiting[0]
+            has_load = newest_load_ns is not None and joints.stamp_ns <= newest_load_ns
             if not has_load and now_ns < deadline_ns:
                 return
             self._waiting.popleft()
-            yield message
+            yield joints

@@ -20,10 +20,11 @@ from wrist_stiffness.compensation.monitor_stream import (
 from wrist_stiffness.compensation.parameters import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.ros.conversions import error_message, nanoseconds, pose_numbers, three
+from wrist_stiffness.ros.conversions import nanoseconds, pose_numbers, three
 from wrist_stiffness.ros.parameters import values_of
 from wrist_stiffness.ros.qos import ALARM_QOS, RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.stream_messages import JointSample, error_payload, joint_reader
 from wrist_stiffness.ros.wrist_node import WristNode
 
 
@@ -85,17 +86,19 @@ class ModelMonitor(WristNode):
         if self.get_parameter("pose_type").value == POSE_TYPES[1]:
             pose = (PoseWithCovarianceStamped, self._on_pose_with_covariance)
         return [
-            self.hear(JointState, "/joint_states", self._on_joints, SENSOR_QOS),
+            self.hear_bytes(
+                JointState, "/joint_states", joint_reader(), self._on_joints, SENSOR_QOS
+            ),
             # The frame before the platform: it is taken out of the pose of the same stamp.
             self.hear(PoseStamped, "/frame_pose_measured", self._on_frame_pose, SENSOR_QOS),
             self.hear(pose[0], "/platform_pose_measured", pose[1], SENSOR_QOS),
             self.hear(PoseArray, "/platform_markers_measured", self._on_markers, SENSOR_QOS),
         ]
 
-    def _on_joints(self, message: JointState) -> None:
+    def _on_joints(self, joints: JointSample) -> None:
         try:
             self.stream.on_joint_state(
-                nanoseconds(message.header.stamp), message.name, message.position, message.velocity
+                joints.stamp_ns, joints.names, joints.positions, joints.velocities
             )
         except WristError as error:
             self.warn(error)
@@ -132,7 +135,7 @@ class ModelMonitor(WristNode):
         # What is not measured is sent as zero with a huge variance: poses cannot carry a NaN.
         residual = np.nan_to_num(judged.residual)
         covariance = judged.covariance + np.diag(NOT_MEASURED * np.isnan(judged.residual))
-        self._residual.publish(error_message(stamp_ns, residual, covariance))
+        self._residual.publish(error_payload(stamp_ns, residual, covariance))
         self._alarm.publish(Bool(data=self.stream.monitor.alarm))
         self.health.good()
 

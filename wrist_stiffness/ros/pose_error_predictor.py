@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from math import hypot
 from typing import Any
 
 import numpy as np
@@ -22,11 +21,16 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.error_model import Prediction
-from wrist_stiffness.ros.conversions import error_message, nanoseconds
 from wrist_stiffness.ros.load_wait import LoadWait
 from wrist_stiffness.ros.markers import wrist_markers
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
 from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.stream_messages import (
+    JointSample,
+    error_payload,
+    joint_reader,
+    number_payload,
+)
 from wrist_stiffness.ros.wrist_node import WristNode
 
 MICROMETRES = 1e6
@@ -79,33 +83,35 @@ class PoseErrorPredictor(WristNode):
 
     def make_inputs(self) -> list[Subscription]:
         """Listen to the motors."""
-        return [self.hear(JointState, "/joint_states", self._on_joint_state, SENSOR_QOS)]
+        return [
+            self.hear_bytes(
+                JointState, "/joint_states", joint_reader(), self._on_joint_state, SENSOR_QOS
+            )
+        ]
 
-    def _on_joint_state(self, message: JointState) -> None:
-        self.waiting.put(message)
+    def _on_joint_state(self, joints: JointSample) -> None:
+        self.waiting.put(joints)
         self.after_load()
 
     def after_load(self) -> None:
         """Predict for the joint states that need not wait any longer."""
-        for message in self.waiting.ready(self.stream.loads.history.newest_ns):
-            self._predict(message)
+        for joints in self.waiting.ready(self.stream.loads.history.newest_ns):
+            self._predict(joints)
 
-    def _predict(self, message: JointState) -> None:
-        stamp_ns = nanoseconds(message.header.stamp)
+    def _predict(self, joints: JointSample) -> None:
+        stamp_ns = joints.stamp_ns
         try:
             prediction = self.stream.on_joint_state(
-                stamp_ns, message.name, message.position, message.velocity
+                stamp_ns, joints.names, joints.positions, joints.velocities
             ).prediction
         except WristError as error:
             self.warn(error)
             return
-        error_out = error_message(stamp_ns, prediction.twist, prediction.covariance)
-        self._error.publish(error_out)
+        self._error.publish(error_payload(stamp_ns, prediction.twist, prediction.covariance))
         if self._s_um.get_subscription_count():
-            shift = error_out.pose.pose.position
-            self._s_um.publish(Float64(data=hypot(shift.x, shift.y, shift.z) * MICROMETRES))
+            self._s_um.publish(number_payload(prediction.shift_norm * MICROMETRES))
         if self._phi_mdeg.get_subscription_count():
-            self._phi_mdeg.publish(Float64(data=prediction.phi * MILLIDEGREES))
+            self._phi_mdeg.publish(number_payload(prediction.phi * MILLIDEGREES))
         self.health.good()
         self.left_out = prediction.warnings
         self._draw(stamp_ns, prediction)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -34,13 +34,16 @@ from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros import static_transforms
-from wrist_stiffness.ros.conversions import nanoseconds, three
+from wrist_stiffness.ros.conversions import nanoseconds
 from wrist_stiffness.ros.executor import DataGroup
 from wrist_stiffness.ros.health import Health
 from wrist_stiffness.ros.parameters import declare, model_path, values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS, STATIC_QOS
+from wrist_stiffness.ros.stream_messages import WrenchSample, wrench_reader
 
 REPORT_EVERY_S = 1.0
+
+Numbers = TypeVar("Numbers")
 
 
 class WristNode(LifecycleNode):
@@ -145,7 +148,9 @@ class WristNode(LifecycleNode):
                 if transforms is None
                 else [self.hear(transforms, "/tf_static", self._on_tf_static, STATIC_QOS)]
             ),
-            self.hear(WrenchStamped, "/load_estimate", self._on_load, SENSOR_QOS),
+            self.hear_bytes(
+                WrenchStamped, "/load_estimate", wrench_reader(), self._on_load, SENSOR_QOS
+            ),
             self.hear(Temperature, "/temperatures", self._on_temperature, SENSOR_QOS),
             *(
                 self.hear(
@@ -175,16 +180,52 @@ class WristNode(LifecycleNode):
             message_type, topic, callback, qos, callback_group=self._data_group
         )
 
+    def hear_bytes(
+        self,
+        message_type: type,
+        topic: str,
+        read: Callable[[bytes], Numbers],
+        callback: Callable[[Numbers], None],
+        qos: QoSProfile,
+    ) -> Subscription:
+        """Subscribe to a part of the stream that is too quick for rclpy's message objects.
+
+        Parameters
+        ----------
+        message_type : type
+            Of the topic.
+        topic : str
+            Its name.
+        read : callable
+            Takes a payload apart; raises WristError where that is not possible, a fault.
+        callback : callable
+            Takes what was read.
+        qos : QoSProfile
+            Of the subscription.
+
+        Returns
+        -------
+        Subscription
+            To be destroyed when the node no longer listens.
+        """
+
+        def on_payload(payload: bytes) -> None:
+            try:
+                numbers = read(payload)
+            except WristError as error:
+                self.warn(error)
+                return
+            callback(numbers)
+
+        return self.create_subscription(
+            message_type, topic, on_payload, qos, callback_group=self._data_group, raw=True
+        )
+
     # Inputs that all nodes have
 
-    def _on_load(self, message: WrenchStamped) -> None:
+    def _on_load(self, load: WrenchSample) -> None:
         try:
-            self.stream.loads.add(
-                nanoseconds(message.header.stamp),
-                message.header.frame_id,
-                three(message.wrench.force),
-                three(message.wrench.torque),
-            )
+            self.stream.loads.add(*load)
         except WristError as error:
             self.warn(error)
         else:
