@@ -102,7 +102,7 @@ class Riddle:
         With magnitudes; likewise.
     days : (Day, Day)
         Two days of the same wrist.
-    bare : (Session, Session)
+    bare_days : (Day, Day)
         The same days, noise for noise, of the same wrist without the hidden effects: for scores
         and for the baseline that is told.
     parts : dict of str to float
@@ -112,8 +112,13 @@ class Riddle:
     case: Case
     hidden: tuple[HiddenEffect, ...]
     days: tuple[Day, Day]
-    bare: tuple[Session, Session]
+    bare_days: tuple[Day, Day]
     parts: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def bare(self) -> tuple[Session, Session]:
+        """Units of the days without the hidden effects."""
+        return self.bare_days[0].units, self.bare_days[1].units
 
     @property
     def train(self) -> Session:
@@ -292,8 +297,8 @@ def pose_riddle(case: Case) -> Riddle:
     hidden = hidden_effects(case)
     one, two = (observe(case, hidden, session) for session in (0, 1))
     if not hidden:
-        return Riddle(case, hidden, (one, two), (one.units, two.units))
-    bare = tuple(observe(case, (), session).units for session in (0, 1))
+        return Riddle(case, hidden, (one, two), (one, two))
+    bare = tuple(observe(case, (), session) for session in (0, 1))
     parts = {}
     if case.ordinary:
         for number, each in enumerate(hidden):

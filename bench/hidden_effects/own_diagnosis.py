@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from bench_wrist import Array, wrist
+from cases import ABSORBED
 from dictionary import Dictionary
 from observe import Day, Riddle, noise_seed, settings_of
 from solvers import Answer
 
+from wrist_stiffness.campaign.base_fit import BaseFit, fit_base
 from wrist_stiffness.campaign.diagnosing import diagnose_sessions
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.reading import read_session
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.workflows.simulate import simulate_recording
 
 
 def own_diagnosis(riddle: Riddle, words: Dictionary | None = None) -> Answer:
-    """Diagnose the first day as it was recorded; its findings predict both days.
+    """Diagnose the first day as it was recorded; the refitted wrist with the findings predicts.
 
     The session holds what a recording holds.  No word of the simulation is looked at.
     """
@@ -43,7 +48,7 @@ def diagnosed(riddle: Riddle, session: MeasuredSession) -> Answer:
     model = ErrorModel("benchmark", wrist(), "closed_form")
     found = diagnose_sessions(model, [session], np.random.default_rng(riddle.case.seed))
     result = found.diagnosis
-    extended = model.with_effects(*found.effects)
+    extended = model.with_effects(*refitted(found.base, found.effects), *found.effects)
     one, two = (predicted(extended, day) for day in riddle.days)
     return Answer(
         result.verdict,
@@ -51,6 +56,28 @@ def diagnosed(riddle: Riddle, session: MeasuredSession) -> Answer:
         (one, two),
         tuple(f"{each.effect}@{each.component}" for each in result.not_excited),
     )
+
+
+def refitted(base: BaseFit, named: Sequence[Effect] = ()) -> list[Effect]:
+    """Return the wrist as it was refitted, without what is named.
+
+    Where the sensors stood on the first day is not of the wrist.
+    """
+    names = {each.name for each in named}
+    return [
+        each
+        for each in base.effects(0, with_extras=False)
+        if each.law.id not in ABSORBED and each.name not in names
+    ]
+
+
+def calibrated(days: tuple[Day, Day]) -> tuple[Array, Array]:
+    """Return what the project's refitted wrist explains of both days, fitted to the first."""
+    model = ErrorModel("benchmark", wrist(), "closed_form")
+    base = fit_base(model, (as_units(model, days[0].recorded),))
+    extended = model.with_effects(*refitted(base))
+    one, two = (predicted(extended, day) for day in days)
+    return one, two
 
 
 def predicted(model: ErrorModel, day: Day) -> Array:

@@ -40,7 +40,7 @@ from dictionary import Dictionary, design_of, dictionary
 from elastic_net import elastic_net
 from observe import Riddle, pose_riddle
 from own_diagnosis import own_diagnosis, own_diagnosis_mcap
-from score import score
+from score import floor_of, score
 from solvers import (
     Solver,
     always_none,
@@ -72,7 +72,7 @@ SAMPLED = ("own_diagnosis_mcap", "knows_the_laws")
 
 TRUTH_FILES = (
     *("cases.py", "observe.py", "units.py", "registered.py", "dictionary.py"),
-    *("whitened.py", "score.py"),
+    *("whitened.py", "score.py", "own_diagnosis.py"),
 )
 FILES = {
     "elastic_net": ("solvers.py", "elastic_net.py"),
@@ -100,6 +100,8 @@ def version_of(solver: str) -> str:
             "wrist_stiffness.workflows.simulate",
         ),
     }.get(solver, ())
+    # The project's calibration is in the floor of every score.
+    modules = (*modules, "wrist_stiffness.campaign.base_fit")
     return code_version((*TRUTH, *modules), (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 
@@ -109,22 +111,25 @@ def solve(case: Case, solvers: Sequence[str], quick: bool, folder: Path) -> list
     try:
         with time_limit(LONGEST_S):
             riddle = pose_riddle(case)
+            words = dictionary(design_of(case), quick, folder)
+            floor = floor_of(riddle, words)
     except InputError as error:
         return [_without(case, name, "out_of_reach", str(error)) for name in solvers]
     except Exception as error:
         return [_without(case, name, "error", repr(error)) for name in solvers]
     posed = time.perf_counter() - begun
-    words = dictionary(design_of(case), quick, folder)
-    return [_ask(riddle, name, words, posed) for name in solvers]
+    return [_ask(riddle, name, words, floor, posed) for name in solvers]
 
 
-def _ask(riddle: Riddle, name: str, words: Dictionary, posed: float) -> dict[str, Any]:
+def _ask(
+    riddle: Riddle, name: str, words: Dictionary, floor: float, posed: float
+) -> dict[str, Any]:
     begun = time.perf_counter()
     try:
         with time_limit(LONGEST_S):
             answer = SOLVERS[name](riddle, words)
             seconds = time.perf_counter() - begun
-            line = asdict(score(riddle, name, answer, words, version_of(name), seconds))
+            line = asdict(score(riddle, name, answer, words, floor, version_of(name), seconds))
             return line | {"posed_s": posed}
     except Exception as error:
         return _without(riddle.case, name, "error", repr(error))

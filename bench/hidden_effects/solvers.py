@@ -78,7 +78,7 @@ def always_none(riddle: Riddle, words: Dictionary) -> Answer:
 
 
 def told_the_answer(riddle: Riddle, words: Dictionary) -> Answer:
-    """Know effect, place, form, shape and magnitude: the floor by definition."""
+    """Know effect, place, form, shape and magnitude."""
     if not riddle.hidden:
         return nothing(riddle)
     names = tuple((f"{h.effect}@{h.component}",) for h in riddle.hidden)
