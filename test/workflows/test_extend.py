@@ -200,6 +200,6 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     assert told["before"]["rmse_phi_mdeg"] > 4.0 * told["noise_floor"]["phi_mdeg"]
     for key in ("s_um", "phi_mdeg"):
         assert told["after"][f"rmse_{key}"] < 1.2 * told["noise_floor"][key]
-    assert "what is left is no more than noise" in capsys.readouterr().out
+    assert "what is left is no more than the noise" in capsys.readouterr().out
     summary = replay(RECORDING, output, tmp_path / "out.mcap")
     assert summary.predictions == summary.joint_states > 0

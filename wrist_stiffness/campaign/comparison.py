@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.contrast_sentences import Told
-from wrist_stiffness.campaign.noise_floor import NoiseFloor
+from wrist_stiffness.campaign.noise_floor import NoiseFloor, against_floor, over_floor
 from wrist_stiffness.diagnosis import Observations, Quantity
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.mechanism.components import Array
 
 JUDGES = 12
 """Blocks of units from which the uncertainty of an error is taken."""
-
-AT_THE_FLOOR = 1.15
-"""An error up to so many times the noise floor is called noise."""
 
 
 @dataclass(frozen=True)
@@ -156,19 +153,7 @@ class Comparison:
 
     def over_floor(self, model: ComparedModel) -> float:
         """Error of a model over the noise floor, the larger of the quantities'."""
-        ratios = [
-            model.after[q.key].rms / self.floor[q.key] if self.floor[q.key] > 0.0 else np.inf
-            for q in self.quantities
-        ]
-        return max(ratios)
-
-    def _against_floor(self, model: ComparedModel) -> str:
-        ratio = self.over_floor(model)
-        if self.noise.source == "unpredictable":
-            return f"{ratio:.1f} x what the conditions do not predict; the noise is not known."
-        if ratio <= AT_THE_FLOOR:
-            return "no more than the noise."
-        return "the instrument has no noise." if np.isinf(ratio) else f"{ratio:.1f} x the noise."
+        return over_floor({q.key: model.after[q.key].rms for q in self.quantities}, self.floor)
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -176,9 +161,8 @@ class Comparison:
         lines = []
         for model in self.models:
             parts = [f"{model.after[q.key].rms:.3g} {q.unit} of {q.name}" for q in self.quantities]
-            lines.append(
-                f"{model.name} is off by {' and '.join(parts)} (RMS): {self._against_floor(model)}"
-            )
+            means = against_floor(self.over_floor(model), self.noise.source)
+            lines.append(f"{model.name} is off by {' and '.join(parts)} (RMS): {means}.")
         if len(self.models) > 1:
             lines += [self._fall(q) for q in self.quantities]
         return tuple(lines)

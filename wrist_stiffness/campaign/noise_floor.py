@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,24 @@ SOURCES = {
     "better",
 }
 """Where a floor may come from, in words."""
+
+
+AT_THE_FLOOR = 1.15
+"""An error up to so many times the noise floor is called noise."""
+
+
+def over_floor(rms: Mapping[str, float], floor: Mapping[str, float]) -> float:
+    """Return errors over their floor by the key of the quantity, the largest of them."""
+    return max(rms[key] / floor[key] if floor[key] > 0.0 else np.inf for key in rms)
+
+
+def against_floor(ratio: float, source: str) -> str:
+    """Say what an error over the floor means, by where the floor is known from."""
+    if source == "unpredictable":
+        return f"{ratio:.1f} x what the conditions do not predict; the noise is not known"
+    if ratio <= AT_THE_FLOOR:
+        return "no more than the noise"
+    return "the instrument has no noise" if np.isinf(ratio) else f"{ratio:.1f} x the noise"
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,17 @@ import numpy as np
 from wrist_stiffness.campaign.fit_result import Fit, Fitted
 from wrist_stiffness.campaign.judging import SEEN, THIS_SESSION, Judged
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-
-AT_THE_FLOOR = 1.15
-"""An error up to so many times the noise floor is called noise."""
+from wrist_stiffness.campaign.noise_floor import AT_THE_FLOOR, against_floor, over_floor
 
 FAR = 3.0
 """Standard deviations of its prior beyond which a parameter is farther off than usual."""
 
 TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
+
+NOT_AT_THE_FLOOR = (
+    "not at the floor: an effect is missing ('wrist-stiffness diagnose' finds out which), or the "
+    "fit was caught where other flanges touch than on the wrist; then more poses and loads help"
+)
 
 JUDGED_BY = {
     SEEN: "on the recordings of the fit; --hold-out judges by a part that the fit has not seen",
@@ -49,10 +52,7 @@ class Errors:
     @property
     def over_floor(self) -> float:
         """Last error over the noise floor, the larger of the quantities'."""
-        last = list(self.rows.values())[-1]
-        return max(
-            (last[key] / self.floor[key] for key in last if self.floor[key] > 0.0), default=1
-        )
+        return over_floor(list(self.rows.values())[-1], self.floor)
 
     def lines(self) -> list[str]:
         """Return a table for people."""
@@ -91,13 +91,13 @@ def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
 def left_lines(errors: Errors, judged: Judged) -> list[str]:
     """Tell how much is left, and how that was judged."""
     ratio = errors.over_floor
-    left = (
-        "what is left is no more than noise"
-        if ratio <= AT_THE_FLOOR
-        else f"what is left is {ratio:.1f} times the noise: something is missing in the model, "
-        "'wrist-stiffness diagnose' finds out what"
-    )
-    return [f"judged {JUDGED_BY[judged.by]}", left]
+    lines = [
+        f"judged {JUDGED_BY[judged.by]}",
+        f"what is left is {against_floor(ratio, errors.floor_source)}",
+    ]
+    if ratio > AT_THE_FLOOR:
+        lines.append(NOT_AT_THE_FLOOR)
+    return lines
 
 
 def told_lines(parameters: Iterable[Fitted], all_of_them: bool = False) -> list[str]:
