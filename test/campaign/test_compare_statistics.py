@@ -248,6 +248,7 @@ def test_headroom_is_the_share_of_what_could_fall():
     assert found.headroom(found.models[1], "s_um") == pytest.approx(6 / 9)
     assert found.headroom(found.models[2], "phi_mdeg") == pytest.approx(1.0)
     assert "67 %" in compared((10.0, 4.0), 1.0).verdict[-1]
+    assert "all that the conditions could explain" in compared((10.0, 1.0), 3.0).verdict[-1]
 
 
 def test_no_headroom_is_claimed_where_nothing_could_fall():

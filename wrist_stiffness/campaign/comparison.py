@@ -178,6 +178,9 @@ class Comparison:
         share = self.headroom(last, quantity.key)
         if share is None:
             return f"{text}; the conditions hold no more than that."
+        if share >= 1.0:
+            # A process over the conditions of a moment knows nothing of where the wrist came from.
+            return f"{text}: all that the conditions could explain."
         return f"{text}: {100.0 * share:.0f} % of what the conditions could explain."
 
     def as_values(self) -> dict[str, Any]:

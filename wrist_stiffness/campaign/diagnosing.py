@@ -175,7 +175,7 @@ def _absorbed(base: BaseFit, sessions: list[str]) -> tuple[str, ...]:
     for name, places in groups.items():
         moved = base.columns[:, :, places] @ base.z[places]
         sizes = [
-            f"{q.per_si * np.sqrt(np.mean(np.sum(moved[:, list(q.components)] ** 2, axis=1))):.3g}"
+            f"{q.per_si * np.sqrt(np.mean(np.sum(moved[:, list(q.components)] ** 2, axis=1))):.2f}"
             f" {q.unit} of {q.name}"
             for q in QUANTITIES
         ]

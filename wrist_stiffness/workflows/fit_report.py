@@ -129,11 +129,12 @@ def far_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
 def untold_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
     """Tell what the data do not say, and what to record to see it."""
     needs = {each.effect.name: each.effect.law.excited_by for each in found.problem.free}
-    untold: dict[str, list[str]] = {}
+    # Several sessions may say the same of one parameter.
+    untold: dict[str, dict[str, None]] = {}
     for each in parameters:
         if not each.excited:
             twin = f" (only together with {each.together[0]})" if each.together else ""
-            untold.setdefault(each.effect, []).append(f"{each.key}{twin}")
+            untold.setdefault(each.effect, {})[f"{each.key}{twin}"] = None
     return [
         f"  {effect}: {', '.join(keys)}; needs {needs[effect]}" for effect, keys in untold.items()
     ]
@@ -167,7 +168,7 @@ def plus_minus(value: float, sigma: float) -> str:
     digits = 3
     if np.isfinite(sigma) and sigma > 0.0:
         digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
-    return f"{value:.{digits}f} +- {sigma:.{digits}f}"
+    return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
 
 
 def tolerances(parameter: Fitted) -> str:
