@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.reading import rigid_rotation
+from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
 from wrist_stiffness.diagnosis import Observations, Quantity
 from wrist_stiffness.errors import InputError

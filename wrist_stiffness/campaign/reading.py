@@ -25,6 +25,7 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.path import GAP_S, turning_stamps
 from wrist_stiffness.campaign.pose_track import PoseTrack, pose_track
 from wrist_stiffness.campaign.registration import agreement
+from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.signals import Signal, Stamps
 from wrist_stiffness.campaign.spikes import spikes
 from wrist_stiffness.compensation.intake import Frames
@@ -45,9 +46,6 @@ from wrist_stiffness.recording.topics import (
 )
 
 Mask = NDArray[np.bool_]
-
-CHUNK = 20_000
-"""Poses whose rigid wrist is in memory at a time."""
 
 ANGLES_USED = 20_000
 """Joint states that are enough to tell the offset of the clocks."""
@@ -219,15 +217,6 @@ def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
     out = np.full((count, *values.shape[1:]), np.nan)
     out[rows] = values
     return out
-
-
-def rigid_rotation(table: Table, theta: Array) -> Array:
-    """Return the rotation U -> F of the rigid platform, (n, 3, 3), at reachable angles (n, 2)."""
-    rotation = np.empty((len(theta), 3, 3))
-    for start in range(0, len(theta), CHUNK):
-        rows = slice(start, start + CHUNK)
-        rotation[rows] = table.mechanism.forward(theta[rows]).platform
-    return rotation
 
 
 def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, str]) -> None:

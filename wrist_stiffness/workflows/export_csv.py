@@ -30,7 +30,8 @@ from wrist_stiffness.campaign.pose_track import (
     last_of_equal,
     measured_components,
 )
-from wrist_stiffness.campaign.reading import notes_of, require_topics, rigid_rotation
+from wrist_stiffness.campaign.reading import notes_of, require_topics
+from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.signals import Stamps
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.settings import StreamSettings
