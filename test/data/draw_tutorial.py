@@ -1,0 +1,57 @@
+"""Draw the pictures of docs/find-the-missing-effect.md again.
+
+    python test/data/draw_tutorial.py FOLDER
+
+FOLDER is where the commands of the tutorial were run: its models are compared once more.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from wrist_stiffness.workflows.compare import compare
+from wrist_stiffness.workflows.pictures.dependence import draw_against
+from wrist_stiffness.workflows.pictures.errors import Bars, draw_bars
+from wrist_stiffness.workflows.calibrate import Run
+from wrist_stiffness.workflows.read_sessions import Recordings
+from wrist_stiffness.workflows.report.parts import against, unit_of
+
+RECORDINGS = Path(__file__).parent / "tutorial"
+PICTURES = Path(__file__).parents[2] / "docs/pictures"
+
+STORIES = {
+    "tutorial-known": ("tuesday", "approach direction", ("wrist_7", "worn")),
+    "tutorial-unknown": ("thursday", "clamp_bar", ("worn", "clamped")),
+}
+"""Recording, condition and models by the beginning of the pictures' names."""
+
+
+def draw(name: str, folder: Path) -> None:
+    """Draw the fall of the error, and the residual against the condition that shows it."""
+    day, topic, models = STORIES[name]
+    compared = compare(
+        [folder / f"{model}.yaml" for model in models],
+        Recordings((RECORDINGS / f"{day}.mcap",)),
+        Run("draw_tutorial.py", ""),
+    )
+    found = compared.comparison
+    bars = [
+        Bars(
+            f"{q.name} [{unit_of(q.unit)}]",
+            models,
+            [model.after[q.key].rms for model in found.models],
+            [model.after[q.key].uncertainty for model in found.models],
+            {"noise floor": found.floor[q.key]},
+        )
+        for q in found.quantities
+    ]
+    draw_bars(bars).savefig(PICTURES / f"{name}-fall.png", dpi=130)
+    statement = next(s for s in found.models[0].told.statements if s.condition.topic == topic)
+    shown = against(statement, [(model.name, model.refitted) for model in found.models])
+    draw_against([shown]).savefig(PICTURES / f"{name}-shown.png", dpi=130)
+
+
+if __name__ == "__main__":
+    for each in STORIES:
+        draw(each, Path(sys.argv[1]))
