@@ -64,7 +64,7 @@ def main() -> None:
     def correction(i: int) -> Correction:
         return correct(
             lambda angles: model.predict(angles, load, guess(i)),
-            table.mechanism,
+            table.workspace,
             theta[i],
             objective,
         )

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.correction import correct
+from wrist_stiffness.compensation.correction import UNCHECKED, correct, residual_twist
 from wrist_stiffness.compensation.objective import OBJECTIVES, Objective
 from wrist_stiffness.errors import LoadRangeError, SingularPoseError, UnreachablePoseError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 
 FIXED_POINT = 1e-9  # rad; the search ends at steps of 1e-10 rad
+PLAY = 4e-5  # rad; 0.15 encoder steps
 FORCE, MOMENT = 1.0, 0.03
 
 
 def corrected(model, theta, load, objective):
     return correct(
-        lambda angles: model.predict(angles, load), model.table.mechanism, theta, objective
+        lambda angles: model.predict(angles, load), model.table.workspace, theta, objective
     )
 
 
@@ -124,13 +125,42 @@ def test_residuals_are_actual_minus_desired(model, objective):
     theta, load = next(random_cases(model, 1))
     correction = corrected(model, theta, load, objective("pointing"))
     wanted = model.table.mechanism.forward(theta).platform
-    for twist, angles in ((correction.before, theta), (correction.after, theta + correction.delta)):
-        rotation, shift = actual_pose(model, angles, load)
-        assert np.allclose(
-            Rotation.from_rotvec(twist[3:]).as_matrix(), rotation @ wanted.T, atol=1e-14
+    rotation, shift = actual_pose(model, theta + correction.delta, load)
+    turn = Rotation.from_rotvec(correction.after[3:]).as_matrix()
+    assert np.allclose(turn, rotation @ wanted.T, atol=1e-14)
+    # Half of the rotation acts on the shift: 1e-4 rad times 1e-5 m.
+    assert np.allclose(correction.after[:3], shift, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("share", "predictions"),
+    [(-0.01, 1), (0.9 * UNCHECKED, 1), (10.0 * UNCHECKED, 2)],
+    ids=["inside", "a small step", "a large step"],
+)
+def test_a_step_that_is_small_next_to_the_play_costs_one_prediction(
+    model, objective, share, predictions
+):
+    pointing, mechanism = objective("pointing"), model.table.mechanism
+    for theta, load in random_cases(model, 20):
+        tried = []
+
+        def predict(angles, load=load, tried=tried):
+            tried.append(angles)
+            return model.predict(angles, load)
+
+        exact = corrected(model, theta, load, pointing).delta
+        held = exact + np.array([1.0, -1.0]) * (1.0 + share) * PLAY
+        found = correct(predict, model.table.workspace, theta, pointing, held, PLAY)
+        assert len(tried) == predictions
+        desired = mechanism.forward(theta)
+        left = pointing.cancelling(desired, mechanism.jacobian(desired)) @ residual_twist(
+            model.predict(theta + found.delta, load), desired.platform
         )
-        # Half of the rotation acts on the shift: 1e-4 rad times 1e-5 m.
-        assert np.allclose(twist[:3], shift, atol=1e-8)
+        if share < 0.0:
+            assert np.array_equal(found.delta, held)
+        else:
+            # The error of this wrist changes by less than 1e-2 of a step.
+            assert np.allclose(np.abs(left), PLAY, rtol=0.0, atol=1e-2 * share * PLAY)
 
 
 def test_a_load_in_the_platform_frame_turns_with_the_platform(model, objective):

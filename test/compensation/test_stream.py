@@ -50,7 +50,7 @@ class Driver:
 
 def corrected(model, theta, load, objective):
     return correct(
-        lambda angles: model.predict(angles, load), model.table.mechanism, theta, objective
+        lambda angles: model.predict(angles, load), model.table.workspace, theta, objective
     )
 
 
@@ -211,7 +211,7 @@ def test_residual_is_that_of_what_is_applied(model, objective):
     driver = corrector(model)
     driver.send()
     desired = model.table.mechanism.forward(THETA).platform
-    before = corrected(model, THETA, Load(DOWN), objective("pointing")).before
+    before = model.predict(THETA, Load(DOWN)).twist
     for seconds in (0.01, 0.01, 0.1):
         correction = driver.send(seconds=seconds).correction
         wanted = residual_twist(model.predict(THETA + correction.delta, Load(DOWN)), desired)

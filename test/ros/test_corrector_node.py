@@ -84,7 +84,7 @@ def expected(model, theta=THETA, name="pointing"):
     load = Load(np.array(DOWN))
     return correct(
         lambda angles: model.predict(angles, load),
-        model.table.mechanism,
+        model.table.workspace,
         np.array(theta),
         objective,
     )
@@ -105,13 +105,14 @@ def test_an_enabled_corrector_corrects_as_the_core_does(graph, corrector, model)
     positions = graph.heard["/motor_positions_corrected"][-1].data.tolist()
     assert positions == [command.position[2], command.position[0]]
     graph.until(lambda: len(graph.heard["/pose_error_residual"]) == 2, "residual")
+    before = model.predict(np.array(THETA), Load(np.array(DOWN))).twist
     for message, twist in zip(
-        graph.heard["/pose_error_residual"], (correction.before, correction.after), strict=True
+        graph.heard["/pose_error_residual"], (before, correction.after), strict=True
     ):
         pose = message.pose.pose
         position, quaternion = pose_of_twist(twist)
         # Before, nothing was applied yet: the residual is linear between the two, to 1e-3.
-        scale = 1e-3 * np.abs(correction.before)
+        scale = 1e-3 * np.abs(before)
         found = [pose.position.x, pose.position.y, pose.position.z]
         assert np.allclose(found, position, rtol=0, atol=scale[:3].max())
         found = [pose.orientation.x, pose.orientation.y, pose.orientation.z]

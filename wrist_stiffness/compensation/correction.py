@@ -13,12 +13,17 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.single_motion import log_one
+from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.model.error_model import Prediction
 
 TOLERANCE = 1e-10
 """The search ends where the angles are known to this [rad]; 1e-6 of an encoder step."""
 
 MAX_ITERATIONS = 40
+
+UNCHECKED = 0.05
+"""A step up to this share of the play is not tried: even if nothing answers, no more is left than
+the play and it, and the next command finds it."""
 
 ANSWERS = 0.5
 """A motor whose error changes by less than this share of its step is crossing a lost motion."""
@@ -32,21 +37,20 @@ class Correction:
     ----------
     delta : (2,) float
         To be added to the command [rad].
-    before, after : (6,) float
-        Residual twist, actual minus desired, at O in F without and with the correction [m, rad].
+    after : (6,) float
+        Residual twist with the correction, actual minus desired, at O in F [m, rad].
     prediction : Prediction
         At the corrected angles, or so near to them that the twist is the same.
     """
 
     delta: Array
-    before: Array
     after: Array
     prediction: Prediction
 
 
 def correct(
     predict: Callable[[Array], Prediction],
-    mechanism: Mechanism,
+    workspace: Workspace,
     command: Array,
     objective: Objective,
     held: Array | None = None,
@@ -66,8 +70,8 @@ def correct(
     predict : callable
         The pose error at motor angles (2,) [rad], under the load of the moment.  A load in F stays
         fixed while the angles are iterated, one in U turns with them.
-    mechanism : Mechanism
-        The rigid wrist.
+    workspace : Workspace
+        The rigid wrist and the table's domain.
     command : (2,) float
         Commanded motor angles [rad].
     objective : Objective
@@ -80,7 +84,7 @@ def correct(
     Returns
     -------
     Correction
-        Angles to add, residual twists before and after.
+        Angles to add and what remains.
 
     Raises
     ------
@@ -89,20 +93,14 @@ def correct(
     InputError
         If the fixed point is not reached.
     """
-    prediction = predict(command)
-    desired = prediction.configuration
+    mechanism, desired = workspace.mechanism, workspace.configuration(command)
     cancelling = objective.cancelling(desired, mechanism.jacobian(desired))
-    # Where the command itself is driven, what remains is the error.
-    before = prediction.twist
-    reached = Correction(np.zeros(2), before, before, prediction)
 
     def at(delta: Array) -> Correction:
         prediction = predict(command + delta)
-        after = residual_twist(prediction, desired.platform)
-        return Correction(delta, before, after, prediction)
+        return Correction(delta, residual_twist(prediction, desired.platform), prediction)
 
-    if held is not None and any(held.tolist()):
-        reached = at(held)
+    reached = at(np.zeros(2) if held is None else held)
     size = np.inf
     steps, missing = [0.0, 0.0], [0.0, 0.0]
     for _ in range(MAX_ITERATIONS):
@@ -112,7 +110,8 @@ def correct(
         if size < TOLERANCE:
             return reached
         # The steps shrink by a constant factor, so the last two of them bound what is missing.
-        if size < last < np.inf and size**2 < TOLERANCE * (last - size):
+        shrinking = size < last < np.inf and size**2 < TOLERANCE * (last - size)
+        if shrinking or size < UNCHECKED * play:
             return as_applied(mechanism, reached, reached.delta + steps)
         reached = at(reached.delta + steps)
     raise InputError(
@@ -155,7 +154,7 @@ def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Co
     jacobian = mechanism.jacobian(correction.prediction.configuration)
     after = correction.after.copy()
     after[3:] += jacobian.dot(delta - correction.delta)
-    return Correction(delta, correction.before, after, correction.prediction)
+    return Correction(delta, after, correction.prediction)
 
 
 def residual_twist(prediction: Prediction, desired: Array) -> Array:

@@ -298,7 +298,7 @@ class CorrectionStream(Stream):
         platform = table.geometry.platform
         objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
         predict = running.preview(stamp_ns, load, theta_dot)
-        correction = correct(predict, table.mechanism, theta, objective, held, play)
+        correction = correct(predict, table.workspace, theta, objective, held, play)
         largest = max(map(abs, correction.delta.tolist()))
         if largest > self.settings.correction_limit:
             raise InputError(
