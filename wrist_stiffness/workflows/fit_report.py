@@ -105,11 +105,10 @@ def told_lines(parameters: Iterable[Fitted], all_of_them: bool = False) -> list[
     lines = []
     for each in parameters:
         if each.excited or all_of_them:
-            note = ", on its bound" if each.at_bound else ""
-            lines.append(
-                f"  {each.effect:30} {each.key:24}{plus_minus(each.value, each.sigma):>22}"
-                f"   {tolerances(each)}{note}"
-            )
+            notes = [tolerances(each)] if np.isfinite(each.prior_sigma) else []
+            notes += ["on its bound"] if each.at_bound else []
+            line = f"  {each.effect:30} {each.key:24}{plus_minus(each.value, each.sigma):>22}"
+            lines.append(f"{line}   {', '.join(notes)}".rstrip())
     return lines
 
 
