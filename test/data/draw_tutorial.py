@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import compare
 from wrist_stiffness.workflows.pictures.dependence import draw_against
@@ -32,7 +33,7 @@ def draw(name: str, folder: Path) -> None:
     day, topic, models = STORIES[name]
     compared = compare(
         [folder / f"{model}.yaml" for model in models],
-        Recordings((RECORDINGS / f"{day}.mcap",)),
+        Recordings((RECORDINGS / f"{day}.mcap",), {}, StreamSettings()),
         Run("draw_tutorial.py", ""),
     )
     found = compared.comparison
