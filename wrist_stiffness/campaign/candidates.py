@@ -138,7 +138,8 @@ class WristCandidate:
             size = None
         else:
             size = LARGE * plausible
-        return Factor(factor.name, FAR * factor.lower, FAR * factor.upper, size)
+        far = (FAR * factor.lower, FAR * factor.upper)
+        return Factor(factor.name, *far, size, plausible)
 
 
 def compensable(law: Law, place: str) -> str:

@@ -33,6 +33,10 @@ MOST_EXTRAS = 3
 LEADING = 0.3
 """Candidates that explain this share of what the best explains are fitted too."""
 
+CLOSE, MOST_REFITTED = 0.6, 2
+"""So many candidates that gain nearly as much as the best are fitted with the whole base: what the
+base took up of one of them shows only then."""
+
 WORTH = 30.0
 """Fall of the sum of squares, in units of the noise, that is worth moving the point for."""
 
@@ -113,7 +117,8 @@ def seek_point(
 ) -> tuple[BaseFit, tuple[WristCandidate, ...]]:
     """Return the base, fitted along with effects that make a difference, and the catalogue there.
 
-    The catalogue is evaluated about the base alone; an effect found has its columns at its values.
+    The catalogue is evaluated about the base alone, once to lead and once where the base ends up;
+    an effect found has its columns at its values.
     """
     base = fit_base(model, units)
     absent = _absent(base)
@@ -124,14 +129,17 @@ def seek_point(
         taken = {each.name for each in extras}
         leaders = screen.leaders([each for each in candidates if each.name not in taken])
         chosen = [each for each in leaders if each[0] > max(WORTH, LEADING * leaders[0][0])]
-        fits = [screen.fitted(candidate, shape) for _, candidate, shape in chosen[:MOST_FITTED]]
+        fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
         if not fits:
             break
-        best = max(fits, key=lambda each: each.gain)
-        trial = fit_base(model, units, (*extras, best.effect), base)
-        if base.cost - trial.cost < WORTH + screen.price(len(best.effect.parameters)):
+        fits.sort(key=lambda each: -each.gain)
+        close = [each for each in fits if each.gain > CLOSE * fits[0].gain][:MOST_REFITTED]
+        trials = [(fit_base(model, units, (*extras, each.effect), base), each) for each in close]
+        trial, best = min(trials, key=lambda each: each[0].cost + each[1].price)
+        if base.cost - trial.cost < WORTH + best.price:
             break
         base, extras = trial, tuple(_fitted_extras(trial).values())
+    if extras:
         candidates = wrist_candidates(_point(base), absent, _near(model, extras), progress)
     return base, candidates
 
@@ -164,7 +172,7 @@ def _absent(base: BaseFit) -> set[str]:
 
 
 def _absorbed(base: BaseFit, sessions: list[str]) -> tuple[str, ...]:
-    """Tell how far each part of the base moved the prediction, as root mean squares."""
+    """Tell how far each part of the base moved the prediction, and itself against its prior."""
     groups: dict[str, list[int]] = {}
     for place, unknown in enumerate(base.problem.unknowns):
         if base.of_base[place]:
@@ -179,8 +187,20 @@ def _absorbed(base: BaseFit, sessions: list[str]) -> tuple[str, ...]:
             f" {q.unit} of {q.name}"
             for q in QUANTITIES
         ]
-        sentences.append(f"{name}: {', '.join(sizes)}")
+        sentences.append(f"{name}: {', '.join(sizes)}{_against_prior(base, places)}")
     return tuple(sentences)
+
+
+def _against_prior(base: BaseFit, places: list[int]) -> str:
+    """Tell of the parameter of a tolerance that moved furthest; nothing where all are free."""
+    known = [place for place in places if np.isfinite(base.prior_std[place])]
+    if not known:
+        return ""
+    far = max(known, key=lambda place: abs(base.z[place] / base.prior_std[place]))
+    unknown = base.problem.unknowns[far]
+    value = unknown.mean + base.z[far] * unknown.step
+    share = abs(base.z[far] / base.prior_std[far])
+    return f" ({unknown.key} = {value:.3g}, {share:.1f} standard deviations of its prior)"
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:

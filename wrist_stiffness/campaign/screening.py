@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from wrist_stiffness.campaign.base_fit import BaseFit
 from wrist_stiffness.campaign.candidates import Point, WristCandidate
+from wrist_stiffness.diagnosis.worth import worth
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 
@@ -37,11 +38,14 @@ class Fitted:
         Of the law's parameters.
     gain : float
         Fall of the weighted sum of squares against the base alone, less the parameters' price.
+    price : float
+        What the freedom of the parameters costs.
     """
 
     candidate: WristCandidate
     values: Mapping[str, float]
     gain: float
+    price: float
 
     @property
     def effect(self) -> Effect:
@@ -83,9 +87,10 @@ class Screen:
         priors = np.zeros((len(self.left) - len(white), white.shape[1]))
         return self.beyond(np.vstack([white, priors]))
 
-    def price(self, parameters: int) -> float:
-        """Return the sum of squares that chance gives to so many parameters (BIC)."""
-        return float(parameters * np.log(self._base.problem.table.measured.sum()))
+    @property
+    def _unit_price(self) -> float:
+        """Sum of squares that a shape parameter costs (BIC)."""
+        return float(np.log(self._base.problem.table.measured.sum()))
 
     def leaders(
         self, candidates: Sequence[WristCandidate]
@@ -93,29 +98,34 @@ class Screen:
         """Return what each candidate gains by its columns, at its best shape, largest first."""
         found = []
         for candidate in candidates:
+            scales = np.array([p.scale for p in candidate.candidate().parameters], dtype=float)
             best = max(
-                ((self._gain(candidate.at(shape)), shape) for shape in candidate.shapes),
+                (
+                    (worth(self.white(candidate.at(shape)), self.left, scales), shape)
+                    for shape in candidate.shapes
+                ),
                 key=lambda pair: pair[0],
             )
-            free = len(candidate.candidate().parameters) + len(best[1])
-            found.append((best[0] - self.price(free), candidate, best[1]))
+            found.append((best[0] - len(best[1]) * self._unit_price, candidate, best[1]))
         return sorted(found, key=lambda each: -each[0])
 
-    def _gain(self, columns: Array) -> float:
-        rows = self.white(columns)
-        norm = np.linalg.norm(rows, axis=0)
-        rows = rows[:, norm > 0.0] / norm[norm > 0.0]
-        if rows.shape[1] == 0:
-            return 0.0
-        values = np.linalg.lstsq(rows, self.left, rcond=1e-6)[0]
-        after = self.left - rows @ values
-        return self.energy - float(after @ after)
+    def fitted(self, candidate: WristCandidate, shape: tuple[float, ...], value: float) -> Fitted:
+        """Fit a candidate with its own law, from where its columns lead.
 
-    def fitted(self, candidate: WristCandidate, shape: tuple[float, ...]) -> Fitted:
-        """Fit a candidate with its own law, from where its columns lead."""
+        Parameters
+        ----------
+        candidate : WristCandidate
+            A leader.
+        shape : tuple of float
+            Where on its grid it leads.
+        value : float
+            What it gains there by its columns.
+        """
         rows = self.white(candidate.at(shape))
         norm = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
         factors = np.linalg.lstsq(rows / norm, self.left, rcond=1e-6)[0] / norm
+        after = self.left - rows @ factors
+        price = self.energy - float(after @ after) - value
         names = [each.factor.name for each in candidate.recipe.columns(shape)]
         start = candidate.effect(dict(zip(names, factors, strict=True)), shape)
         parameters = [p for p in start.parameters if p.key not in candidate.recipe.idle]
@@ -151,5 +161,5 @@ class Screen:
             xtol=1e-4,
             max_nfev=MOST_TRIALS,
         )
-        gain = self.energy - 2.0 * float(found.cost) - self.price(len(keys))
-        return Fitted(candidate, values(found.x), gain)
+        gain = self.energy - 2.0 * float(found.cost) - price
+        return Fitted(candidate, values(found.x), gain, price)

@@ -27,12 +27,16 @@ class Parameter:
         What is physically possible.
     plausible : float, optional
         Size that would not surprise; decides whether the data could have shown the effect.
+    scale : float, optional
+        Usual size, from which follows what the parameter costs; without it, what the Bayesian
+        information criterion asks.
     """
 
     name: str
     lower: float = -np.inf
     upper: float = np.inf
     plausible: float | None = None
+    scale: float | None = None
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from wrist_stiffness.diagnosis.findings import Model, describe, members_of, with
 from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
+    Hypothesis,
     all_hypotheses,
     gain,
     make_evidence,
@@ -22,6 +23,7 @@ from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Array, Observations
 from wrist_stiffness.diagnosis.outliers import lost_units
 from wrist_stiffness.diagnosis.projection import Base
+from wrist_stiffness.diagnosis.ranking import evidence_of
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.diagnosis.result import Diagnosis, NotExcited, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut, held_out, refuted, sealed_units
@@ -190,7 +192,7 @@ def _opened(
     broken: list[str] = []
     for each in entered:
         alone = base_with(evidence.base, tuple(kept))
-        if broken and gain(alone, each.hypothesis) < _price(alone, each):
+        if broken and _worthless(alone, each.hypothesis):
             # It entered only beside an effect that did not hold.
             continue
         trial = [other.hypothesis for other in kept] + [each.hypothesis]
@@ -203,9 +205,9 @@ def _opened(
     return tuple(kept), stages, broken
 
 
-def _price(base: Base, entered: Entered) -> float:
-    """Sum of squares that the information criterion asks of an effect."""
-    return entered.hypothesis.candidate.freedom * float(np.log(base.freedom))
+def _worthless(base: Base, hypothesis: Hypothesis) -> bool:
+    """Tell whether an effect explains less than its freedom costs."""
+    return evidence_of(base, hypothesis, gain(base, hypothesis)) < 0
 
 
 def _unexplained(

@@ -79,7 +79,7 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
         float(np.linalg.norm(after.white) / np.linalg.norm(before.white)),
         own.score,
         entered.p_value,
-        _stability(model, others, ranked, {m.name for m in members}, scale, rng),
+        _stability(model, others, ranked, {m.name for m in members}, rng),
         {q.key: bought(before, after, q) for q in model.evidence.observations.reported},
         candidate.compensable,
         _told(own),
@@ -127,17 +127,16 @@ def _stability(
     others: Base,
     ranked: list[Ranked],
     members: set[str],
-    scale: float,
     rng: np.random.Generator,
 ) -> float:
     """Share of block resamples that choose a member of the class."""
-    first: dict[str, Hypothesis] = {}
+    first: dict[str, Ranked] = {}
     for each in ranked:
-        first.setdefault(each.name, each.hypothesis)
-    grams = BlockGrams(model.evidence, others, list(first.values()), model.blocks)
-    freedom = np.array([hypothesis.candidate.freedom for hypothesis in first.values()])
+        first.setdefault(each.name, each)
+    best = list(first.values())
+    grams = BlockGrams(model.evidence, others, [each.hypothesis for each in best], model.blocks)
     inside = np.array([name in members for name in first])
-    return stability(grams, inside, freedom * np.log(others.freedom) * scale, rng)
+    return stability(grams, inside, np.array([each.price for each in best]), rng)
 
 
 def _told(own: Ranked) -> str:

@@ -9,8 +9,9 @@ from wrist_stiffness.diagnosis.estimates import possible
 from wrist_stiffness.diagnosis.hypotheses import Hypothesis
 from wrist_stiffness.diagnosis.observations import Array, Labels
 from wrist_stiffness.diagnosis.permutation import rearranged
-from wrist_stiffness.diagnosis.projection import Base
+from wrist_stiffness.diagnosis.projection import ABSORBED, Base
 from wrist_stiffness.diagnosis.structure import background, lack_of_fit
+from wrist_stiffness.diagnosis.worth import worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +29,9 @@ class Ranked:
     remaining : float
         Excess over the noise floor with it in the model.
     score : float
-        Bayesian information criterion against the base, in units of the background: larger is
-        better.
+        Evidence against the base, in units of the background: larger is better.
+    price : float
+        What the effect's freedom costs, in sums of squares.
     """
 
     hypothesis: Hypothesis
@@ -37,6 +39,7 @@ class Ranked:
     gain: float
     remaining: float
     score: float
+    price: float
 
     @property
     def name(self) -> str:
@@ -74,11 +77,37 @@ def scored(
     if not found:
         return []
     scale = float(background(min(entry[3] for entry in found), dimension))
-    price = np.log(base.freedom)
+    scores = [evidence_of(base, entry[0], entry[2], scale) for entry in found]
     ranked = [
-        Ranked(*entry, entry[2] / scale - entry[0].candidate.freedom * price) for entry in found
+        Ranked(*entry, score, entry[2] - scale * score)
+        for entry, score in zip(found, scores, strict=True)
     ]
     return sorted(ranked, key=lambda each: -each.score)
+
+
+def evidence_of(base: Base, hypothesis: Hypothesis, gain: float, scale: float = 1.0) -> float:
+    """Return what a hypothesis explains, less what its freedom costs, in units of the background.
+
+    Parameters
+    ----------
+    base : Base
+        What is refitted first.
+    hypothesis : Hypothesis
+        The effect.
+    gain : float
+        Sum of squares that it explains.
+    scale : float
+        Variance of the background.
+    """
+    candidate, price = hypothesis.candidate, float(np.log(base.freedom))
+    scales = [p.scale for p in candidate.parameters if p.scale is not None]
+    if len(scales) < len(candidate.parameters):
+        return gain / scale - candidate.freedom * price
+    columns = base.beyond(hypothesis.columns)
+    norm = np.linalg.norm(hypothesis.columns, axis=0)
+    seen = np.linalg.norm(columns, axis=0) > ABSORBED * norm
+    found = worth(columns[:, seen], base.residual, np.array(scales)[seen], scale)
+    return found - len(candidate.shape) * price
 
 
 def rank(

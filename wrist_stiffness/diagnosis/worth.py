@@ -1,0 +1,39 @@
+"""What a candidate's columns are worth: the fall of the sum of squares, less what freedom costs.
+
+A prior of the usual size of each parameter charges a direction by how far it could move the data
+(Bayes factor of a linear model with a Gaussian prior; MacKay 1992).  A direction that no plausible
+size would show is free of charge and explains nothing; so a spring of 21 constants of which six
+show pays for six.  How far from the usual a hidden effect lies is not known: the width of the
+prior, one number an effect, is the one that suits it best.
+"""
+
+import numpy as np
+
+from wrist_stiffness.diagnosis.observations import Array
+
+WIDTHS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+"""Width of the prior in usual sizes."""
+
+
+def worth(columns: Array, residual: Array, scales: Array, variance: float = 1.0) -> float:
+    """Twice the logarithm of the Bayes factor of columns against none of them.
+
+    Parameters
+    ----------
+    columns : (N, k) array
+        What a unit of each parameter does beyond the base, whitened.
+    residual : (N,) array
+        What the base leaves, whitened.
+    scales : (k,) array
+        Usual size of each parameter.
+    variance : float
+        Of a number of the residual.
+    """
+    scaled = columns * scales
+    size, vectors = np.linalg.eigh(scaled.T @ scaled / variance)
+    size = np.maximum(size, 0.0)
+    moment = vectors.T @ (scaled.T @ residual) / variance
+    return max(
+        float(np.sum(width**2 * moment**2 / (1 + width**2 * size) - np.log1p(width**2 * size)))
+        for width in WIDTHS
+    )
