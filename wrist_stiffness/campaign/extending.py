@@ -77,9 +77,9 @@ class Extension:
     @cached_property
     def bought(self) -> dict[str, tuple[float, float]]:
         """Fall of the held-out error and its standard uncertainty, by the key of the quantity."""
-        noise = self.after.fit.noise
+        judge = self.after.fit
         return {
-            q.key: bought(self.before.held_out(noise), self.after.held_out(noise), q)
+            q.key: bought(self.before.held_out(judge), self.after.held_out(judge), q)
             for q in self.after.observations.reported
         }
 
@@ -114,8 +114,8 @@ class Extension:
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
-        noise = self.after.fit.noise
-        without, with_it = self.before.held_out(noise), self.after.held_out(noise)
+        judge = self.after.fit
+        without, with_it = self.before.held_out(judge), self.after.held_out(judge)
         if refuted(without, with_it):
             out.append("the error on the unseen part GROWS: leave this effect out")
         elif not refuted(with_it, without):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.fit_problem import FitProblem
+from wrist_stiffness.campaign.wander import with_wander
 from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.whitening import NoiseModel
 from wrist_stiffness.mechanism.components import Array
@@ -83,6 +84,8 @@ class Fit:
         Units that the fit saw.
     noise : NoiseModel
         Scatter of the units, with a misfit counted as more of it.
+    wander : (6,) float
+        Scatter of each unit beside what the table states, already in `seen` [m, rad].
     misfit : float
         Sum of the squared white residuals over their degrees of freedom; 1 if only noise is left.
     lost : int
@@ -98,6 +101,7 @@ class Fit:
     residual: Array
     used: Mask
     noise: NoiseModel
+    wander: Array
     misfit: float
     lost: int
     arrived: bool
@@ -109,8 +113,9 @@ class Fit:
 
     @property
     def seen(self) -> Observations:
-        """The units that the fit saw, the others blank."""
-        return self.problem.table.with_values(np.where(self.used[:, None], self.residual, np.nan))
+        """The units that the fit saw, the others blank, with their wander."""
+        blank = np.where(self.used[:, None], self.residual, np.nan)
+        return with_wander(self.problem.table.with_values(blank), self.wander)
 
     @property
     def parameters(self) -> tuple[Fitted, ...]:

@@ -17,6 +17,7 @@ from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fit_result import Fit
 from wrist_stiffness.campaign.free_effects import FreeEffect
 from wrist_stiffness.campaign.shims import GAPS
+from wrist_stiffness.campaign.wander import found_wander, with_wander
 from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.outliers import lost_units
@@ -42,6 +43,8 @@ LOST_COST = 50.0
 """What a lost number costs when ways are compared: seven standard deviations."""
 
 MOST_HALVINGS = 6
+
+NOTHING = np.zeros(6)
 
 
 def fit(
@@ -129,7 +132,12 @@ def _cost(found: Fit) -> float:
 
 
 def _settled(
-    problem: FitProblem, z: Array, unseen: Mask, noise_rounds: int, progress: Progress
+    problem: FitProblem,
+    z: Array,
+    unseen: Mask,
+    noise_rounds: int,
+    progress: Progress,
+    wander: Array = NOTHING,
 ) -> Fit:
     """Take steps until they are done with the noise as it was found in the last round."""
     table, weight = problem.table, problem.weights
@@ -139,6 +147,9 @@ def _settled(
         columns = problem.columns(z)
         lost = lost_units(table.with_values(residual), columns, Settings().outlier_limit)
         seen = table.with_values(np.where((lost | unseen)[:, None], np.nan, residual))
+        if rounds and rounds < noise_rounds:
+            wander = found_wander(seen, columns, weight, z)
+        seen = with_wander(seen, wander)
         if noise is None or rounds < noise_rounds:
             noise = estimate_noise(seen, columns, np.empty((*residual.shape, 0)))
             if rounds == 0:
@@ -160,6 +171,7 @@ def _settled(
         np.where(lost[:, None], np.nan, residual),
         ~unseen,
         linear.noise,
+        wander,
         linear.misfit,
         int(lost.sum()),
         rounds == noise_rounds,

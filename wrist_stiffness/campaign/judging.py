@@ -13,10 +13,10 @@ import numpy as np
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fit_result import Fit
 from wrist_stiffness.campaign.fitting import fit, start_of
+from wrist_stiffness.campaign.wander import with_wander
 from wrist_stiffness.diagnosis.observations import Labels, Observations
 from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
 from wrist_stiffness.diagnosis.settings import Settings
-from wrist_stiffness.diagnosis.whitening import NoiseModel
 from wrist_stiffness.mechanism.components import Array
 
 ANOTHER_SESSION = "another session"
@@ -51,10 +51,11 @@ class Judged:
         left = HeldOut(self.observations.values, np.empty(0))
         return {q.key: left.rmse(q) for q in self.observations.reported}
 
-    def held_out(self, noise: NoiseModel) -> HeldOut:
-        """Return what is left, made white with a noise."""
+    def held_out(self, fit: Fit) -> HeldOut:
+        """Return what is left, made white with the noise of a fit."""
         values = self.observations.values
-        return HeldOut(values, noise.whiten(self.observations, values[:, :, None])[:, 0])
+        units = with_wander(self.observations, fit.wander)
+        return HeldOut(values, fit.noise.whiten(units, values[:, :, None])[:, 0])
 
 
 def judged(
