@@ -67,6 +67,8 @@ def draw_bars(every: Sequence[Bars]) -> Any:
                 xytext=(5, 0),
                 textcoords="offset points",
                 va="center",
+                # The line of a level may run through it.
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
             )
         told: list[str] = []
         for style, (name, level) in zip(LINES, bars.marks.items(), strict=False):

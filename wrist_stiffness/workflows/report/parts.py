@@ -42,7 +42,8 @@ def against(statement: Statement, models: Sequence[tuple[str, Observations]]) ->
     models : sequence of (str, Observations)
         Name and residuals of each model to be shown, over the same units.
     """
-    change, condition = statement.changes[0], statement.condition
+    change = max(statement.changes, key=lambda each: each.size / each.uncertainty)
+    condition = statement.condition
     values = condition.columns[:, 0] if condition.along is None else condition.along
     return Against(
         condition.name,
