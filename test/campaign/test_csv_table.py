@@ -210,7 +210,15 @@ def changed(row, column, value):
         (table_of(), "nothing measured"),
         (table_of(FULL, full_cells).splitlines()[0], "no rows below the column names"),
         (table_of(FULL, full_cells).replace(",", ";"), "separated by ';'"),
-        ("", "column time_s, motor_1_deg, motor_2_deg is missing"),
+        ("", "no column names in the first line"),
+        (table_of(FULL, full_cells).replace(",", "\t"), "separated by tabs"),
+        (changed(1, "x_mm", "x_m"), "column x_m is neither of the load nor of the pose.*x_mm"),
+        (changed(1, "z_mm", "Z_mm"), "column Z_mm is neither of the load nor of the pose"),
+        (changed(1, "spindle_1", "fx_kN"), "column fx_kN is neither of the load nor of the pose"),
+        (changed(7, "time_s", "1e9"), r"row 7, column time_s: 1e9 s is a stamp outside 0 to 21474"),
+        (changed(2, "time_s", "-2e9"), "row 2, column time_s: -2e9 s is a stamp outside 0"),
+        (changed(2, "time_s", "1.7e12"), "row 2, column time_s: 1.7e12 s is a stamp outside 0"),
+        (table_of(",z_mm", lambda i: ","), "nothing is measured in any of its 6 rows"),
     ],
 )
 def test_a_wrong_table_is_one_error_with_its_place(tmp_path, text, reason):

@@ -29,6 +29,9 @@ SIGNIFICANT = (15, 16, 17)
 
 NANOSECONDS = Decimal(1_000_000_000)
 
+STEM = re.compile(r"(motor_[12]|[fm][xyz]|[xyz]|q[xyzw]|p\d+[xyz])(_.*)?", re.IGNORECASE)
+"""What a column of the load or of the pose begins with: never that of a covariate."""
+
 
 @dataclass(frozen=True)
 class Columns:
@@ -88,11 +91,14 @@ def columns_of(header: Sequence[str]) -> Columns:
     Raises
     ------
     InputError
-        If a column is missing, named twice or has no unit, or nothing measured is there.
+        If a column is missing, named twice or has no unit or a wrong one, or nothing measured is
+        there.
     """
     for name in header:
         if list(header).count(name) > 1:
             raise InputError(f"column {name or '(without a name)'} is there twice")
+    if not any(header):
+        raise InputError("no column names in the first line")
     if missing := [name for name in (TIME, *MOTORS) if name not in header]:
         raise InputError(f"column {', '.join(missing)} is missing (found: {', '.join(header)})")
     loads = [name for name in LOAD if name in header]
@@ -117,6 +123,11 @@ def columns_of(header: Sequence[str]) -> Columns:
     for name in header:
         if name in known:
             continue
+        if STEM.fullmatch(name):
+            raise InputError(
+                f"column {name} is neither of the load nor of the pose, which are "
+                f"{', '.join((*LOAD, *POSITION, *QUATERNION))} and p1x_mm ...: check its unit"
+            )
         if found := TEMPERATURE.fullmatch(name):
             temperatures[found[1]] = name
         elif COVARIATE.fullmatch(name):

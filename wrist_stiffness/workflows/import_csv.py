@@ -56,6 +56,9 @@ TIME_ZERO_NS = 1_700_000_000_000_000_000
 EPOCH_FROM_S = 1_000_000_000
 """Times from here on (September 2001) are taken as stamps since 1970."""
 
+LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
+"""ROS 2 counts the seconds of a stamp in 32 bits."""
+
 ROWS_A_REPORT = 1000
 
 
@@ -140,6 +143,8 @@ def import_csv(
                 progress(rows, total)
         if rows == 0:
             raise InputError(f"{table}: no rows below the column names")
+        if measured == 0:
+            raise InputError(f"{table}: nothing is measured in any of its {rows} rows")
     progress(rows, rows)
     return Imported(
         Path(output), rows, measured, tuple(columns.temperatures), tuple(columns.covariates)
@@ -175,10 +180,12 @@ def _survey(table: Path) -> tuple[int, list[str]]:
     except UnicodeDecodeError as error:
         raise InputError(f"{table}: is no text in UTF-8") from error
     header = [name.strip() for name in next(csv.reader([first]), [])]
-    if len(header) < 2 and ";" in first:
-        raise InputError(
-            f"{table}: columns are separated by ';': save it with commas, and points in numbers"
-        )
+    for mark, name in ((";", "';'"), ("\t", "tabs")):
+        if len(header) < 2 and mark in first:
+            raise InputError(
+                f"{table}: columns are separated by {name}: save it with commas, and points in "
+                "numbers"
+            )
     return total, header
 
 
@@ -199,6 +206,7 @@ def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
     readers = {name: reader_of(name) for name in header if name != TIME}
     required = {*MOTORS, *(LOAD if columns.loads else ())}
     before: tuple[int, str] | None = None
+    zero_ns = 0
     with table.open(newline="", encoding="utf-8-sig") as stream:
         lines = csv.reader(stream)
         next(lines)
@@ -217,6 +225,13 @@ def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
                 raise InputError(
                     f"{place}, column {TIME}: {text[TIME]} is not later than {before[1]} of the "
                     "row before"
+                )
+            if before is None:
+                zero_ns = _zero(time_ns)
+            if not 0 <= zero_ns + time_ns <= LAST_STAMP_NS:
+                raise InputError(
+                    f"{place}, column {TIME}: {text[TIME]} s is a stamp outside 0 to "
+                    f"{LAST_STAMP_NS / 1e9:.0f} s since 1970"
                 )
             before = time_ns, text[TIME]
             values = {}
