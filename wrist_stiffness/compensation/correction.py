@@ -11,7 +11,6 @@ import numpy as np
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.single_motion import log_one
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.model.error_model import Prediction
@@ -41,11 +40,14 @@ class Correction:
         Residual twist with the correction, actual minus desired, at O in F [m, rad].
     prediction : Prediction
         At the corrected angles, or so near to them that the twist is the same.
+    jacobian : (3, 2) float
+        Of the platform's angular velocity, at the command.
     """
 
     delta: Array
     after: Array
     prediction: Prediction
+    jacobian: Array
 
 
 def correct(
@@ -93,12 +95,14 @@ def correct(
     InputError
         If the fixed point is not reached.
     """
-    mechanism, desired = workspace.mechanism, workspace.configuration(command)
-    cancelling = objective.cancelling(desired, mechanism.jacobian(desired))
+    desired = workspace.configuration(command)
+    jacobian = workspace.mechanism.jacobian(desired)
+    cancelling = objective.cancelling(desired, jacobian)
 
     def at(delta: Array) -> Correction:
         prediction = predict(command + delta)
-        return Correction(delta, residual_twist(prediction, desired.platform), prediction)
+        after = residual_twist(prediction, desired.platform)
+        return Correction(delta, after, prediction, jacobian)
 
     reached = at(np.zeros(2) if held is None else held)
     size = np.inf
@@ -112,7 +116,7 @@ def correct(
         # The steps shrink by a constant factor, so the last two of them bound what is missing.
         shrinking = size < last < np.inf and size**2 < TOLERANCE * (last - size)
         if shrinking or size < UNCHECKED * play:
-            return as_applied(mechanism, reached, reached.delta + steps)
+            return as_applied(reached, reached.delta + steps)
         reached = at(reached.delta + steps)
     raise InputError(
         f"correction: no fixed point after {MAX_ITERATIONS} steps, last step "
@@ -131,13 +135,11 @@ def _step(missing: float, last_missing: float, last_step: float, play: float) ->
     return -beyond
 
 
-def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Correction:
+def as_applied(correction: Correction, delta: Array) -> Correction:
     """Return what a correction leaves where only another one near it is applied.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        The rigid wrist.
     correction : Correction
         At its fixed point.
     delta : (2,) float
@@ -151,10 +153,9 @@ def as_applied(mechanism: Mechanism, correction: Correction, delta: Array) -> Co
     """
     if delta.tolist() == correction.delta.tolist():
         return correction
-    jacobian = mechanism.jacobian(correction.prediction.configuration)
     after = correction.after.copy()
-    after[3:] += jacobian.dot(delta - correction.delta)
-    return Correction(delta, after, correction.prediction)
+    after[3:] += correction.jacobian.dot(delta - correction.delta)
+    return Correction(delta, after, correction.prediction, correction.jacobian)
 
 
 def residual_twist(prediction: Prediction, desired: Array) -> Array:

@@ -167,8 +167,7 @@ class CorrectionStream(Stream):
         self._held = held
         delta = self._advance(stamp_ns, theta, correction)
         if correction is not None:
-            mechanism = self.running_model().model.table.mechanism
-            correction = as_applied(mechanism, correction, delta)
+            correction = as_applied(correction, delta)
         forgotten = self._remember(stamp_ns, theta + delta, load, theta_dot)
         if self.enabled:
             fault = fault or forgotten
@@ -313,7 +312,7 @@ class CorrectionStream(Stream):
         weight = guard_weight(
             table.workspace, correction.prediction.configuration, self.settings.safety
         )
-        return as_applied(table.mechanism, correction, weight * correction.delta)
+        return as_applied(correction, weight * correction.delta)
 
     def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
         if self.model is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import isfinite
 from typing import Literal
 
@@ -48,17 +49,7 @@ class MotorNames:
         InputError
             If a motor is missing or named twice.
         """
-        found = []
-        listed = list(names)
-        for motor in (self.motor_1, self.motor_2):
-            count = listed.count(motor)
-            if count != 1:
-                count_text = "is missing" if count == 0 else f"is named {count} times"
-                raise InputError(
-                    f"{what}: {motor} {count_text} among {', '.join(names) or 'no names'}"
-                )
-            found.append(listed.index(motor))
-        return found[0], found[1]
+        return _places(self, tuple(names), what)
 
     def angles(
         self, names: Sequence[str], positions: Sequence[float], what: str = JOINT_STATE
@@ -111,6 +102,19 @@ class MotorNames:
             return None
         speeds = np.array([velocities[place] for place in self.places(names)], dtype=float)
         return speeds if np.all(np.isfinite(speeds)) else None
+
+
+@lru_cache(maxsize=32)
+def _places(motors: MotorNames, names: tuple[str, ...], what: str) -> tuple[int, int]:
+    # A stream says the same names in every message.
+    found = []
+    for motor in (motors.motor_1, motors.motor_2):
+        count = names.count(motor)
+        if count != 1:
+            count_text = "is missing" if count == 0 else f"is named {count} times"
+            raise InputError(f"{what}: {motor} {count_text} among {', '.join(names) or 'no names'}")
+        found.append(names.index(motor))
+    return found[0], found[1]
 
 
 @dataclass(frozen=True)
