@@ -67,7 +67,7 @@ def page_of(result, observations, notes=()):
 def test_everything_of_a_finding_is_on_the_page(observations):
     page = page_of(RESULT, observations, ["monday: 5 spikes"])
     for words in (
-        "Missing in the model: joint_clearance at joint_3 (or joint_clearance at joint_4).",
+        "Missing in the model: joint_clearance@joint_3 (or joint_clearance@joint_4).",
         "s from 7.5 to 1.3 µm (noise floor 1.2)",
         "joint_3 has play",
         "To be sure: rock it by hand",
@@ -89,7 +89,7 @@ def test_everything_of_a_finding_is_on_the_page(observations):
 
 def test_nothing_missing_is_said_first(observations):
     page = page_of(replace(RESULT, verdict="none", findings=()), observations)
-    assert "Nothing is missing at this noise" in page
+    assert "Nothing is missing: what is left is noise." in page
     assert "Missing in the model" not in page
 
 

@@ -16,6 +16,7 @@ from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import remarks_of
 from wrist_stiffness.workflows.provenance import Provenance
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+from wrist_stiffness.workflows.verdict import class_of, verdict_lines
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.report.page import Page
@@ -145,23 +146,6 @@ def diagnose_recordings(
     )
 
 
-def verdict_lines(result: Diagnosis) -> list[str]:
-    """Return the verdict in one or two sentences."""
-    if result.verdict == "none":
-        return ["Nothing is missing: what is left is noise."]
-    found = "; ".join(_class_of(each) for each in result.findings)
-    if result.verdict == "effect":
-        return [f"Missing in the model: {found}."]
-    if found:
-        return [f"Missing in the model: {found}.", "Something else that no known effect explains."]
-    return ["Something is missing that no known effect explains."]
-
-
-def _class_of(finding: Finding) -> str:
-    names = finding.names
-    return names[0] if len(names) == 1 else f"{names[0]} (or {', '.join(names[1:])})"
-
-
 def _table(result: Diagnosis) -> list[str]:
     titles = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
     rows = (
@@ -174,7 +158,7 @@ def _table(result: Diagnosis) -> list[str]:
 
 
 def _finding_lines(place: int, finding: Finding) -> list[str]:
-    out = [f"{place}. {_class_of(finding)}", f"   {finding.evidence}"]
+    out = [f"{place}. {class_of(finding)}", f"   {finding.evidence}"]
     out += [
         f"   {name} = {value:.4g} +- {error:.2g}"
         for name, (value, error) in finding.parameters.items()

@@ -30,6 +30,7 @@ from wrist_stiffness.workflows.report.parts import (
     typeset,
     unit_of,
 )
+from wrist_stiffness.workflows.verdict import class_of, verdict_lines
 
 MOST_PICTURED = 4
 """Conditions that are drawn."""
@@ -125,19 +126,15 @@ def report_of_diagnosis(
     return Page(
         "Which physical effect is missing?",
         f"{', '.join(recordings)}: {shown.observations.n_units} dwells and moments in motion",
-        verdict_of(result, quantities),
+        _verdict(result, quantities),
         tuple(sections),
     )
 
 
-def verdict_of(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
+def _verdict(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
     """Return the answer in a few sentences."""
-    found = [_class_of(finding) for finding in result.findings]
-    if result.verdict == "none":
-        return ("Nothing is missing at this noise: no effect of the catalogue is in the data.",)
-    lines = []
-    if found:
-        lines.append(f"Missing in the model: {'; and '.join(found)}.")
+    lines = verdict_lines(result)
+    if result.findings:
         falls = [
             f"{q.name} from {number(result.before[q.key])} to {number(result.after[q.key])} "
             f"{unit_of(q.unit)} (noise floor {number(result.noise_floor[q.key])})"
@@ -154,17 +151,12 @@ def verdict_of(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str
     return tuple(lines)
 
 
-def _class_of(finding: Finding) -> str:
-    names = [f"{effect} at {component}" for effect, component in finding.members]
-    return names[0] if len(names) == 1 else f"{names[0]} (or {', '.join(names[1:])})"
-
-
 def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]:
     if not result.findings:
         return [Text("No effect of the catalogue was found.")]
     parts: list[Part] = []
     for place, finding in enumerate(result.findings, 1):
-        parts.append(Text(f"{place}. {_class_of(finding)}. {typeset(finding.evidence)}."))
+        parts.append(Text(f"{place}. {class_of(finding)}. {typeset(finding.evidence)}."))
         if finding.check:
             parts.append(Text(f"To be sure: {finding.check}."))
         parts.append(_numbers(finding, quantities))
