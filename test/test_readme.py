@@ -1,7 +1,7 @@
 """Every command that the documents teach is run, and prints what they show.
 
-`python test/test_readme.py` writes the real outputs into the documents; do that after the shipped
-table was built anew.
+`python test/test_readme.py` writes the real outputs into the documents, or into those that are
+named; do that after the shipped table was built anew.  A line `...` in an output stands for lines that are left out.
 """
 
 import importlib.metadata
@@ -22,7 +22,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = ("README.md", "docs/commands.md")
+DOCUMENTS = ("README.md", "docs/commands.md", "docs/find-the-missing-effect.md")
 OUR_PROGRAM = {
     "wrist-stiffness": [sys.executable, "-m", "wrist_stiffness"],
     "python": [sys.executable],
@@ -32,6 +32,7 @@ TIMEOUT_S = 300.0
 FENCE = re.compile(r"^```(sh|console)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 CHECKSUM = re.compile(r"\b[0-9a-f]{12}\b")
+LEFT_OUT = "..."
 RELATIVE, ABSOLUTE = 0.02, 0.02
 """Numbers differ in the last digit from machine to machine; an outdated table differs by more."""
 
@@ -75,6 +76,15 @@ def fault_of(command, folder):
     return f"there is no {', no '.join(missing)}" if missing else ""
 
 
+def workplace(folder):
+    """Return a folder below it from which the recordings of the tests are where documents say."""
+    inside = folder / "tutorial"
+    if not inside.exists():
+        (folder / "test").symlink_to(ROOT / "test")
+        inside.mkdir()
+    return inside
+
+
 def run(command, folder):
     name, *arguments = words(command.line)
     return subprocess.run(
@@ -90,13 +100,34 @@ def run(command, folder):
 
 def difference(shown, printed):
     """Compare outputs: texts equal but for blanks, numbers within the tolerance."""
-    shown, printed = plain(shown), plain(printed)
+    shown, printed = plain(shown), plain(excerpt(shown, printed))
     if NUMBER.sub("#", shown) != NUMBER.sub("#", printed):
         return f"it prints\n{printed}\nand not\n{shown}"
     for old, new in zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=True):
         if not math.isclose(float(old), float(new), rel_tol=RELATIVE, abs_tol=ABSOLUTE):
             return f"it prints {new} and not {old} (python test/test_readme.py writes it anew)"
     return ""
+
+
+def excerpt(shown, printed):
+    """Leave out of an output what a document leaves out of it."""
+    if LEFT_OUT not in shown.splitlines():
+        return printed
+    kept, rest = [], printed.splitlines()
+    for line in shown.splitlines():
+        if line == LEFT_OUT:
+            kept.append(line)
+            continue
+        wanted = form(line)
+        while rest and form(rest[0]) != wanted and kept[-1:] == [LEFT_OUT]:
+            rest.pop(0)
+        kept += rest[:1]
+        rest = rest[1:]
+    return "\n".join(kept if kept[-1:] == [LEFT_OUT] else [*kept, *rest])
+
+
+def form(line):
+    return NUMBER.sub("#", plain(line))
 
 
 def plain(output):
@@ -158,7 +189,7 @@ def test_commands_of_the_document_run_and_print_what_it_shows(document, tmp_path
     commands = commands_of((ROOT / document).read_text())
     assert len(commands) > 5
     for command in commands:
-        fault = fault_of(command, tmp_path)
+        fault = fault_of(command, workplace(tmp_path))
         assert not fault, f"{document}: {command.line}\n{fault}"
 
 
@@ -183,6 +214,12 @@ def test_commands_of_the_document_run_and_print_what_it_shows(document, tmp_path
         ("```console\n$ python -c 'print(\"s 8.73 um\")'\ns 9.73 um\n```\n", "8.73 and not 9.73"),
         ("```console\n$ python -c 'print(\"s 8.73 um\")'\ns 8.73 mm\n```\n", "and not"),
         ("```console\n$ python -c 'print(\"s 8.73 um\")'\n```\n", "and not"),
+        ("```console\n$ python -c 'print(\"a\\nb 1\\nc\")'\n...\nb 1\n...\n```\n", ""),
+        ("```console\n$ python -c 'print(\"a\\nb 1\\nc\")'\na\n...\nc\n```\n", ""),
+        ("```console\n$ python -c 'print(\"a\\nb 1\\nc\")'\n...\nb 2\n...\n```\n", "prints 1"),
+        ("```console\n$ python -c 'print(\"a\\nb 1\\nc\")'\n...\nd 1\n...\n```\n", "and not"),
+        ("```console\n$ python -c 'print(\"a\\nb 1\\nc\")'\n...\nb 1\n```\n", "and not"),
+        ("```console\n$ python -c 'print(\"a\\nb 1\\nc\")'\nb 1\n...\n```\n", "and not"),
     ],
 )
 def test_a_wrong_document_is_found(block, fault, tmp_path):
@@ -215,7 +252,8 @@ def test_links_lead_somewhere(document):
 
 def write_outputs(document):
     """Put the real outputs into the `console` blocks of a document."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = workplace(Path(temporary))
 
         def filled(match):
             kind, block = match.groups()
@@ -223,6 +261,7 @@ def write_outputs(document):
             for command in commands_of(match.group(0)):
                 is_ours = words(command.line)[0] in OUR_PROGRAM
                 output = run(command, folder).stdout if is_ours else ""
+                output = excerpt(command.shown or "", output)
                 lines += [f"$ {command.line}", *output.replace(str(ROOT), "...").splitlines()]
             return match.group(0) if kind == "sh" else "\n".join(["```console", *lines, "```"])
 
@@ -231,5 +270,5 @@ def write_outputs(document):
 
 
 if __name__ == "__main__":
-    for name in DOCUMENTS:
+    for name in sys.argv[1:] or DOCUMENTS:
         write_outputs(name)
