@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 
 DESCRIPTION = """\
 Write the measured poses of a recording as a table, one row each, with the motor angles, the load at
@@ -32,25 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument(
         "--table", help="lookup table of the wrist; only loads that turn with the platform need it"
     )
-    parser.add_argument(
-        "--topic",
-        action="append",
-        default=[],
-        metavar="STANDARD:=ACTUAL",
-        help="a topic's name in this recording; may be repeated",
-    )
-    parser.add_argument(
-        "--joint",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="name of motor 1, then of motor 2 (default: motor_1_joint, motor_2_joint)",
-    )
-    parser.add_argument(
-        "--parameters",
-        metavar="FILE",
-        help="the nodes' ROS 2 parameter file, for its sensor frames and age limit of loads",
-    )
+    add_recording_options(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace an existing table")
     parser.add_argument("--json", metavar="FILE", help="write the summary here as well")
     parser.set_defaults(run=_run)
@@ -58,23 +41,18 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
-    from wrist_stiffness.recording.topics import parse_topic_remaps
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.export_csv import export_csv
     from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.parameter_file import node_settings
 
-    if len(arguments.joint) not in (0, 2):
-        raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")
-    settings, _ = node_settings(arguments.parameters, arguments.joint)
+    named = recordings_named([arguments.recording], arguments)
     exported = export_csv(
         arguments.recording,
         arguments.output,
         load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz")),
-        remaps=parse_topic_remaps(arguments.topic),
-        settings=settings,
+        remaps=named.topics,
+        settings=named.settings,
         overwrite=arguments.overwrite,
         progress=Progress("rows"),
     )

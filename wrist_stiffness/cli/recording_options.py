@@ -1,4 +1,4 @@
-"""Options that every command shares which reads recordings with measured poses."""
+"""Options that every command shares which reads recordings."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wrist_stiffness.compensation.settings import StreamSettings
     from wrist_stiffness.workflows.read_sessions import Recordings
 
 
-def add_recording_options(parser: argparse.ArgumentParser) -> None:
-    """Add `--topic`, `--joint` and `--parameters`."""
+def add_recording_options(
+    parser: argparse.ArgumentParser, parameters: str = "sensor frames, age limit of loads"
+) -> None:
+    """Add `--topic`, `--joint` and `--parameters`, of which the command uses these parameters."""
     parser.add_argument(
         "--topic",
         action="append",
@@ -28,7 +31,7 @@ def add_recording_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--parameters",
         metavar="FILE",
-        help="the nodes' ROS 2 parameter file: sensor frames, age limit of loads",
+        help=f"the nodes' ROS 2 parameter file: {parameters}",
     )
 
 
@@ -40,12 +43,24 @@ def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordi
     InputError
         If an option cannot be read.
     """
-    from wrist_stiffness.errors import InputError
     from wrist_stiffness.recording.topics import parse_topic_remaps
-    from wrist_stiffness.workflows.parameter_file import node_settings
     from wrist_stiffness.workflows.read_sessions import Recordings
+
+    settings, _ = settings_named(arguments)
+    return Recordings(paths, parse_topic_remaps(arguments.topic), settings)
+
+
+def settings_named(arguments: argparse.Namespace) -> tuple[StreamSettings, StreamSettings]:
+    """Return the settings of predictor and corrector by those options.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be read.
+    """
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.workflows.parameter_file import node_settings
 
     if len(arguments.joint) not in (0, 2):
         raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")
-    settings, _ = node_settings(arguments.parameters, arguments.joint)
-    return Recordings(paths, parse_topic_remaps(arguments.topic), settings)
+    return node_settings(arguments.parameters, arguments.joint)

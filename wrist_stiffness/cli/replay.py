@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.recording_options import add_recording_options, settings_named
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.output_changes import TopicChanges
@@ -40,25 +41,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument("recording", help="rosbag2 folder with MCAP storage, or a .mcap file")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder or .mcap file")
     parser.add_argument("--model", help="model file (default: the shipped wrist's)")
-    parser.add_argument(
-        "--topic",
-        action="append",
-        default=[],
-        metavar="STANDARD:=ACTUAL",
-        help="a topic's name in this recording; may be repeated",
-    )
-    parser.add_argument(
-        "--joint",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="name of motor 1, then of motor 2 (default: motor_1_joint, motor_2_joint)",
-    )
-    parser.add_argument(
-        "--parameters",
-        metavar="FILE",
-        help="the nodes' ROS 2 parameter file: sensor frames, objective, contact policy ...",
-    )
+    add_recording_options(parser, "sensor frames, objective, contact policy ...")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing OUT")
     parser.add_argument(
         "--against", metavar="OLD_OUT", help="earlier replay to compare with: what changed?"
@@ -77,12 +60,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.json_file import write_json
     from wrist_stiffness.workflows.output_changes import output_changes
-    from wrist_stiffness.workflows.parameter_file import node_settings
     from wrist_stiffness.workflows.replay import replay
 
-    if len(arguments.joint) not in (0, 2):
-        raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")
-    settings = node_settings(arguments.parameters, arguments.joint)
+    settings = settings_named(arguments)
     if arguments.against is not None:
         # Before the replay, which takes its time, and perhaps its place.
         open_recording(arguments.against)
