@@ -75,7 +75,7 @@ class Campaign:
             self.add("/joint_states", stamp, state)
         return self
 
-    def with_loads(self, frame_id="wrist_base", force=lambda i: (0.0, 0.0, -1.0 - 0.01 * i)):
+    def with_loads(self, frame_id="wrist_base", force=lambda i: (0.0, 0.0, -1.0 - 0.005 * i)):
         for i, stamp in enumerate(self.joint_ns):
             wrench = Wrench(Vector3(*force(i)), Vector3())
             self.add("/load_estimate", stamp, WrenchStamped(Header(int(stamp), frame_id), wrench))

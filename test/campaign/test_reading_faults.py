@@ -98,6 +98,29 @@ def test_a_load_that_never_changes_is_said(tmp_path, campaign, table):
     assert any("the load never changes" in remark for remark in session.remarks)
 
 
+def test_loads_in_another_unit_are_said_and_not_dropped_in_silence(tmp_path, campaign, table):
+    """Pulling ever harder, up to 102 N instead of 1: gram-force in place of newton."""
+    campaign.with_joints().with_loads(force=lambda i: (0.0, 0.0, -102.0 * i / 799)).with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    limit = table.geometry.limits.force
+    beyond = np.sum(np.abs(session.block.load[:, 2]) > limit)
+    assert 0 < beyond < len(session)
+    said = f"{beyond} of 799 measured poses are not used: the force at O goes up to 102 N"
+    assert any(said in text and f"limit is {limit:g} N" in text for text in session.remarks)
+
+
+@pytest.mark.parametrize(("offset_m", "read"), [(0.015, True), (0.025, False), (-1.5, False)])
+def test_positions_far_from_o_are_refused(tmp_path, campaign, table, offset_m, read):
+    shift = np.full((len(campaign.pose_ns), 3), [0.0, offset_m, 0.0])
+    recording = campaign.with_joints().with_loads().with_poses(shift=shift).written(tmp_path / "b")
+    if read:
+        assert len(read_session(recording, table)) == len(shift)
+        return
+    said = f"more than {1e3 * abs(offset_m):g} mm .limit 20 mm. from the base's O along y"
+    with pytest.raises(InputError, match=said):
+        read_session(recording, table)
+
+
 def test_swapped_motors_are_refused(tmp_path, campaign, table):
     """They look nearly like an instrument that is turned by a quarter."""
     campaign.with_joints(("motor_2_joint", "motor_1_joint")).with_loads().with_poses()

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
+from wrist_stiffness.campaign.table_range import beyond_range
 from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
 from wrist_stiffness.diagnosis import Observations, Quantity
 from wrist_stiffness.errors import InputError
@@ -171,7 +172,7 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     if not accepted.any():
         raise InputError(
             f"{session.name}: none of {len(session)} measurements lies in the table's domain and "
-            "load range"
+            f"load range ({'; '.join(beyond_range(model.table, session.block))})"
         )
     session = session.take(accepted)
     parts = cut(

@@ -28,7 +28,8 @@ from wrist_stiffness.campaign.registration import agreement
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.signals import Signal, Stamps
 from wrist_stiffness.campaign.spikes import spikes
-from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.campaign.table_range import beyond_range
+from wrist_stiffness.compensation.intake import BASE_FRAME, Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, RecordingError
@@ -51,6 +52,9 @@ ANGLES_USED = 20_000
 """Joint states that are enough to tell the offset of the clocks."""
 
 LEAST_POSES = 5
+
+FAR_M = 0.02
+"""Farther from O than registrations are: their refit would leave errors of its own [m]."""
 
 OWN_CLOCK_S = 0.2
 """A larger offset is another clock and is taken out; a smaller one is the effect `time_delay`."""
@@ -162,6 +166,8 @@ def _session(
     block = machine.at(time_ns)
     rigid = rigid_rotation(table, block.theta)
     _require_same_wrist(rotation, rigid)
+    _require_near(shift)
+    remarks += beyond_range(table, block)
     lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
     if lost.any():
         remarks.append(f"{lost.sum()} of {len(lost)} measured poses are spikes: left out")
@@ -271,6 +277,22 @@ def _require_same_wrist(rotation: Array, rigid: Array) -> None:
         f"instrument is turned by {np.degrees(found.turn):.0f} deg; map its frame, or check the "
         "joints' names, order and signs"
     )
+
+
+def _require_near(shift: Array) -> None:
+    """Refuse positions that no registration explains: a wrong unit or another frame."""
+    known = np.isfinite(shift).any(axis=0)
+    if not known.any():
+        return
+    off = np.where(known, np.nanmedian(np.abs(np.where(known, shift, 0.0)), axis=0), 0.0)
+    worst = int(np.argmax(off))
+    if off[worst] > FAR_M:
+        raise InputError(
+            f"the measured positions are not those of the platform's point O in {BASE_FRAME}: half "
+            f"of them are more than {1e3 * off[worst]:.4g} mm (limit {1e3 * FAR_M:g} mm) from the "
+            f"base's O along {'xyz'[worst]}; map the instrument's frame, or check the unit (m in a "
+            "recording, mm in a table)"
+        )
 
 
 def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOffset | None:
