@@ -18,11 +18,18 @@ from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.ros.stream_messages import (
+    JointSample,
+    error_payload,
+    joint_payload,
+    joint_reader,
+)
 from wrist_stiffness.shipped import shipped_file
 
 NAMES = ("motor_1_joint", "motor_2_joint")
 SAMPLES = 500
 ROUNDS = 7
+MILLISECOND = 1_000_000
 
 
 def microseconds(step: Callable[[int], object]) -> float:
@@ -53,6 +60,8 @@ def main() -> None:
     predictions = [model.predict(each, load) for each in theta]
     objective = Objective("pointing", table.geometry.platform.normal, np.zeros(3))
     jacobian = table.mechanism.jacobian(configurations[0])
+    read, covariance = joint_reader(), predictions[0].covariance
+    state = joint_payload(JointSample(1, "", NAMES, tuple(theta[0].tolist()), (), ()))
     unlike = np.random.default_rng(0).permutation(SAMPLES)
 
     def guess(i: int) -> np.ndarray:
@@ -84,8 +93,12 @@ def main() -> None:
         "predict a sample": lambda i: predicting.on_joint_state(i + 2, NAMES, theta[i].tolist()),
         "what cancels the task": lambda i: objective.cancelling(configurations[i], jacobian),
         "residual twist": lambda i: residual_twist(predictions[i], configurations[i].platform),
-        "fixed point": correction,
-        "correct a command": lambda i: correcting.on_command(i + 2, "", NAMES, theta[i].tolist()),
+        "fixed point from nothing": correction,
+        "correct a command": lambda i: correcting.on_command(
+            i * MILLISECOND + 2, "", NAMES, theta[i].tolist()
+        ),
+        "joint state from bytes": lambda i: read(state),
+        "pose error to bytes": lambda i: error_payload(i, predictions[i].twist, covariance),
         "pose of the twist": lambda i: pose_of_twist(predictions[i].twist),
         "general operators, response": lambda i: respond(
             table.operators_at(configurations[i]), load.wrench, guess(i)
