@@ -51,11 +51,13 @@ def effect(name, **values):
 @pytest.mark.parametrize(
     ("added", "share"),
     [
-        # Of the largest change.  A load that changes is a mean over some 50 ms.
-        (effect("platform_compliance@platform", z_um_per_N=1.0), 6e-3),
+        # Of the largest change.  A dwell is told by a handful of moments: what has no memory is
+        # exact, what creeps or slips is as good as the trapezoid rule.
+        (effect("platform_compliance@platform", z_um_per_N=1.0), 1e-8),
+        (effect("backlash@motor_1", width_mdeg=50.0), 1e-8),
+        (effect("joint_clearance@joint_3", clearance_um=5.0), 1e-8),
         (effect("creep@joint_3", delayed_percent=20.0, time_constant_s=5.0), 3e-3),
-        (effect("backlash@motor_1", width_mdeg=50.0), 5e-3),
-        (effect("joint_friction@joint_3", coefficient=0.1), 3e-2),
+        (effect("joint_friction@joint_3", coefficient=0.1), 1e-3),
     ],
     ids=lambda value: getattr(value, "name", ""),
 )
@@ -69,4 +71,8 @@ def test_kept_moments_tell_what_all_samples_tell(model, session, added, share):
     scale = np.maximum([np.abs(change[:, :3]).max(), np.abs(change[:, 3:]).max()], [1e-9, 1e-7])
     full = np.array([change[label == u].mean(axis=0) for u in range(len(column))])
     off = np.abs(column - full) / np.repeat(scale, 3)
-    assert np.quantile(off, 0.99) < share
+    dwell = units.cut.dwell
+    assert off[dwell].max() < share
+    # In motion only while the load changes: there it is a mean over some 50 ms.
+    assert np.median(off[~dwell]) < 1e-3
+    assert np.quantile(off[~dwell], 0.99) < 0.05
