@@ -72,6 +72,10 @@ RECORDED = CellSettings(rate_hz=10.0, program_seconds=120.0, program_seed=101)
 NEW = CellSettings(rate_hz=20.0, program_seconds=60.0, program_seed=202)
 """What is recorded, and the new motions: other poses, loads and days."""
 
+SLOW = ("thermal_expansion", "thermal_softening")
+SLOW_RATE_HZ, SLOW_TIMES = 2.0, 10.0
+"""Parts warm within ten minutes: their experiments take so many times longer."""
+
 SETTINGS = Settings(permutations=299)
 SEED = 5
 TARE = "load_bias"
@@ -114,11 +118,20 @@ def extended(
     return model, added
 
 
+def paced(settings: CellSettings, effect: str) -> CellSettings:
+    """Return an experiment that is long enough for an effect."""
+    if effect not in SLOW:
+        return settings
+    seconds = SLOW_TIMES * settings.program_seconds
+    return replace(settings, rate_hz=SLOW_RATE_HZ, program_seconds=seconds)
+
+
 def hidden(name: str, table: Table) -> tuple[CellSettings, float]:
     """Return the settings of the recording with an effect, and its size."""
+    settings = paced(RECORDED, name.partition("@")[0])
     for size in SIZES:
         try:
-            return hide(name, size, table, RECORDED, RECORDED.program_seconds), size
+            return hide(name, size, table, settings, settings.program_seconds), size
         except InputError as error:
             reason = error
     raise reason
@@ -139,7 +152,8 @@ def loop(name: str, model: ErrorModel, told: bool) -> dict[str, Any]:
         findings = [list(finding.names) for finding in result.findings]
     names = [f"{effect}@{component}"] if told else [each[0] for each in findings]
     better, added = extended(model, session, names)
-    motion = Motion(table, replace(NEW, hidden=settings.hidden), NEW.program_seconds, SEED + 1)
+    new_motions = replace(paced(NEW, effect), hidden=settings.hidden)
+    motion = Motion(table, new_motions, new_motions.program_seconds, SEED + 1)
     old, new = motion.corrected(model), motion.corrected(better)
     rows = {
         "floor": motion.floor(),

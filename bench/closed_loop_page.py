@@ -19,8 +19,8 @@ SEEN = 1.2
 
 HEADER = (
     "| hidden effect | size | diagnosed as | pointing before → after [mdeg] | floor [mdeg] "
-    "| moving, after [mdeg] | shift before → after [µm] | compensable |\n"
-    "|---|---|---|---|---|---|---|---|\n"
+    "| moving, after [mdeg] | turns | shift before → after [µm] | compensable |\n"
+    "|---|---|---|---|---|---|---|---|---|\n"
 )
 
 
@@ -43,6 +43,7 @@ def line(row: Mapping[str, Any]) -> str:
         f"{mdeg(old['resting'])} → {mdeg(new['resting'])}",
         mdeg(floor["resting"]),
         mdeg(new["moving"]),
+        f"{new['turns']} / {row['ideal']['turns']}",
         f"{um(old['shift'])} → {um(new['shift'])}",
         answer(row),
     )
