@@ -238,8 +238,6 @@ def wrist_candidates(
                 index(law, place, column.trial)
                 if column.origin:
                     index(law, place, column.origin)
-        if _meets(own, near.get(f"{law.id}@{place}")):
-            index(law, place, dict(near[f"{law.id}@{place}"]))
     changes = point.changes(listed, progress)
     found = []
     for law, place, own in plans:
@@ -256,11 +254,6 @@ def wrist_candidates(
                     change = change - changes[index(law, place, column.origin)]
                 stack.append(change / column.size)
             known[shape] = np.stack(stack, axis=-1)
-            values = near.get(f"{law.id}@{place}")
-            if values and _meets(own, values) and shape == _shape_of(own, values):
-                whole = changes[index(law, place, dict(values))]
-                each = np.array([values[column.factor.name] for column in own.columns(shape)])
-                known[shape] = meeting(known[shape], each, whole)
         found.append(WristCandidate(law, place, own, known, seen=f"{law.id}@{place}" in near))
     return tuple(found)
 
@@ -279,42 +272,6 @@ def _wave(point: Point, place: str) -> Callable[[Shape], Array]:
         return turn[:, :, None] * wave[:, None, :]
 
     return columns
-
-
-def _meets(own: Recipe, values: Mapping[str, float] | None) -> bool:
-    """Tell whether an effect with several columns was found, and these are its parameters."""
-    if not values:
-        return False
-    columns = own.columns(tuple(p.grid[0] for p in own.shape))
-    return len(columns) > 1 and all(column.factor.name in values for column in columns)
-
-
-def _shape_of(own: Recipe, values: Mapping[str, float]) -> Shape:
-    return tuple(values[parameter.name] for parameter in own.shape)
-
-
-def meeting(columns: Array, values: Array, whole: Array) -> Array:
-    """Return columns that add up to the whole effect at given values, (u, 6, k).
-
-    A sensor turned by two angles is not the sum of two turns: what is left over goes to the
-    parameters in proportion to what each does alone.
-
-    Parameters
-    ----------
-    columns : (u, 6, k) float
-        Each parameter alone.
-    values : (k,) float
-        Where they shall meet.
-    whole : (u, 6) float
-        The effect there [m, rad].
-    """
-    alone = np.linalg.norm((columns * values).reshape(-1, len(values)), axis=0)
-    if not alone.any():
-        return columns
-    rest = whole - columns @ values
-    # By squares: what is nearly idle gets nearly nothing, whatever its value.
-    share = np.where(values != 0.0, alone**2 / np.sum(alone**2), 0.0)
-    return columns + rest[:, :, None] * share / np.where(values != 0.0, values, 1.0)
 
 
 def _points(own: Recipe) -> list[Shape]:
