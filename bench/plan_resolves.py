@@ -6,7 +6,8 @@ the true one are its class of twins.  `plan` chooses extra settings, each visite
 where these do not suffice it plans again, five times at most.  The others are random: poses,
 sides, and loads of the same list.  Both are performed by the virtual cell, with instruments set up
 anew.  Counted are poses (one approach each; the other side is another pose) and measurements at
-rest (a planned pose with a load is two, as it is measured without it as well; a random one is one).
+rest (a planned pose with a load is two, as it is measured without it as well; a random one is one,
+and once more with such returns).
 A class is resolved from the number on at which every wrong twin lies behind the true one by 25 in
 the Bayesian information criterion, noise aside, with everything refitted that a diagnosis refits.
 Reference poses and long holds, which a plan has besides, are left out.
@@ -18,12 +19,14 @@ from __future__ import annotations
 
 import sys
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wrist_stiffness.campaign import design_pool, planning
 from wrist_stiffness.campaign.design_information import (
+    CHARGE,
+    FREE,
     RESOLVED,
     Goal,
     Information,
@@ -78,7 +81,8 @@ HIDDEN = (
 """What poses and loads at rest can show, and no diagnosis refits anyway."""
 
 VISIBLE = 6.0
-"""Discrimination from nothing that the hidden effect has in the paper's design."""
+"""Discrimination from nothing that the hidden effect has in the paper's design, square root of what
+its law's parameters do not cost: a diagnosis finds it."""
 
 DECISIVE = 6.0
 MOST_TWINS = 5
@@ -86,10 +90,15 @@ EXTRA = 40
 """Extra poses at most."""
 
 PLANS = 5
+STEPS = 5
+LONGEST_STEP = 1.0
+ARMS = ("planned", "random", "random with returns")
 design_pool.POOL = 40
 """Fewer settings than the command has to choose from, to save time."""
 
 planning.fixed_visits = lambda *given: design_pool.fixed_visits(*given)[:1]
+planning._Pool.fixed_gram = lambda _, grams: np.zeros(grams.shape[1:])
+"""Reference poses and holds are left out of what is measured, so of the plan's reckoning too."""
 
 RATE_HZ = 5.0
 PACE = Pace(float(np.radians(30.0)), 2.0, in_motion=False)
@@ -164,17 +173,25 @@ def left_by(timeline: Timeline, hidden: HiddenEffect) -> np.ndarray:
     return performed(timeline, hidden) - performed(timeline, None)
 
 
-def told(timeline: Timeline, sets: list, truth: str, left: np.ndarray | None) -> Information:
-    """Return the Gram matrices with the simulation's effect in place of the model's."""
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What an experiment has measured, (n, 6), and what nuisances leave in it."""
+
+    timeline: Timeline
+    nuisances: list[Signature]
+    left: np.ndarray
+
+
+def told(timeline: Timeline, sets: list, truth: str, left: np.ndarray) -> tuple[Information, list]:
+    """Return Gram matrices with the simulation's effect in place of the model's, and nuisances."""
     known = (*SESSION, *WRIST)
     found = signatures(MODEL, timeline.block, [*((effect_named(n),) for n in known), *sets])
     effects = [each for each in found[len(known) :] if not each.lacks]
-    if left is not None:
-        effects = [
-            replace(each, truths=left[..., None]) if each.name == truth else each
-            for each in effects
-        ]
-    return information(timeline, found[: len(known)], SESSION, effects, TABLE, NOISE)
+    effects = [
+        replace(each, truths=left[..., None]) if each.name == truth else each for each in effects
+    ]
+    nuisances = found[: len(known)]
+    return information(timeline, nuisances, SESSION, effects, TABLE, NOISE), nuisances
 
 
 def behind(gram: np.ndarray, layout: Layout, truth: str, names: list[str]) -> np.ndarray:
@@ -184,24 +201,56 @@ def behind(gram: np.ndarray, layout: Layout, truth: str, names: list[str]) -> np
     return squares[..., 1:] - squares[..., :1]
 
 
-def fitted(known: Information, truth: str, signature: Signature) -> Effect | None:
-    """Return an effect with the values that fit the hidden one best, None if out of bounds."""
+def worth_its_parameters(known: Information, truth: str, name: str) -> bool:
+    """Tell whether the criterion prefers an effect to nothing for what the truth left."""
     left = beyond_nuisances(known.total, known.layout)
-    columns, y = known.layout.columns[signature.name], known.layout.truths[truth]
-    inner = left[np.ix_(columns, columns)]
-    sizes = np.linalg.lstsq(inner + 1e-2 * np.eye(len(inner)), left[np.ix_(columns, y)])[0][:, 0]
-    effect, values = signature.effect, {}
+    columns, y = known.layout.columns[name], known.layout.truths[truth]
+    inner = left[np.ix_(columns, columns)] + np.eye(len(columns)) / FREE**2
+    cross = left[np.ix_(columns, y)]
+    return float((cross.T @ np.linalg.solve(inner, cross)).item()) > CHARGE * len(columns)
+
+
+def in_bounds(gram: np.ndarray, layout: Layout, truth: str, signature: Signature) -> bool:
+    """Tell whether about such values fit the hidden effect best as its law allows."""
+    left = beyond_nuisances(gram, layout)
+    columns, y = layout.columns[signature.name], layout.truths[truth]
+    inner = left[np.ix_(columns, columns)] + np.eye(len(columns)) / FREE**2
+    sizes = np.linalg.solve(inner, left[np.ix_(columns, y)])[:, 0]
+    effect = signature.effect
     linear = effect.stage != "sensor" and all(p.linear for p in effect.parameters)
-    for p, size in zip(effect.parameters, sizes, strict=True):
-        base = 0.0 if linear else effect.estimates[p.key].value
-        values[p.key] = base + float(size) * p.scale
-        if not p.lower <= values[p.key] <= p.upper:
-            return None
-    return effect.with_values(values)
+    return all(
+        p.lower <= (0.0 if linear else effect.estimates[p.key].value) + size * p.scale <= p.upper
+        for p, size in zip(effect.parameters, sizes, strict=True)
+    )
+
+
+def fitted(data: list[Measured], effect: Effect) -> Effect:
+    """Return an effect with the values that fit all data best, by Gauss's method."""
+    scale = np.array([p.scale for p in effect.parameters])
+    lower, upper = np.array([(p.lower, p.upper) for p in effect.parameters]).T
+    for _ in range(STEPS):
+        gram = np.zeros(())
+        for measured in data:
+            (own,) = signatures(MODEL, measured.timeline.block, [(effect,)])
+            own = replace(own, truths=measured.left[..., None] - own.truths)
+            known = information(measured.timeline, measured.nuisances, SESSION, [own], TABLE, NOISE)
+            gram = gram + carried_over(known, (*SESSION, TARE))
+        left = beyond_nuisances(gram, known.layout)
+        values = np.array([effect.estimates[p.key].value for p in effect.parameters])
+        step = np.linalg.solve(
+            left[:-1, :-1] + np.eye(len(values)) / FREE**2,
+            left[:-1, -1] - values / scale / FREE**2,
+        )
+        step *= min(1.0, LONGEST_STEP / np.abs(step).max())
+        values = np.clip(values + scale * step, lower, upper)
+        effect = effect.with_values(
+            {p.key: float(v) for p, v in zip(effect.parameters, values, strict=True)}
+        )
+    return effect
 
 
 def resolved_from(
-    poor: np.ndarray, extra: Information, counts: np.ndarray, truth: str, twins: list
+    poor: np.ndarray, extra: Information, timeline: Timeline, truth: str, twins: list
 ) -> tuple[float, float]:
     """Return the numbers of poses and measurements from which on the class is resolved."""
     grams = poor + np.cumsum(extra.grams, axis=0)
@@ -209,13 +258,12 @@ def resolved_from(
     if not good[-1]:
         return np.inf, np.inf
     last = int(np.flatnonzero(~good)[-1]) + 1 if not good.all() else 0
-    return float(last + 1), float(np.cumsum(counts)[last])
+    return float(last + 1), float(np.cumsum(np.bincount(timeline.visit))[last])
 
 
-def planned_visits(question: Question, poor: Timeline, seed: int) -> list[Visit]:
+def planned_visits(question: Question, earlier: list[Timeline], seed: int) -> list[Visit]:
     """Return the visits that a plan chooses, none where nothing can be settled."""
-    found = plan(MODEL, question, Conditions(LOADS, PACE, NOISE, None, seed), [poor])
-    return [v for setting in found.settings for v in setting.visits(PACE.dwell_s)]
+    return list(plan(MODEL, question, Conditions(LOADS, PACE, NOISE, None, seed), earlier).visits)
 
 
 def random_visits(seed: int) -> list[Visit]:
@@ -243,9 +291,10 @@ def one_case(seed: int, poor: Timeline, poor_model: list[Signature], sets: dict)
             effects = [replace(r, truths=left[..., None]) if r.name == truth else r for r in rivals]
             known = information(poor, nuisances, SESSION, effects, TABLE, NOISE)
             size = float(discrimination(known.total, known.layout, [Goal(truth, "")])[0])
-            if 0.8 * VISIBLE < size < 1.25 * VISIBLE:
+            wanted = np.sqrt(VISIBLE**2 + CHARGE * len(known.layout.columns[truth]))
+            if 0.8 * wanted < size < 1.25 * wanted:
                 break
-            larger = hidden.magnitude * VISIBLE / max(size, 1e-3)
+            larger = hidden.magnitude * wanted / max(size, 1e-3)
             if larger > ALL[effect].limit:
                 return {"truth": truth, "skip": "too small at its limit"}
             hidden = replace(hidden, magnitude=larger)
@@ -260,55 +309,66 @@ def one_case(seed: int, poor: Timeline, poor_model: list[Signature], sets: dict)
             name
             for name in names
             if margins[name] - best <= DECISIVE
-            and (name == truth or fitted(known, truth, by_name[name]) is not None)
+            and worth_its_parameters(known, truth, name)
+            and (name == truth or in_bounds(known.total, known.layout, truth, by_name[name]))
         ),
         key=margins.__getitem__,
     )
     if truth not in members:
-        return {
-            "truth": truth,
-            "skip": f"the paper's design prefers {min(margins, key=margins.get)}",
-        }
+        return {"truth": truth, "skip": "not in the class that the paper's design leaves"}
     members = members[:MOST_TWINS]
     if truth not in members:
         members[-1] = truth
     if len(members) < 2:
         return {"truth": truth, "skip": "no twins"}
-    first = fitted(known, truth, by_name[members[0]])
     twins = [name for name in members if name != truth]
-    classed = [sets[name] for name in members]
-    found: dict = {"truth": truth, "twins": twins}
-    if first is None:
-        first = effect_named(truth)
-    others = [effect_named(name) for name in members[1:]]
     own = [by_name[name] for name in members]
     paper = carried_over(information(poor, nuisances, SESSION, own, TABLE, NOISE), (*SESSION, TARE))
-
-    def resolved(visits: list[Visit], once: bool) -> tuple[float, float]:
-        order = np.random.default_rng([seed, 2]).permutation(len(visits))
-        timeline = run_through([visits[i] for i in order], WORKSPACE, PACE, np.zeros(2))
-        timeline = once_each(timeline) if once else timeline
-        extra = told(timeline, classed, truth, left_by(timeline, hidden))
-        counts = np.bincount(timeline.visit)[np.argsort(order)]
-        extra = Information(extra.grams[np.argsort(order)], extra.layout)
-        return resolved_from(paper, extra, counts, truth, twins)
-
-    visits: list[Visit] = []
-    found["planned"] = np.inf, np.inf
+    found: dict = {"truth": truth, "twins": twins, "planned": (np.inf, np.inf)}
+    rounds: list[list[Visit]] = []
+    data, gram, layout = [Measured(poor, nuisances, left)], known.total, known.layout
     for number in range(PLANS):
-        question = between([[first, *others]], [], np.random.default_rng([seed, number]))
-        added = planned_visits(question, poor, seed + 1000 * number)
+        left_over = still_open(gram, layout, truth, members, data, sets)
+        if len(left_over) < 2:
+            break
+        question = between([left_over], [], np.random.default_rng([seed, number]))
+        added = planned_visits(question, [each.timeline for each in data], seed + 1000 * number)
         if not added:
             break
-        visits = [*visits, *added][:EXTRA]
-        found["planned"] = resolved(visits, once=False)
-        if np.isfinite(found["planned"][0]):
+        order = np.random.default_rng([seed, 2, number]).permutation(len(added))
+        rounds.append([added[i] for i in order])
+        visits = [visit for each in rounds for visit in each][:EXTRA]
+        timeline = run_through(visits, WORKSPACE, PACE, np.zeros(2))
+        measured = left_by(timeline, hidden)
+        extra, own = told(timeline, [sets[name] for name in members], truth, measured)
+        found["planned"] = resolved_from(paper, extra, timeline, truth, twins)
+        if np.isfinite(found["planned"][0]) or len(visits) == EXTRA:
             break
-    if not visits:
-        found["skip"] = f"the plan says that no experiment tells it from {', '.join(twins)}"
-        return found
-    found["random"] = resolved(random_visits(seed), once=True)
+        data = [data[0], Measured(timeline, own, measured)]
+        gram, layout = paper + extra.total, extra.layout
+    timeline = run_through(random_visits(seed), WORKSPACE, PACE, np.zeros(2))
+    left, classed = left_by(timeline, hidden), [sets[name] for name in members]
+    for name, measured in (("random", once_each(timeline)), ("random with returns", timeline)):
+        extra, _ = told(measured, classed, truth, left)
+        found[name] = resolved_from(paper, extra, measured, truth, twins)
     return found
+
+
+def still_open(
+    gram: np.ndarray,
+    layout: Layout,
+    truth: str,
+    members: list[str],
+    data: list[Measured],
+    sets: dict,
+) -> list[Effect]:
+    """Return what a diagnosis of all data would leave, best first and with the values found."""
+    margins = dict(zip(members, behind(gram, layout, truth, members), strict=True))
+    best = min(margins.values())
+    kept = sorted(
+        (name for name in members if margins[name] - best < RESOLVED**2), key=margins.__getitem__
+    )
+    return [fitted(data, sets[kept[0]][0]), *(effect_named(name) for name in kept[1:])]
 
 
 def main() -> None:
@@ -325,20 +385,22 @@ def main() -> None:
     poor_model = [each for each in signs if not each.lacks]
     done, skipped = [], 0
     while len(done) < wanted:
-        found = one_case(seed, poor, poor_model, sets)
+        try:
+            found = one_case(seed, poor, poor_model, sets)
+        except InputError as error:
+            found = {"truth": "", "skip": str(error)[:60]}
         if "skip" in found:
             skipped += 1
             print(f"{seed:4d} {found['truth']:32s} left out: {found['skip']}", flush=True)
         else:
             done.append(found)
-            (planned, more), (random, _) = found["planned"], found["random"]
-            print(
-                f"{seed:4d} {found['truth']:32s} planned {planned:3.0f} poses ({more:3.0f} "
-                f"measurements)  random {random:3.0f}  against {', '.join(found['twins'])}",
-                flush=True,
+            figures = "  ".join(
+                f"{arm} {found[arm][0]:3.0f} ({found[arm][1]:3.0f})" for arm in ARMS
             )
+            print(f"{seed:4d} {found['truth']:32s} {figures}  against {', '.join(found['twins'])}")
+            sys.stdout.flush()
         seed += 1
-    pairs = np.array([(each["planned"], each["random"]) for each in done])
+    pairs = np.array([[each[arm] for arm in ARMS] for each in done])
     settled = np.isfinite(pairs).any(axis=(1, 2))
     print(
         f"{len(done)} cases, {skipped} left out; in {int(np.sum(~settled))} neither the planned "
@@ -346,7 +408,8 @@ def main() -> None:
     )
     pairs = pairs[settled]
     for place, what in enumerate(("poses", "measurements")):
-        report(pairs[..., place], what)
+        report(pairs[:, [0, 1], place], what)
+    report(pairs[:, [0, 2], 0], "poses, random ones measured without load as well")
 
 
 def report(pairs: np.ndarray, what: str) -> None:

@@ -29,9 +29,9 @@ from wrist_stiffness.campaign.design_question import (
 )
 from wrist_stiffness.campaign.design_signatures import plausible, signatures
 from wrist_stiffness.campaign.design_timeline import Pace, Visit, run_through
+from wrist_stiffness.campaign.design_truths import after_data, as_asked
 from wrist_stiffness.campaign.loads_file import NO_LOAD, AppliedLoad
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.planning import equal_sizes
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
@@ -148,19 +148,63 @@ def test_discrimination_is_the_distance_of_dense_least_squares(
         charge = CHARGE * (effects[rival].columns.shape[2] - effects[truth].columns.shape[2])
         apart = np.clip(apart + charge, 0.0, own)
     found = discrimination(known.total, known.layout, [goal])[0]
-    assert found == pytest.approx(np.sqrt(apart.mean()), rel=1e-5, abs=1e-4)
+    # Over several truths the bound on a wrong answer is averaged.
+    wrong = np.exp(-0.125 * apart).mean()
+    assert found == pytest.approx(np.sqrt(-8.0 * np.log(wrong)), rel=1e-5, abs=1e-4)
 
 
-def test_visits_add_up_and_scales_move_truths_alone(known, evaluated):
+def test_visits_add_up_and_rivals_without_data_are_equally_large(known):
     assert np.allclose(known.total, known.grams.sum(axis=0))
     goals = [Goal("backlash@motor_1", ""), Goal("drive_compliance@motor_1", "")]
     before = discrimination(known.total, known.layout, goals)
-    scaled = known.scaled({"backlash@motor_1": 3.0})
-    after = discrimination(scaled.total, known.layout, goals)
-    assert np.allclose(after, before * [3.0, 1.0])
-    factors = equal_sizes(known, [[goal.truth for goal in goals]])
-    equal = discrimination(known.scaled(factors).total, known.layout, goals)
+    truths = as_asked(known, [[goal.truth for goal in goals]])
+    equal = discrimination(truths.of(known.total), truths.layout, goals)
     assert equal == pytest.approx([before[0], before[0]])
+    columns = len(known.layout.prior) + known.layout.columns["drive_compliance@motor_1"]
+    scaled = np.ix_(columns, columns)
+    assert np.allclose(truths.of(known.total)[scaled], known.total[scaled])
+
+
+def test_a_rival_is_what_fits_the_data_that_the_best_member_explains(model, timeline, evaluated):
+    """Against one least squares over all measurements, the rival's prior and the nuisances' in."""
+    nuisances, effects = evaluated
+    best, rival = effects[0], effects[2]
+    known = information(timeline, nuisances, NUISANCES[:1], effects, model.table, NOISE)
+    truths = after_data(
+        known.total, known.layout, [[best.name, rival.name]], np.random.default_rng(0)
+    )
+    stacked = np.concatenate(
+        [*(each.columns for each in nuisances), rival.columns, best.truths], axis=2
+    )
+    white = np.vstack(whitened(timeline, stacked, model.table, NOISE))
+    count = rival.columns.shape[2]
+    ridge = np.concatenate([np.sqrt(known.layout.prior), np.ones(count)])
+    matrix = np.vstack([white[:, :-1], np.diag(ridge)])
+    target = np.append(white[:, -1], np.zeros(len(ridge)))
+    fitted = np.linalg.lstsq(matrix, target, rcond=None)[0][-count:]
+    p = len(known.layout.prior)
+    place = p + truths.layout.truths[rival.name][0]
+    assert truths.combined[p + known.layout.columns[rival.name], place] == pytest.approx(
+        fitted, rel=1e-6
+    )
+
+
+def test_draws_are_as_wide_as_the_data_leave_the_values(known):
+    """Many draws: nearly the prior without data, nearly the best values with very many."""
+    name = "drive_compliance@motor_1"
+    alike = [["backlash@motor_1", name]]
+    widths = []
+    for share in (1e-9, 1.0, 1e6):
+        rng = np.random.default_rng(1)
+        values = []
+        for _ in range(200):
+            truths = after_data(share * known.total, known.layout, alike, rng)
+            places = len(known.layout.prior) + truths.layout.truths[name]
+            row = len(known.layout.prior) + known.layout.columns[name][0]
+            values += list(np.diff(truths.combined[row, places[:2]]))
+        widths.append(np.std(values))
+    assert widths[0] == pytest.approx(1.0, rel=0.2)
+    assert widths[0] > widths[1] > 100.0 * widths[2]
 
 
 def test_more_measurements_never_harm(known):

@@ -106,17 +106,38 @@ def rivals_without_load():
     return between([[backlash, effect_named("encoder_eccentricity@motor_1")]], [], generator())
 
 
-def test_each_pose_is_approached_from_both_sides_in_random_order(longer):
+def of_few_laws(monkeypatch, *names):
+    few = {name: find_law(name) for name in names}
+    monkeypatch.setattr(design_question, "catalogue", lambda: few)
+    return design_question.commissioning(generator())
+
+
+def test_a_commissioning_approaches_each_pose_from_both_sides_in_random_order(model, monkeypatch):
+    question = of_few_laws(monkeypatch, "backlash")
+    found = plan(model, question, conditions(model, minutes=8.0, in_motion=False))
     sides = {}
     order = []
-    for visit in dict.fromkeys(dwell.visit for dwell in longer.timeline.dwells):
+    for visit in dict.fromkeys(dwell.visit for dwell in found.timeline.dwells):
         if visit.purpose == "setting":
             sides.setdefault(tuple(visit.theta), []).append(visit.approach)
             order.append(tuple(visit.theta))
+    assert len(sides) > 3
     for approaches in sides.values():
         assert np.allclose(np.sum(approaches, axis=0), 0.0)
     neighbours = sum(a == b for a, b in zip(order[:-1], order[1:], strict=True))
     assert neighbours < 0.3 * len(order)
+
+
+def test_between_rivals_only_the_sides_that_tell_are_visited(model, longer):
+    """A lost motion needs both sides of something; no pose needs both for its own sake."""
+    visits = longer.visits
+    assert len({tuple(visit.approach) for visit in visits}) > 1
+    sides = {}
+    for visit in visits:
+        sides.setdefault(tuple(visit.theta), set()).add(tuple(visit.approach))
+    assert any(len(approaches) == 1 for approaches in sides.values())
+    performed = {d.visit for d in longer.timeline.dwells if d.purpose.startswith("setting")}
+    assert performed == set(visits)
 
 
 def test_the_last_motion_is_the_approach_that_the_table_names(longer):
@@ -170,9 +191,7 @@ def test_a_pose_sensor_that_needs_rest_is_not_asked_in_motion(model):
 def test_a_commissioning_calibrates_and_tells_apart(model, monkeypatch):
     """With a catalogue of three laws, one of which needs a thermometer."""
     names = ("backlash", "drive_compliance", "thermal_softening")
-    few = {name: find_law(name) for name in names}
-    monkeypatch.setattr(design_question, "catalogue", lambda: few)
-    found = plan(model, design_question.commissioning(generator()), conditions(model, minutes=8.0))
+    found = plan(model, of_few_laws(monkeypatch, *names), conditions(model, minutes=8.0))
     assert found.timeline.duration_s <= 480.0
     assert found.cannot.keys() == {f"thermal_softening@joint_{i}" for i in range(1, 6)}
     motors = [f"{name}@motor_{i}" for name in names[:2] for i in (1, 2)]

@@ -30,6 +30,8 @@ def choose(
     utility: Utility,
     enough: Callable[[Array], bool],
     rng: np.random.Generator,
+    looked_at: int = LOOKED_AT,
+    per_second: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[int]:
     """Choose settings.
@@ -50,6 +52,10 @@ def choose(
         Tells of a Gram matrix (q, q) whether nothing more is needed.
     rng : numpy.random.Generator
         Which settings are compared.
+    looked_at : int
+        How many settings are compared in each step.
+    per_second : bool
+        Whether short ones are preferred; else as few as possible are chosen.
     progress : callable, optional
         Called with (seconds planned, budget).
 
@@ -60,12 +66,15 @@ def choose(
     """
     chosen: list[int] = []
     total, spent = start.copy(), 0.0
-    while not enough(total):
+    # Who asks has not been answered by what is there, whatever a linear reckoning says of it.
+    while not chosen or not enough(total):
         left = np.flatnonzero(cost_s <= budget_s - spent)
         if len(left) == 0:
             break
-        looked = rng.choice(left, min(LOOKED_AT, len(left)), replace=False)
-        gain = (utility(total + grams[looked]) - utility(total)) / cost_s[looked]
+        looked = rng.choice(left, min(looked_at, len(left)), replace=False)
+        gain = utility(total + grams[looked]) - utility(total)
+        if per_second:
+            gain = gain / cost_s[looked]
         best = int(looked[np.argmax(gain)])
         chosen.append(best)
         total += grams[best]

@@ -14,12 +14,13 @@ beyond what lets the truth be seen at all.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 from scipy.stats import norm
 
 from wrist_stiffness.campaign.design_signatures import Signature
@@ -93,13 +94,6 @@ class Layout:
     columns: dict[str, NDArray[np.intp]]
     truths: dict[str, NDArray[np.intp]]
 
-    def scaled(self, grams: Array, factors: Mapping[str, float]) -> Array:
-        """Return Gram matrices (..., q, q) with the truths of some effects times a factor."""
-        size = np.ones(grams.shape[-1])
-        for name, factor in factors.items():
-            size[len(self.prior) + self.truths[name]] = factor
-        return size[:, None] * grams * size
-
 
 def whitened(
     experiment: Experiment, twists: Array, table: Table, noise: MeasurementNoise
@@ -168,10 +162,6 @@ class Information:
         """Of the whole experiment, (q, q)."""
         total: Array = self.grams.sum(axis=0)
         return total
-
-    def scaled(self, factors: Mapping[str, float]) -> Information:
-        """Return the same with the truths of some effects times a factor."""
-        return Information(self.layout.scaled(self.grams, factors), self.layout)
 
 
 def information(
@@ -274,7 +264,7 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
     Returns
     -------
     (..., g) float
-        d in standard deviations; the mean square over the truth's plausible sizes.
+        d in standard deviations; over several truths, what errs as often as they do on average.
     """
     left = beyond_nuisances(gram, layout)
     squares = np.zeros((*left.shape[:-2], len(goals)))
@@ -288,7 +278,8 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
             apart = own - np.sum(cross * np.linalg.solve(inner, cross), axis=-2)
             charge = CHARGE * (len(rival) - len(layout.columns[goal.truth]))
             own = np.minimum(apart + charge, own)
-        squares[..., number] = np.maximum(own, 0.0).mean(axis=-1)
+        wrong = logsumexp(-0.125 * np.maximum(own, 0.0), axis=-1) - np.log(own.shape[-1])
+        squares[..., number] = np.maximum(-8.0 * wrong, 0.0)
     return np.sqrt(squares)
 
 

@@ -217,18 +217,18 @@ def fixed_visits(settings: Sequence[Setting], pace: Pace, workspace: Workspace) 
 
 
 def arrange(
-    settings: Sequence[Setting],
+    chosen: Sequence[Visit],
     fixed: Sequence[Visit],
     workspace: Workspace,
     pace: Pace,
     rng: np.random.Generator,
 ) -> Timeline:
-    """Put chosen settings into a random order, with everything that an experiment needs besides.
+    """Put chosen visits into a random order, with everything that an experiment needs besides.
 
     Parameters
     ----------
-    settings : sequence of Setting
-        Chosen; each is visited from both sides, at different times.
+    chosen : sequence of Visit
+        Both sides of a pose, where both are chosen, come at different times.
     fixed : sequence of Visit
         Of `fixed_visits`.
     workspace : Workspace
@@ -244,8 +244,7 @@ def arrange(
         Warm-up, visits, returns to the reference pose at the beginning, in between and at the end.
     """
     reference, *holds = fixed
-    visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
-    visits = [visits[i] for i in rng.permutation(len(visits))]
+    visits = [chosen[i] for i in rng.permutation(len(chosen))]
     for number, hold in enumerate(holds, start=1):
         visits.insert(number * len(visits) // (len(holds) + 1), hold)
     ordered = _with_returns(visits, reference, workspace, pace)

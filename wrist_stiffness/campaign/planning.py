@@ -8,16 +8,17 @@ computed again on its own path, in its own order.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.campaign.design_choice import choose
+from wrist_stiffness.campaign.design_choice import LOOKED_AT, choose
 from wrist_stiffness.campaign.design_information import (
     RESOLVED,
     Goal,
     Information,
+    Layout,
     MeasurementNoise,
     calibrated,
     carried_over,
@@ -36,6 +37,7 @@ from wrist_stiffness.campaign.design_pool import (
 from wrist_stiffness.campaign.design_question import SESSION, TARE, Question
 from wrist_stiffness.campaign.design_signatures import signatures
 from wrist_stiffness.campaign.design_timeline import Experiment, Pace, Timeline, Visit, run_through
+from wrist_stiffness.campaign.design_truths import after_data, as_asked
 from wrist_stiffness.campaign.loads_file import Source
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -113,7 +115,7 @@ class Plan:
     ----------
     timeline : Timeline or None
         What to do when; None where no such experiment could answer any of the questions.
-    settings : tuple of Setting
+    visits : tuple of Visit
         Chosen ones, in the order of their worth.
     answers : tuple of Answer
         To every question.
@@ -124,7 +126,7 @@ class Plan:
     """
 
     timeline: Timeline | None
-    settings: tuple[Setting, ...]
+    visits: tuple[Visit, ...]
     answers: tuple[Answer, ...]
     cannot: Mapping[str, str]
     calibration: Mapping[str, float]
@@ -173,7 +175,9 @@ def plan(
     rng = np.random.default_rng(conditions.seed)
     settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
     fixed = fixed_visits(settings, pace, workspace)
-    pool = _Pool(settings, fixed, rng.permutation(2 * len(settings)), pace, model)
+    whole = question.goals is None
+    order = rng.permutation(2 * len(settings))
+    pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
     stage = _Stages(progress, 2 + len(earlier))
     known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
     question = question.without(lacking)
@@ -184,18 +188,22 @@ def plan(
     start = np.zeros_like(known.total)
     for each in before:
         start += carried_over(each, (*SESSION, TARE))
-    sizes = equal_sizes(known, question.alike)
-    known, start = known.scaled(sizes), known.layout.scaled(start, sizes)
-    best = discrimination(start + LONGER * known.total, known.layout, goals)
+    if before:
+        truths = after_data(start, known.layout, question.alike, rng)
+        refuted = _refuted(start, known.layout, question.alike)
+        goals = tuple(goal for goal in goals if goal.truth not in refuted)
+    else:
+        truths = as_asked(known, question.alike)
+    grams, start, layout = truths.of(known.grams), truths.of(start), truths.layout
+    total = grams.sum(axis=0)
+    best = discrimination(start + LONGER * total, layout, goals)
     reachable = {goal: bool(d >= needed(goal)) for goal, d in zip(goals, best, strict=True)}
     aimed = [goal for goal in goals if reachable[goal]]
-    whole = question.goals is None
     if not aimed and not whole:
         least = [Answer(goal, float(d), False) for goal, d in zip(goals, best, strict=True)]
         return Plan(None, (), tuple(least), lacking, {})
     if whole:
-        aimed = _nearest(aimed, discrimination(known.total, known.layout, aimed))
-    layout = known.layout
+        aimed = _nearest(aimed, discrimination(total, layout, aimed))
 
     def utility(gram: Array) -> Array:
         right = 1.0 - wrong_bound(discrimination(gram, layout, aimed)).mean(axis=-1)
@@ -208,7 +216,6 @@ def plan(
         return bool(np.all(reached >= [needed(goal) for goal in aimed]))
 
     seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
-    grams = pool.by_setting(known.grams)
     least_s = pool.arranged([], rng).duration_s
     if least_s > seconds:
         raise InputError(
@@ -216,29 +223,32 @@ def plan(
             "warm-up, reference poses and two long holds take"
         )
     chosen = choose(
-        grams,
+        pool.by_unit(grams),
         pool.cost_s,
-        start + pool.fixed_gram(known.grams),
+        start + pool.fixed_gram(grams),
         seconds - least_s,
         utility,
         enough,
         rng,
+        LOOKED_AT if whole else len(pool.cost_s),
+        per_second=conditions.seconds is not None,
     )
-    timeline = pool.arranged(chosen, rng)
+    visits = pool.visits_of(chosen)
+    timeline = pool.arranged(visits, rng)
     while timeline.duration_s > seconds:
-        chosen = chosen[:-1]
-        timeline = pool.arranged(chosen, rng)
-    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0].scaled(sizes)
-    reached = discrimination(start + final.total, final.layout, goals)
+        visits = visits[: -pool.in_unit]
+        timeline = pool.arranged(visits, rng)
+    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
+    reached = discrimination(start + truths.of(final.total), layout, goals)
     answers = [
         Answer(goal, float(d), reachable[goal]) for goal, d in zip(goals, reached, strict=True)
     ]
     return Plan(
         timeline,
-        tuple(settings[i] for i in chosen),
+        tuple(visits),
         tuple(answers),
         lacking,
-        improvement(start + final.total, final.layout),
+        improvement(start + truths.of(final.total), layout),
     )
 
 
@@ -261,7 +271,7 @@ class _Stages:
 
 
 class _Pool:
-    """All settings, performed as one experiment."""
+    """All settings, performed as one experiment, to be chosen as pairs of visits or singly."""
 
     def __init__(
         self,
@@ -270,21 +280,23 @@ class _Pool:
         order: NDArray[np.intp],
         pace: Pace,
         model: ErrorModel,
+        both_sides: bool,
     ) -> None:
-        self._settings, self._fixed, self._pace = settings, fixed, pace
+        self._fixed, self._pace = fixed, pace
         self._workspace = model.table.workspace
-        visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
-        ordered = [*(visits[i] for i in order), *fixed]
+        self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
+        self.in_unit = 2 if both_sides else 1
+        ordered = [*(self._visits[i] for i in order), *fixed]
         reference = reference_pose(self._workspace)
         self.timeline = run_through(ordered, self._workspace, pace, reference)
         self._place = np.argsort(order)
         visit_s = np.diff(self.timeline.ends, prepend=0.0)
-        self.cost_s = self.by_setting(visit_s)
+        self.cost_s = self.by_unit(visit_s)
 
-    def by_setting(self, of_visits: Array) -> Array:
-        """Return the sums (m, ...) over both visits of each setting of values (v, ...)."""
-        both = of_visits[self._place].reshape(len(self._settings), 2, *of_visits.shape[1:])
-        total: Array = both.sum(axis=1)
+    def by_unit(self, of_visits: Array) -> Array:
+        """Return the sums (m, ...) over the visits of each unit of values (v, ...)."""
+        units = of_visits[self._place].reshape(-1, self.in_unit, *of_visits.shape[1:])
+        total: Array = units.sum(axis=1)
         return total
 
     def fixed_gram(self, grams: Array) -> Array:
@@ -292,15 +304,14 @@ class _Pool:
         total: Array = grams[len(self._place) :].sum(axis=0)
         return total
 
-    def arranged(self, chosen: Sequence[int], rng: np.random.Generator) -> Timeline:
-        """Return the experiment of some settings."""
-        return arrange(
-            [self._settings[i] for i in chosen],
-            self._fixed,
-            self._workspace,
-            self._pace,
-            rng,
-        )
+    def visits_of(self, chosen: Sequence[int]) -> list[Visit]:
+        """Return the visits of some units; a unit chosen twice is visited twice."""
+        places = (self.in_unit * unit + side for unit in chosen for side in range(self.in_unit))
+        return [replace(self._visits[place]) for place in places]
+
+    def arranged(self, visits: Sequence[Visit], rng: np.random.Generator) -> Timeline:
+        """Return the experiment of some visits."""
+        return arrange(visits, self._fixed, self._workspace, self._pace, rng)
 
 
 def evaluated(
@@ -341,16 +352,16 @@ def evaluated(
     return known, lacking
 
 
-def equal_sizes(known: Information, alike: Sequence[Sequence[str]]) -> dict[str, float]:
-    """Return factors that make the members of each class as large as its first one."""
-    factors = {}
-    for members in alike:
-        shown = [name for name in members if name in known.layout.truths]
-        sizes = discrimination(known.total, known.layout, [Goal(name, "") for name in shown])
-        for name, size in zip(shown, sizes, strict=True):
-            if size > 0.0 and sizes[0] > 0.0:
-                factors[name] = float(sizes[0] / size)
-    return factors
+def _refuted(gram: Array, layout: Layout, alike: Sequence[Sequence[str]]) -> set[str]:
+    """Return the members of classes that cannot make up what the first one left in the data."""
+    pairs = [
+        Goal(members[0], rival)
+        for members in alike
+        for rival in members[1:]
+        if members[0] in layout.truths and rival in layout.truths
+    ]
+    reached = discrimination(gram, layout, pairs)
+    return {pair.rival for pair, d in zip(pairs, reached, strict=True) if d >= RESOLVED}
 
 
 def _all_goals(known: Information) -> tuple[Goal, ...]:

@@ -65,10 +65,11 @@ def summary(plan: Plan, question: Question) -> str:
 def _what(plan: Plan) -> str:
     if plan.timeline is None:
         return "no plan: nothing that these loads allow would settle any of the questions"
-    loads = sorted({s.load.name for s in plan.settings if s.load.name})
+    loads = sorted({visit.load.name for visit in plan.visits if visit.load.name})
+    poses = len({tuple(visit.theta) for visit in plan.visits})
     return (
-        f"{plan.timeline.duration_s / 60.0:.1f} minutes: {len(plan.settings)} settings, each from "
-        f"two sides; {len(plan.timeline.dwells)} measurements at rest; "
+        f"{plan.timeline.duration_s / 60.0:.1f} minutes: {len(plan.visits)} approaches to {poses} "
+        f"poses; {len(plan.timeline.dwells)} measurements at rest; "
         f"loads: {', '.join(loads) or 'none'}"
     )
 
