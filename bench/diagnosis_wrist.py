@@ -12,7 +12,8 @@ import resource
 import sys
 import time
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "2")
+# The matrices are small: on a busy machine further threads wait for each other, and waiting counts.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
