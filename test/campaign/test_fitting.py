@@ -82,6 +82,7 @@ def test_parameters_planted_in_the_virtual_cell_are_recovered(model):
         model,
         HiddenEffect("bushing_stiffness", "joint_1", "plain", softer, 0),
         HiddenEffect("encoder_offset", "motor_2", "plain", zero, 0),
+        seconds=150.0,
     )
     free = (
         free_all(effect("bushing_stiffness@joint_1")),

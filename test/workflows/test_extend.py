@@ -28,7 +28,10 @@ RECORDING = Path(__file__).parents[1] / "data" / "wrist_b.mcap"
 """Hides backlash at motor 2."""
 
 SET_UP = ["measurement_frame", "target_mounting", "load_bias"]
-BUILT = ["axis_misalignment", "flange_contact", "link_stiffness", "bushing_stiffness"]
+BUILT = [
+    *("axis_misalignment", "flange_contact", "link_stiffness", "bushing_stiffness"),
+    "load_scale",
+]
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 

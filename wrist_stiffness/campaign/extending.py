@@ -158,7 +158,7 @@ def extend(
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)
     base = FitProblem(model.with_effects(*held), units, free)
-    before = judged(base, progress=progress, most_ways=1)
+    before = judged(base, progress=progress)
     wide = replace(base, free=(*free, _free(effect, units)))
     start = _with_effect(wide, before.fit, start_values(before.fit, effect))
     after = judged(wide, start, progress)

@@ -84,8 +84,9 @@ class Fit:
         Units that the fit saw.
     noise : NoiseModel
         Scatter of the units, with a misfit counted as more of it.
-    wander : (6,) float
-        Scatter of each unit beside what the table states, already in `seen` [m, rad].
+    wander : (2, 6) float
+        Scatter of moments in motion and of rests beside what the table states, in `seen` already
+        [m, rad].
     misfit : float
         Sum of the squared white residuals over their degrees of freedom; 1 if only noise is left.
     lost : int

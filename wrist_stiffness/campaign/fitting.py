@@ -7,7 +7,6 @@ squares.  Noise and lost beams depend on the fit, so they are found again at eac
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,6 @@ from scipy.optimize import lsq_linear
 from wrist_stiffness.campaign.fit_problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fit_result import Fit
 from wrist_stiffness.campaign.free_effects import FreeEffect
-from wrist_stiffness.campaign.shims import GAPS
 from wrist_stiffness.campaign.wander import found_wander, with_wander
 from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.observations import Mask, Observations
@@ -36,15 +34,14 @@ CLOSE, SMALL_FALL = 0.05, 0.1
 """A round ends when no parameter moves by more than this share of its uncertainty, or the sum of
 squares falls by less than this, which no parameter can feel."""
 
-SUSPECT = 1.2
-"""Mean square, by the scatter that is known without any fit, from which other ways are tried."""
-
-LOST_COST = 50.0
-"""What a lost number costs when ways are compared: seven standard deviations."""
+ROUGH = np.tile(np.repeat([30e-6, np.radians(0.09)], 3), (2, 1))
+"""Scatter that the measurements are taken to have at first.  Flanges touch or do not, so the sum of
+squares has valleys apart from the deepest one; rough data lead into that which the priors favour.
+"""
 
 MOST_HALVINGS = 6
 
-NOTHING = np.zeros(6)
+NOTHING = np.zeros((2, 6))
 
 
 def fit(
@@ -52,7 +49,6 @@ def fit(
     start: Array | None = None,
     held_out: Mask | None = None,
     progress: Progress = silent,
-    most_ways: int = 3,
 ) -> Fit:
     """Find the most probable parameters.
 
@@ -67,9 +63,6 @@ def fit(
         Units of `problem.table` that the fit must not see.
     progress : callable
         Is told steps done and steps at most.
-    most_ways : int
-        How many ways to try from the means of the priors where much is left: 1 where an effect is
-        known to be missing.
 
     Returns
     -------
@@ -89,46 +82,17 @@ def fit(
         raise InputError(f"fit: only {measured} numbers were measured")
     if start is not None:
         return _settled(problem, start, unseen, NOISE_ROUNDS, progress)
-    found_all: list[Fit] = []
-    for way in _ways(problem)[:most_ways]:
-        z = np.zeros(len(weight))
-        for stage in way:
-            led = _settled(stage, start_of(stage, problem, z), unseen, 1, silent)
-            z = start_of(problem, stage, led.z)
-        found_all.append(_settled(problem, z, unseen, NOISE_ROUNDS, progress))
-        if _cost(found_all[-1]) < SUSPECT * table.measured[~unseen].sum():
-            break
-    return min(found_all, key=_cost)
+    z = np.zeros(len(weight))
+    set_up = replace(problem, free=tuple(_per_session(each) for each in problem.free))
+    if 0 < len(set_up.unknowns) < len(weight):
+        led = _settled(set_up, start_of(set_up, problem, z), unseen, 1, silent)
+        z = start_of(problem, set_up, led.z)
+        z = _settled(problem, z, unseen, 1, silent, ROUGH).z
+    return _settled(problem, z, unseen, NOISE_ROUNDS, progress)
 
 
-def _ways(problem: FitProblem) -> list[tuple[FitProblem, ...]]:
-    """Return the stages of the ways to try, the best one first.
-
-    Flanges touch or do not, so the sum of squares has valleys apart from the deepest one.  Most
-    often the way through the set-up, and then through gaps that follow the axes, leads into that.
-    """
-
-    def only(kept: Callable[[FreeEffect], bool]) -> FitProblem:
-        free = tuple(each if kept(each) else replace(each, scale={}) for each in problem.free)
-        return replace(problem, free=free)
-
-    set_up = only(lambda each: each.per_session)
-    shimmed = only(lambda each: each.effect.law.id != GAPS)
-    if not 0 < len(set_up.unknowns) < len(problem.unknowns):
-        return [()]
-    if len(shimmed.unknowns) == len(problem.unknowns):
-        return [(set_up,)]
-    return [(set_up, shimmed), (set_up,), ()]
-
-
-def _cost(found: Fit) -> float:
-    """Sum of squares by the scatter that is known without any fit, for ways to be compared."""
-    factor = replace(found.noise, scatter=np.eye(6), colour_share=0.0)
-    seen = found.observations.take(found.used)
-    white = factor.whiten(seen, seen.values[:, :, None])
-    # A unit that counts as lost on one way only must not make that way the better one.
-    blank = found.problem.table.measured[found.used].sum() - seen.measured.sum()
-    return float((white**2).sum()) + LOST_COST * float(blank)
+def _per_session(free: FreeEffect) -> FreeEffect:
+    return free if free.per_session else replace(free, scale={})
 
 
 def _settled(

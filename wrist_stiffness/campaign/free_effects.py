@@ -25,9 +25,11 @@ BUILT = (
     ("flange_contact", PASSIVE_JOINTS),
     ("link_stiffness", LINKS),
     ("bushing_stiffness", JOINTS),
+    ("load_scale", ("load_sensor",)),
 )
 """What differs from wrist to wrist within its tolerances.  The gaps of the flanges are among them
-because whoever fits a wrist shims them to its axes."""
+because whoever fits a wrist shims them to its axes; the load sensor's scale, because softer parts
+look nearly like it."""
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,6 @@ def judged(
     problem: FitProblem,
     start: tuple[FitProblem, Array] | None = None,
     progress: Progress = silent,
-    most_ways: int = 3,
 ) -> Judged:
     """Fit to all but the held-out units and say what is left of those.
 
@@ -74,16 +73,14 @@ def judged(
         Point of a like problem from which to begin.
     progress : callable
         Told steps done and steps at most.
-    most_ways : int
-        As in `fit`.
     """
     table = problem.table
     aside = sealed_units(table, Settings().sealed_share)
     if len(problem.sessions) == 1:
-        found = fit(problem, _begin(problem, start), aside, progress, most_ways)
+        found = fit(problem, _begin(problem, start), aside, progress)
         return Judged(found, found.observations.take(aside), table.rows[aside], THIS_SESSION)
     earlier = replace(problem, sessions=problem.sessions[:-1])
-    found = fit(earlier, _begin(earlier, start), None, progress, most_ways)
+    found = fit(earlier, _begin(earlier, start), None, progress)
     again = tuple(each for each in problem.free if each.per_session)
     own = {each.effect.name for each in again}
     wrist = tuple(each for each in found.effects() if each.name not in own)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.observations import Observations
+from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.whitening import component_factors
 from wrist_stiffness.mechanism.components import Array
 
@@ -23,10 +23,23 @@ SHARES = np.concatenate([[0.0], np.geomspace(0.05, 1.5, 12)])
 
 
 def with_wander(table: Observations, wander: Array) -> Observations:
-    """Return the units with a standard deviation (6,) of their own beside what is stated."""
+    """Return the units with a standard deviation beside what is stated.
+
+    Parameters
+    ----------
+    table : Observations
+        u units.
+    wander : (2, 6) float
+        Of moments in motion, and of rests [m, rad].
+    """
     if table.covariance is None or not wander.any():
         return table
-    return replace(table, covariance=table.covariance + np.diag(wander**2))
+    own = wander[_at_rest(table).astype(int)]
+    return replace(table, covariance=table.covariance + own[:, :, None] ** 2 * np.eye(6))
+
+
+def _at_rest(table: Observations) -> Mask:
+    return table.covariate("held_s") > 0.0
 
 
 def found_wander(seen: Observations, columns: Array, weight: Array, z: Array) -> Array:
@@ -43,22 +56,24 @@ def found_wander(seen: Observations, columns: Array, weight: Array, z: Array) ->
 
     Returns
     -------
-    (6,) float
-        Alike for the three shifts and for the three turns [m, rad]; zero where no scatter is
-        stated.
+    (2, 6) float
+        Of moments in motion, whose loads are known less well, and of rests; alike for the three
+        shifts and for the three turns [m, rad].  Zero where no scatter is stated.
     """
-    wander = np.zeros(6)
+    wander = np.zeros((2, 6))
     if seen.covariance is None:
         return wander
-    for half in HALVES:
-        values = seen.values[:, half]
-        if not np.isfinite(values).any():
-            continue
-        tried = []
-        for size in SHARES * np.sqrt(np.nanmean(values**2)):
-            wander[half] = size
-            tried.append((_misfit(with_wander(seen, wander), columns, weight, z), size))
-        wander[half] = min(tried)[1]
+    rest = _at_rest(seen)
+    for kind, rows in enumerate((~rest, rest)):
+        for half in HALVES:
+            values = seen.values[rows, half]
+            if not np.isfinite(values).any():
+                continue
+            tried = []
+            for size in SHARES * np.sqrt(np.nanmean(values**2)):
+                wander[kind, half] = size
+                tried.append((_misfit(with_wander(seen, wander), columns, weight, z), size))
+            wander[kind, half] = min(tried)[1]
     return wander
 
 
