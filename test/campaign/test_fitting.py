@@ -146,6 +146,21 @@ def test_three_of_a_thousand_lie_beyond_three_sigma(model):
     assert chi2.ppf(0.001, count) < total < chi2.ppf(0.999, count)
 
 
+def test_scatter_beyond_what_the_instrument_states_is_found(model):
+    rng = np.random.default_rng(13)
+    true = effect("measurement_frame@pose_sensor", shift_x_um=100.0)
+    more = np.repeat([4.0, 1.0], 3)
+    session = measured(model.with_effects(true), poses(rng, 60), rng, more * SIGMA)
+    session = replace(session, covariance=np.diag(SIGMA**2))
+    found = fit(problem_of(model, [session], [free_all(effect(true.name), per_session=True)]))
+    # Poses measured once are no means over a rest.
+    shift, turn = found.wander[0, 0], found.wander[0, 3]
+    assert shift == pytest.approx(np.sqrt(15.0) * SIGMA[0], rel=0.35)
+    assert turn < SIGMA[3]
+    known = by_name(found)["measurement_frame@pose_sensor", "shift_x_um"].sigma
+    assert known == pytest.approx(1e6 * 4.0 * SIGMA[0] / np.sqrt(60), rel=0.4)
+
+
 def test_columns_are_the_derivative_of_the_residual(model):
     rng = np.random.default_rng(2)
     session = measured(model, poses(rng, 12), rng)

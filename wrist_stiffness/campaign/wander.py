@@ -57,8 +57,9 @@ def found_wander(seen: Observations, columns: Array, weight: Array, z: Array) ->
     Returns
     -------
     (2, 6) float
-        Of moments in motion, whose loads are known less well, and of rests; alike for the three
-        shifts and for the three turns [m, rad].  Zero where no scatter is stated.
+        Of moments in motion, whose loads are known less well, and poses measured once; and of
+        means over rests.  Alike for the three shifts and for the three turns [m, rad]; zero where
+        no scatter is stated.
     """
     wander = np.zeros((2, 6))
     if seen.covariance is None:
