@@ -10,6 +10,7 @@ from wrist_stiffness.campaign.contrast_sentences import Told, tell
 from wrist_stiffness.campaign.headroom import held_out_process, left_by_others
 from wrist_stiffness.campaign.noise_floor import (
     NoiseFloor,
+    against_floor,
     by_side,
     noise_floor,
     repeatability,
@@ -171,6 +172,18 @@ def test_a_process_makes_nothing_of_noise():
     assert 0.98 * before < after <= before
 
 
+def test_a_process_makes_nothing_of_slow_wander_under_slow_conditions():
+    """Neighbours in time tell each other's wander; blocks that were not seen do not."""
+    rng = np.random.default_rng(23)
+    observations = table(rng)
+    walk = np.cumsum(rng.normal(size=(N, 7)), axis=0) / np.sqrt(N)
+    conditions = {name: np.zeros(N) for name in observations.covariates}
+    conditions |= {"T_link_1": 20.0 + walk[:, 6], "time_s": observations.times}
+    slow = replace(observations, covariates=conditions, values=20e-6 * walk[:, :6])
+    left = slow.with_values(held_out_process(slow, np.random.default_rng(0)))
+    assert sizes(left)["s_um"].rms > 0.5 * sizes(slow)["s_um"].rms
+
+
 def test_blanks_stay_blanks_in_what_a_process_leaves():
     observations = table(np.random.default_rng(7), change_of("fz", 2, 3e-6))
     values = observations.values.copy()
@@ -260,6 +273,11 @@ def test_verdict_says_whether_it_is_noise():
     found = compared((5.0, 1.0), 1.0)
     assert "5.1 x the noise" in found.verdict[0] or "5.0 x the noise" in found.verdict[0]
     assert "no more than the noise" in found.verdict[1]
+
+
+def test_half_more_than_the_floor_is_more_than_noise():
+    assert against_floor(1.1, "replicates") == "no more than the noise"
+    assert against_floor(1.5, "replicates") == "1.5 x the noise"
 
 
 def test_without_a_known_floor_nothing_is_called_noise():

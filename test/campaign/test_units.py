@@ -104,3 +104,16 @@ def test_rows_without_a_measurement_tell_the_path_but_are_no_unit_in_motion():
     moving = ~found.dwell[found.label] & (found.label >= 0)
     assert moving.any()
     assert measured[moving].all()
+
+
+def crept(counts):
+    """Cut five seconds in which motor 1 creeps by some encoder counts."""
+    time = np.arange(0.0, 5.0, 0.01)
+    theta = np.zeros((len(time), 2))
+    theta[:, 0] = STEP * np.round(counts * time / 5.0)
+    return cut_all(Block(time, theta, np.zeros((len(time), 6))))
+
+
+def test_a_flickering_count_is_at_rest_and_a_slow_creep_is_not():
+    assert crept(1).dwell.tolist() == [True]
+    assert not crept(8).dwell.any()
