@@ -1,13 +1,14 @@
 """How many extra poses tell twins apart: planned ones against random ones.
 
 A virtual cell hides an effect (laws of the simulation, not of the model) and is measured as in the
-paper: 25 poses, one load, one approach.  The effects that fit these measurements about as well as
-the true one are its class of twins.  `plan` chooses extra settings, each visited from both sides;
-where these do not suffice it plans again, five times at most.  The others are random: poses,
-sides, and loads of the same list.  Both are performed by the virtual cell, with instruments set up
-anew.  Counted are poses (one approach each; the other side is another pose) and measurements at
-rest (a planned pose with a load is two, as it is measured without it as well; a random one is one,
-and once more with such returns).
+paper: 25 poses, one load, one approach; it is made so large that its own law is worth its
+parameters there.  The effects that fit these measurements about as well, and are worth theirs, are
+its class of twins.  `plan` chooses extra approaches; where these do not suffice, what is still open
+is fitted anew to all measurements and planned for again, five times at most.  The others are
+random: poses, sides, and loads of the same list.  Both are performed by the virtual cell, with
+instruments set up anew.  Counted are poses (one approach each; the other side is another pose) and
+measurements at rest (a planned pose with a load is two, as it is measured without it as well; a
+random one is one, and in a third arm two likewise).
 A class is resolved from the number on at which every wrong twin lies behind the true one by 25 in
 the Bayesian information criterion, noise aside, with everything refitted that a diagnosis refits.
 Reference poses and long holds, which a plan has besides, are left out.
@@ -22,6 +23,7 @@ import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
+from plan_resolves_report import report
 
 from wrist_stiffness.campaign import design_pool, planning
 from wrist_stiffness.campaign.design_information import (
@@ -81,8 +83,8 @@ HIDDEN = (
 """What poses and loads at rest can show, and no diagnosis refits anyway."""
 
 VISIBLE = 6.0
-"""Discrimination from nothing that the hidden effect has in the paper's design, square root of what
-its law's parameters do not cost: a diagnosis finds it."""
+"""Discrimination from nothing that the hidden effect has in the paper's design, beyond what its
+law's parameters cost: a diagnosis finds it."""
 
 DECISIVE = 6.0
 MOST_TWINS = 5
@@ -408,36 +410,8 @@ def main() -> None:
     )
     pairs = pairs[settled]
     for place, what in enumerate(("poses", "measurements")):
-        report(pairs[:, [0, 1], place], what)
-    report(pairs[:, [0, 2], 0], "poses, random ones measured without load as well")
-
-
-def report(pairs: np.ndarray, what: str) -> None:
-    """Print medians with bootstrap intervals; never resolved counts as twice all poses."""
-    capped = np.where(np.isfinite(pairs), pairs, 2.0 * EXTRA)
-    rng = np.random.default_rng(0)
-    draws = capped[rng.integers(len(capped), size=(4000, len(capped)))]
-    for name, column in (("planned", 0), ("random", 1)):
-        never = int(np.sum(~np.isfinite(pairs[:, column])))
-        print(f"{name:8s} median {np.median(capped[:, column]):4.1f} {what}, never {never}")
-    print(
-        f"planned / random {what}: median of the cases' ratios "
-        f"{_spread(np.median(draws[..., 0] / draws[..., 1], axis=1), capped[:, 0] / capped[:, 1])}"
-        f", ratio of the medians "
-        f"{np.median(capped[:, 0]) / np.median(capped[:, 1]):.2f} "
-        f"({_interval(np.median(draws[..., 0], axis=1) / np.median(draws[..., 1], axis=1))}), "
-        f"ratio of the sums {capped[:, 0].sum() / capped[:, 1].sum():.2f} "
-        f"({_interval(draws[..., 0].sum(axis=1) / draws[..., 1].sum(axis=1))})"
-    )
-
-
-def _spread(draws: np.ndarray, values: np.ndarray) -> str:
-    return f"{np.median(values):.2f} ({_interval(draws)})"
-
-
-def _interval(draws: np.ndarray) -> str:
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return f"95 % {low:.2f} to {high:.2f}"
+        report(pairs[:, [0, 1], place], what, 2.0 * EXTRA)
+    report(pairs[:, [0, 2], 0], "poses, random ones measured without load as well", 2.0 * EXTRA)
 
 
 if __name__ == "__main__":
