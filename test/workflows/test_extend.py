@@ -110,6 +110,8 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert abs(abs(size.value) - 150.0) < 3.5 * size.sigma
     assert abs(abs(soft.value) - 0.2) < 3.5 * soft.sigma
     assert size.value * soft.value > 0.0
+    (line,) = (line for line in found.lines() if "sag_mdeg  " in line)
+    assert "usual size" not in line
     before, after = found.extension.before.rms, found.extension.after.rms
     assert after["phi_mdeg"] < 1.3 * found.errors.floor["phi_mdeg"]
     assert before["phi_mdeg"] > 1.5 * after["phi_mdeg"]

@@ -158,7 +158,8 @@ class Extended:
         lines = [*used_lines(self.sessions, found.fit), ""]
         lines += [*self.errors.lines(), *left_lines(self.errors, found.after)]
         lines += ["", f"{found.effect.name}: {sentence}"]
-        lines += told_lines(found.own, all_of_them=True)
+        usual = all(np.isfinite(parameter.scale) for parameter in found.effect.parameters)
+        lines += told_lines(found.own, all_of_them=True, usual=usual)
         lines += [f"WARNING: {warning}" for warning in found.warnings]
         moved = found.base_moved[:MOST_MOVED]
         lines += (

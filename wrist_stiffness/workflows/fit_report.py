@@ -100,12 +100,24 @@ def left_lines(errors: Errors, judged: Judged) -> list[str]:
     return lines
 
 
-def told_lines(parameters: Iterable[Fitted], all_of_them: bool = False) -> list[str]:
-    """Return the estimates that the data tell, or all of them, a line each."""
+def told_lines(
+    parameters: Iterable[Fitted], all_of_them: bool = False, usual: bool = True
+) -> list[str]:
+    """Return the estimates that the data tell, or all of them, a line each.
+
+    Parameters
+    ----------
+    parameters : iterable of Fitted
+        Of a fit.
+    all_of_them : bool
+        Also those that the data do not tell.
+    usual : bool
+        Whether they have a usual size: those of a user's formula have none.
+    """
     lines = []
     for each in parameters:
         if each.excited or all_of_them:
-            notes = [tolerances(each)] if np.isfinite(each.prior_sigma) else []
+            notes = [tolerances(each)] if usual else []
             notes += ["on its bound"] if each.at_bound else []
             line = f"  {each.effect:30} {each.key:24}{plus_minus(each.value, each.sigma):>22}"
             lines.append(f"{line}   {', '.join(notes)}".rstrip())
