@@ -1,7 +1,8 @@
 """Every command that the documents teach is run, and prints what they show.
 
 `python test/test_readme.py` writes the real outputs into the documents, or into those that are
-named; do that after the shipped table was built anew.  A line `...` in an output stands for lines that are left out.
+named; do that after the shipped table was built anew.  A line `...` in an output stands for lines
+that are left out.
 """
 
 import importlib.metadata
