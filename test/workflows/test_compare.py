@@ -134,10 +134,19 @@ def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys)
         (["--each", "--report", "x.html"], "--report draws one wrist"),
         (["--scheduler", "tcp://localhost:1"], "add --each"),
         (["--model", "missing.yaml"], "missing.yaml"),
+        (["--report", "no folder/x.html"], "no folder/x.html: folder no folder does not exist"),
+        (["--json", "."], ".: cannot be written: it is a folder"),
     ],
 )
-def test_wrong_use_is_one_line(options, named, capsys):
+def test_wrong_use_is_one_line_before_any_work(options, named, capsys):
     assert main(["compare", str(DATA / "wrist_a.mcap"), *options]) == 2
-    error = capsys.readouterr().err
-    assert named in error
-    assert error.count("\n") == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert named in captured.err
+    assert captured.err.count("\n") == 1
+
+
+def test_what_was_not_measured_is_no_number_on_a_page():
+    from wrist_stiffness.workflows.report.parts import number
+
+    assert [number(float("nan")), number(12345.6), number(0.01234)] == ["-", "12346", "0.0123"]

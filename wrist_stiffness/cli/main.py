@@ -5,6 +5,7 @@ import errno
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Protocol
 
 from wrist_stiffness import __version__
@@ -30,7 +31,7 @@ from wrist_stiffness.cli.parser import (
     PROG,
     OneLineParser,
 )
-from wrist_stiffness.errors import WristError
+from wrist_stiffness.errors import InputError, WristError
 
 DESCRIPTION = """\
 Predict, correct and explain the pose error of a flexible two-degree-of-freedom wrist."""
@@ -134,6 +135,8 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     """
     arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
     try:
+        for option in ("report", "json"):
+            _require_place(getattr(arguments, option, None))
         code: int = arguments.run(arguments)
         if sys.stdout is not None:  # None where the caller closed it
             sys.stdout.flush()
@@ -157,6 +160,16 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
         _discard_output()
         return _refuse(f"the output cannot be written: {error.strerror}")
     return code
+
+
+def _require_place(path: str | None) -> None:
+    """Refuse a result's file that cannot be written, before minutes of work for it."""
+    if path is None:
+        return
+    if Path(path).is_dir():
+        raise InputError(f"{path}: cannot be written: it is a folder")
+    if not Path(path).absolute().parent.is_dir():
+        raise InputError(f"{path}: folder {Path(path).parent} does not exist")
 
 
 def _refuse(reason: str) -> int:

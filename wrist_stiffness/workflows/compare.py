@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -91,11 +92,13 @@ class Compared:
             for model in found.models:
                 sizes: dict[str, Size] = getattr(model, stage)
                 cells = "".join(
-                    f"{sizes[k].mean:11.4g}{sizes[k].rms:9.4g}{sizes[k].maximum:9.4g}" for k in keys
+                    f"{_shown(sizes[k].mean, 4):>11}{_shown(sizes[k].rms, 4):>9}"
+                    f"{_shown(sizes[k].maximum, 4):>9}"
+                    for k in keys
                 )
                 out.append(f"  {model.name:{wide - 2}}{cells}")
         for title, level in self.levels():
-            cells = "".join(f"{'':11}{level[k]:9.4g}{'':9}" for k in keys)
+            cells = "".join(f"{'':11}{_shown(level[k], 4):>9}{'':9}" for k in keys)
             out.append(f"{title:{wide}}{cells}".rstrip())
         out.append(f"noise floor from: {SOURCES[found.noise.source]}")
         return out
@@ -117,7 +120,7 @@ class Compared:
         for pose in self.worst(model):
             motors = " ".join(f"{angle:.1f}" for angle in pose.theta_deg)
             force = " ".join(f"{value:.2f}" for value in np.round(pose.load[:3], 2) + 0.0)
-            errors = "".join(f"{pose.errors[key]:13.3g}" for key in keys)
+            errors = "".join(f"{_shown(pose.errors[key], 3):>13}" for key in keys)
             out.append(f"{pose.time_s:10.1f}{motors:>18}{force:>24}{errors}  {pose.session}")
         return out
 
@@ -192,6 +195,13 @@ def unique_names(paths: Sequence[str | Path]) -> list[str]:
     return [
         stem if count[stem] == 1 else str(path) for stem, path in zip(stems, paths, strict=True)
     ]
+
+
+def _shown(value: float, digits: int) -> str:
+    """Return a number without an exponent, so that columns stay apart; "-" for what is unknown."""
+    if isnan(value):
+        return "-"
+    return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.{digits}g}"
 
 
 def remarks_of(sessions: Sequence[MeasuredSession] | Any) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 
 from wrist_stiffness.campaign.contrast_sentences import Change, Statement
 from wrist_stiffness.diagnosis import Observations
@@ -28,7 +29,9 @@ def unit_of(unit: str) -> str:
 
 
 def number(value: float) -> str:
-    """Return three significant digits, without an exponent where a person would write none."""
+    """Return three significant digits, without an exponent where a person writes none; NaN is -."""
+    if isnan(value):
+        return "-"
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
