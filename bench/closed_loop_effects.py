@@ -36,9 +36,10 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.simulation.catalogue import CATALOGUE
+from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect
 from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.size import Scale
 from wrist_stiffness.workflows.simulate import hide
 
 HIDDEN = (
@@ -66,7 +67,7 @@ HIDDEN = (
 """One place of each effect, then more where forms differ."""
 
 SIZES = (3.0, 1.0, 0.5)
-"""Of the effect, in units of one sample's noise: the first that it can have."""
+"""Of the effect, in units of one sample's noise: the first that it can have, else its limit."""
 
 RECORDED = CellSettings(rate_hz=10.0, program_seconds=120.0, program_seed=101)
 NEW = CellSettings(rate_hz=20.0, program_seconds=60.0, program_seed=202)
@@ -132,9 +133,12 @@ def hidden(name: str, table: Table) -> tuple[CellSettings, float]:
     for size in SIZES:
         try:
             return hide(name, size, table, settings, settings.program_seconds), size
-        except InputError as error:
-            reason = error
-    raise reason
+        except InputError:
+            continue
+    effect, component, form = name.replace(":", "@").split("@")
+    largest = HiddenEffect(effect, component, form, CATALOGUE[effect].limit, settings.program_seed)
+    size = Scale(table, settings, settings.program_seconds).size(largest)
+    return replace(settings, hidden=(largest,)), size
 
 
 def loop(name: str, model: ErrorModel, told: bool) -> dict[str, Any]:

@@ -61,7 +61,8 @@ def answer(row: Mapping[str, Any]) -> str:
     """Return whether the corrector cancels it, as measured."""
     floor = row["floor"]["resting"]
     if row["compensable"] == "no":
-        return "no: in the instrument, the wrist itself is right"
+        harm = row["extended"]["resting"] > SEEN * floor
+        return "no: in the instrument" + (", **and the fit does harm**" if harm else "")
     said = "yes" if row["compensable"] == "yes" else "with its signal"
     if row["old"]["resting"] <= SEEN * floor:
         return f"{said}: makes no pointing error above the floor"
