@@ -1,6 +1,7 @@
 import argparse
 import io
 import os
+import signal
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -211,3 +212,35 @@ def test_a_terminal_gets_a_bar_with_the_time_left():
     assert shown[-1].startswith("poses [##############################] 100 % 100 s")
     assert shown[-1].endswith("\n")
     assert len({len(line.rstrip("\n")) for line in shown[1:]}) == 1
+
+
+def test_sigterm_cleans_up_and_ends_with_its_code(tmp_path):
+    part = tmp_path / "half.part"
+
+    def run(arguments):
+        part.write_text("half")
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            return 0
+        finally:
+            part.unlink()
+
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(SystemExit) as left:
+        main(TRY, [command(run)])
+    assert left.value.code == 128 + signal.SIGTERM
+    assert not part.exists()
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.parametrize(
+    ("effect", "named"),
+    [
+        ("joint_clearance@joint_9", "joint_clearance is at joint_1, joint_2"),
+        ("backlash@motor_1:doubled", "backlash has the forms single"),
+    ],
+)
+def test_an_effect_where_it_cannot_be_names_the_places(effect, named, tmp_path, capsys):
+    argv = ["simulate", "-o", str(tmp_path / "a"), "--seconds", "1", "--effect", effect]
+    assert main(argv) == 2
+    assert named in capsys.readouterr().err

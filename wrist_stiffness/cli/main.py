@@ -31,6 +31,7 @@ from wrist_stiffness.cli.parser import (
     PROG,
     OneLineParser,
 )
+from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
 from wrist_stiffness.errors import InputError, WristError
 
 DESCRIPTION = """\
@@ -137,7 +138,8 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     try:
         for option in ("report", "json"):
             _require_place(getattr(arguments, option, None))
-        code: int = arguments.run(arguments)
+        with cleaned_up_on_sigterm():
+            code: int = arguments.run(arguments)
         if sys.stdout is not None:  # None where the caller closed it
             sys.stdout.flush()
     except WristError as error:

@@ -78,7 +78,6 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
@@ -112,16 +111,15 @@ def _run(arguments: argparse.Namespace) -> int:
         settings = hide_blind(arguments.blind, table, settings, arguments.seconds)
     elif arguments.effect is not None:
         settings = hide(arguments.effect, arguments.size, table, settings, arguments.seconds)
-    with cleaned_up_on_sigterm():
-        written = simulate_recording(
-            arguments.output,
-            table,
-            settings,
-            arguments.seconds,
-            arguments.seed,
-            Progress("samples"),
-            arguments.overwrite,
-        )
+    written = simulate_recording(
+        arguments.output,
+        table,
+        settings,
+        arguments.seconds,
+        arguments.seed,
+        Progress("samples"),
+        arguments.overwrite,
+    )
     if arguments.json:
         write_json(
             arguments.json,

@@ -190,6 +190,10 @@ def hide(
     if not (np.isfinite(size) and size > 0.0):
         raise InputError(f"effect {name!r}: size {size:g} is not a positive number")
     entry = ALL[effect]
+    if component not in entry.components:
+        raise InputError(f"effect {name!r}: {effect} is at {', '.join(entry.components)} only")
+    if form and form not in entry.forms:
+        raise InputError(f"effect {name!r}: {effect} has the forms {', '.join(entry.forms)} only")
     start = HiddenEffect(
         effect, component, form or entry.forms[0], entry.plausible, settings.program_seed
     )
