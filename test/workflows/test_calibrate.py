@@ -93,3 +93,18 @@ def test_a_recording_that_is_not_there_is_one_line(tmp_path, capsys):
 )
 def test_two_digits_of_the_uncertainty_are_shown(value, sigma, text):
     assert plus_minus(value, sigma) == text
+
+
+@pytest.mark.parametrize(
+    "command", [["calibrate"], ["extend", "--effect", "backlash@motor_1"]], ids=lambda c: c[0]
+)
+def test_a_model_that_is_there_is_not_replaced_unasked(command, tmp_path, capsys):
+    kept = tmp_path / "kept.yaml"
+    kept.write_text("mine")
+    arguments = ["--fit", str(tmp_path / "x.mcap"), "-o", str(kept)]
+    assert main([*command, *arguments]) == 2
+    assert "exists already" in capsys.readouterr().err
+    # With leave to replace, the next complaint is of the recording.
+    assert main([*command, *arguments, "--overwrite"]) == 2
+    assert "x.mcap" in capsys.readouterr().err
+    assert kept.read_text() == "mine"

@@ -179,6 +179,10 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg", {"b_mdeg": 1.0}),
             "start value of b_mdeg",
         ),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * fzz", {}),
+            "fzz is neither a signal .* nor a covariate .*--start fzz=VALUE",
+        ),
         (FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * (", {}), "formula"),
     ],
 )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from wrist_stiffness.cli.parser import OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
+from wrist_stiffness.errors import InputError
 
 DESCRIPTION = """\
 Commissioning. Fit what differs from session to session (registration of the pose sensor, its target
@@ -17,7 +19,8 @@ measurements shows little but the registration."""
 EPILOG = """\
 examples:
   wrist-stiffness calibrate --fit monday -o wrist_7.yaml
-  wrist-stiffness calibrate wrist_7.yaml --fit monday tuesday --hold-out -o wrist_7.yaml
+  wrist-stiffness calibrate wrist_7.yaml --fit monday tuesday --hold-out -o wrist_7.yaml \\
+      --overwrite
 
 Record poses all over the workspace from both sides, loads of several sizes and directions, and
 none. What a recording does not tell stays as it was, and is said. A recording whose notes
@@ -55,8 +58,24 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         help="recordings with measured poses, or folders of such; each is a session of one wrist",
     )
     parser.add_argument("-o", "--output", required=True, metavar="MODEL2", help="file to write")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing MODEL2")
     add_recording_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+
+
+def require_new_model(arguments: argparse.Namespace) -> None:
+    """Refuse to replace a model that nobody asked to replace.
+
+    Raises
+    ------
+    InputError
+        If the output is there and `--overwrite` is not.
+    """
+    if Path(arguments.output).is_file() and not arguments.overwrite:
+        raise InputError(
+            f"{arguments.output} exists already and is not overwritten; choose another "
+            "name, or --overwrite"
+        )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -66,6 +85,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.workflows.calibrate import calibrate_model
     from wrist_stiffness.workflows.json_file import write_json
 
+    require_new_model(arguments)
     found = calibrate_model(
         arguments.model or shipped_file("config/palmieri2015_model.yaml"),
         recordings_named(arguments.fit, arguments),

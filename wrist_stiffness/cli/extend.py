@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.calibrate import add_fit_options
+from wrist_stiffness.cli.calibrate import add_fit_options, require_new_model
 from wrist_stiffness.cli.parser import OneLineParser
 from wrist_stiffness.cli.recording_options import recordings_named
 
@@ -77,6 +77,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.workflows.extend import extend_model
     from wrist_stiffness.workflows.json_file import write_json
 
+    require_new_model(arguments)
     found = extend_model(
         arguments.model or shipped_file("config/palmieri2015_model.yaml"),
         _addition(arguments),

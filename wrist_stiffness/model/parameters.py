@@ -30,6 +30,12 @@ UNITS = {
 """Size in SI units of everything that a parameter's name may end in."""
 
 
+def has_unit(key: str) -> bool:
+    """Tell whether a parameter's name ends in a known unit, as `clearance_um` does."""
+    words = key.split("_")
+    return len(words) > 1 and words[-1] in UNITS
+
+
 def si_factor(key: str) -> float:
     """Return the SI size of the unit that a parameter's name ends in.
 
@@ -46,7 +52,7 @@ def si_factor(key: str) -> float:
     words = key.split("_")
     if len(words) >= 4 and words[-2] == "per" and words[-3] in UNITS and words[-1] in UNITS:
         return UNITS[words[-3]] / UNITS[words[-1]]
-    return UNITS.get(words[-1], 1.0) if len(words) > 1 else 1.0
+    return UNITS[words[-1]] if has_unit(key) else 1.0
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import names_in
 from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
-from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.parameters import Estimate, has_unit
 from wrist_stiffness.model.registry import find_law, law_from_file
 from wrist_stiffness.workflows.calibrate import Run, writable
 from wrist_stiffness.workflows.fit_report import (
@@ -99,6 +99,12 @@ class FormulaEffect:
             raise InputError(
                 f"{self.id}: start value of {unknown[0]}, but the formula's parameters are "
                 f"{', '.join(keys) or 'none'}"
+            )
+        if bare := [key for key in keys if key not in self.start and not has_unit(key)]:
+            raise InputError(
+                f"{self.id}: {bare[0]} is neither a signal ({', '.join(sorted(SIGNALS))}) nor a "
+                "covariate of the recordings; if it is a parameter, end its name in its unit "
+                f"({bare[0]}_um), or give --start {bare[0]}=VALUE"
             )
         if not keys:
             raise InputError(
