@@ -21,12 +21,12 @@ import numpy as np
 from closed_loop_drive import Motion
 from closed_loop_page import write_page
 
-from wrist_stiffness.campaign.calibrating import calibrate
-from wrist_stiffness.campaign.candidates import compensable
-from wrist_stiffness.campaign.diagnosing import diagnose_sessions
-from wrist_stiffness.campaign.extending import extend
-from wrist_stiffness.campaign.free_effects import BUILT, SET_UP
+from wrist_stiffness.campaign.fitting.calibrate import calibrate
+from wrist_stiffness.campaign.fitting.extend import extend
+from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.candidates import compensable
+from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table

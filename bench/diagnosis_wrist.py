@@ -17,9 +17,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from wrist_stiffness.campaign.diagnosing import diagnose_sessions, seek_point, silent
 from wrist_stiffness.campaign.observing import as_units
-from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions, seek_point, silent
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 

@@ -25,8 +25,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from plan_resolves_report import report
 
-from wrist_stiffness.campaign import design_pool, planning
-from wrist_stiffness.campaign.design_information import (
+from wrist_stiffness.campaign.planning import plan as planning
+from wrist_stiffness.campaign.planning import pool
+from wrist_stiffness.campaign.planning.information import (
     CHARGE,
     FREE,
     RESOLVED,
@@ -39,8 +40,10 @@ from wrist_stiffness.campaign.design_information import (
     discrimination,
     information,
 )
-from wrist_stiffness.campaign.design_pool import draw_settings
-from wrist_stiffness.campaign.design_question import (
+from wrist_stiffness.campaign.planning.loads_file import Actuator, AppliedLoad, Weight
+from wrist_stiffness.campaign.planning.plan import Conditions, plan
+from wrist_stiffness.campaign.planning.pool import draw_settings
+from wrist_stiffness.campaign.planning.question import (
     SESSION,
     TARE,
     WRIST,
@@ -49,10 +52,8 @@ from wrist_stiffness.campaign.design_question import (
     drawn,
     effect_named,
 )
-from wrist_stiffness.campaign.design_signatures import Signature, signatures
-from wrist_stiffness.campaign.design_timeline import Pace, Timeline, Visit, run_through
-from wrist_stiffness.campaign.loads_file import Actuator, AppliedLoad, Weight
-from wrist_stiffness.campaign.planning import Conditions, plan
+from wrist_stiffness.campaign.planning.signatures import Signature, signatures
+from wrist_stiffness.campaign.planning.timeline import Pace, Timeline, Visit, run_through
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
@@ -95,10 +96,10 @@ PLANS = 5
 STEPS = 5
 LONGEST_STEP = 1.0
 ARMS = ("planned", "random", "random with returns")
-design_pool.POOL = 40
+pool.POOL = 40
 """Fewer settings than the command has to choose from, to save time."""
 
-planning.fixed_visits = lambda *given: design_pool.fixed_visits(*given)[:1]
+planning.fixed_visits = lambda *given: pool.fixed_visits(*given)[:1]
 planning._Pool.fixed_gram = lambda _, grams: np.zeros(grams.shape[1:])
 """Reference poses and holds are left out of what is measured, so of the plan's reckoning too."""
 

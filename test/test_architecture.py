@@ -74,6 +74,47 @@ def violations(module, text):
     return found
 
 
+ROOMS_OF_CAMPAIGN = {
+    "reading": set(),
+    "fitting": set(),
+    "comparing": {"fitting"},
+    "searching": {"fitting"},
+    "planning": set(),
+}
+
+
+def crossings(module, text):
+    """Return what a module of campaign (path below it) imports against the rules of its rooms."""
+    room = Path(module).parts[0]
+    allowed = ROOMS_OF_CAMPAIGN.get(room, set()) | {room}
+    prefix = f"{PACKAGE}.campaign."
+    used = [name for name, _ in imports(ast.parse(text)) if name.startswith(prefix)]
+    into = [(name, name.removeprefix(prefix).split(".")[0]) for name in used]
+    return [
+        f"campaign/{module} imports {name}"
+        for name, other in into
+        if other in ROOMS_OF_CAMPAIGN and other not in allowed
+    ]
+
+
+def test_the_rooms_of_campaign_keep_to_their_directions():
+    campaign = SOURCE / "campaign"
+    rooms = {path.parent.name for path in campaign.glob("*/__init__.py")}
+    assert rooms == set(ROOMS_OF_CAMPAIGN)
+    found = []
+    for path in campaign.rglob("*.py"):
+        found += crossings(path.relative_to(campaign), path.read_text())
+    assert found == []
+
+
+def test_a_wrong_way_between_the_rooms_of_campaign_is_found():
+    line = "from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions"
+    assert crossings("reading/session.py", line)
+    assert crossings("units.py", line)
+    assert not crossings("searching/screening.py", line)
+    assert not crossings("comparing/compare.py", "from wrist_stiffness.campaign.units import cut")
+
+
 def test_every_module_keeps_to_the_import_directions():
     modules = sorted(SOURCE.rglob("*.py"))
     assert modules

@@ -26,7 +26,7 @@ TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.residual
 PACKAGE = Path(wrist_stiffness.__file__).parent
 
 OWN = (
-    "wrist_stiffness.campaign.diagnosing",
+    "wrist_stiffness.campaign.searching.diagnose",
     # The registry finds the laws by their files, no import names them.
     *(f"wrist_stiffness.model.effects.{p.stem}" for p in (PACKAGE / "model/effects").glob("*.py")),
 )

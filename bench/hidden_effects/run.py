@@ -96,12 +96,12 @@ def version_of(solver: str) -> str:
         "own_diagnosis": OWN,
         "own_diagnosis_mcap": (
             *OWN,
-            "wrist_stiffness.campaign.reading",
+            "wrist_stiffness.campaign.reading.session",
             "wrist_stiffness.workflows.simulate",
         ),
     }.get(solver, ())
     # The project's calibration is in the floor of every score.
-    modules = (*modules, "wrist_stiffness.campaign.base_fit")
+    modules = (*modules, "wrist_stiffness.campaign.searching.base_fit")
     return code_version((*TRUTH, *modules), (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 

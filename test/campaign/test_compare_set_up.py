@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.comparing import compare_models
+from wrist_stiffness.campaign.comparing.compare import compare_models
+from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import observe
-from wrist_stiffness.campaign.set_up import refit_set_up, refitted_values
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.comparison import ComparedModel, Comparison, sizes
-from wrist_stiffness.campaign.contrast_sentences import Told, tell
-from wrist_stiffness.campaign.headroom import held_out_process, left_by_others
+from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, sizes
+from wrist_stiffness.campaign.comparing.headroom import held_out_process, left_by_others
+from wrist_stiffness.campaign.comparing.sentences import Told, tell
+from wrist_stiffness.campaign.comparing.worst_poses import worst_poses
 from wrist_stiffness.campaign.noise_floor import (
     NoiseFloor,
     against_floor,
@@ -16,7 +17,6 @@ from wrist_stiffness.campaign.noise_floor import (
     repeatability,
 )
 from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.campaign.worst_poses import worst_poses
 from wrist_stiffness.diagnosis import Observations
 
 N = 400

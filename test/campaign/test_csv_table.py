@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.csv_columns import (
+from wrist_stiffness.campaign.reading.csv_columns import (
     column_of,
     covariate_of,
     nanoseconds,
@@ -14,7 +14,7 @@ from wrist_stiffness.campaign.csv_columns import (
     seconds,
     writer_of,
 )
-from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, RecordingError, WristError

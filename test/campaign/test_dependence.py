@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.dependence import dependences
+from wrist_stiffness.campaign.comparing.dependence import dependences
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.errors import InputError
 

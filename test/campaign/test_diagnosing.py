@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.diagnosing import diagnose_sessions
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from wrist_stiffness.campaign.fit_problem import FitProblem
-from wrist_stiffness.campaign.fitting import fit
-from wrist_stiffness.campaign.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.campaign.fitting.fit import fit
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist

@@ -2,7 +2,7 @@
 
 import pytest
 
-from wrist_stiffness.campaign.folder import recordings_in
+from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.errors import RecordingError
 
 

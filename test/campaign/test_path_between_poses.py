@@ -3,7 +3,7 @@
 import numpy as np
 
 from wrist_stiffness.campaign.observing import observe
-from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 

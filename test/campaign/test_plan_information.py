@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from wrist_stiffness.campaign.design_earlier import as_experiment
-from wrist_stiffness.campaign.design_information import (
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.planning.earlier import as_experiment
+from wrist_stiffness.campaign.planning.information import (
     CHARGE,
     FREE,
     MOTION_NOISE,
@@ -21,17 +22,16 @@ from wrist_stiffness.campaign.design_information import (
     information,
     whitened,
 )
-from wrist_stiffness.campaign.design_question import (
+from wrist_stiffness.campaign.planning.loads_file import NO_LOAD, AppliedLoad
+from wrist_stiffness.campaign.planning.question import (
     SESSION,
     between,
     commissioning,
     effect_named,
 )
-from wrist_stiffness.campaign.design_signatures import plausible, signatures
-from wrist_stiffness.campaign.design_timeline import Pace, Visit, run_through
-from wrist_stiffness.campaign.design_truths import after_data, as_asked
-from wrist_stiffness.campaign.loads_file import NO_LOAD, AppliedLoad
-from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.planning.signatures import plausible, signatures
+from wrist_stiffness.campaign.planning.timeline import Pace, Visit, run_through
+from wrist_stiffness.campaign.planning.truths import after_data, as_asked
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.loads_file import read_loads
+from wrist_stiffness.campaign.planning.loads_file import read_loads
 from wrist_stiffness.errors import InputError
 
 GRAVITY = np.array([0.0, 0.0, -9.81])

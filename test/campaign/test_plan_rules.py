@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign import design_pool, design_question
-from wrist_stiffness.campaign.design_information import MeasurementNoise
-from wrist_stiffness.campaign.design_question import between, effect_named
-from wrist_stiffness.campaign.design_timeline import PEAK, Pace
-from wrist_stiffness.campaign.loads_file import Actuator, Weight
-from wrist_stiffness.campaign.planning import Conditions, plan
+from wrist_stiffness.campaign.planning import pool
+from wrist_stiffness.campaign.planning import question as design_question
+from wrist_stiffness.campaign.planning.information import MeasurementNoise
+from wrist_stiffness.campaign.planning.loads_file import Actuator, Weight
+from wrist_stiffness.campaign.planning.plan import Conditions, plan
+from wrist_stiffness.campaign.planning.question import between, effect_named
+from wrist_stiffness.campaign.planning.timeline import PEAK, Pace
 from wrist_stiffness.errors import InputError, LoadRangeError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.backlash import Backlash
@@ -37,7 +38,7 @@ def model():
 @pytest.fixture(autouse=True)
 def small_pool(monkeypatch):
     """Fewer settings to choose from, for the time of the tests."""
-    monkeypatch.setattr(design_pool, "POOL", 10)
+    monkeypatch.setattr(pool, "POOL", 10)
 
 
 def conditions(model, sources=(WEIGHT, GRIPPER), minutes=None, seed=0, **pace):
@@ -60,7 +61,7 @@ def generator():
 @pytest.fixture(scope="module")
 def longer(model):
     patch = pytest.MonkeyPatch()
-    patch.setattr(design_pool, "POOL", 10)
+    patch.setattr(pool, "POOL", 10)
     try:
         return plan(model, rivals(), conditions(model, minutes=25.0))
     finally:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.machine_signals import machine_signals
-from wrist_stiffness.campaign.reading import read_session
-from wrist_stiffness.campaign.signals import in_order
+from wrist_stiffness.campaign.reading.machine_signals import machine_signals
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.reading.signals import in_order
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.load_history import LoadHistory
 from wrist_stiffness.errors import FrameError, StaleLoadError

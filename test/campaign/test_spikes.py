@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.spikes import spikes
+from wrist_stiffness.campaign.reading.spikes import spikes
 
 LEAST = np.array([1e-6])
 

@@ -19,8 +19,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from wrist_stiffness.campaign.diagnosing import diagnose_sessions
-from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.model.model_file import load_model, save_model

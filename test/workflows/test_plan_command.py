@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from wrist_stiffness.campaign import design_pool
+from wrist_stiffness.campaign.planning import pool
 from wrist_stiffness.cli.main import main
 
 LOADS = """
@@ -45,7 +45,7 @@ DIAGNOSIS = {
 def small_pool():
     """Fewer settings to choose from, for the time of the tests."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(design_pool, "POOL", 10)
+    patch.setattr(pool, "POOL", 10)
     yield
     patch.undo()
 

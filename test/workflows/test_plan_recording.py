@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign import design_pool
+from wrist_stiffness.campaign.planning import pool
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import (
@@ -53,7 +53,7 @@ RATE_HZ = 10.0
 def files(tmp_path_factory):
     """Loads and diagnosis; fewer settings to choose from, for the time of the tests."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(design_pool, "POOL", 10)
+    patch.setattr(pool, "POOL", 10)
     folder = tmp_path_factory.mktemp("files")
     (folder / "loads.yaml").write_text(LOADS)
     (folder / "found.json").write_text(json.dumps(DIAGNOSIS))

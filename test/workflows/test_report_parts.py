@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.conditions import Condition
-from wrist_stiffness.campaign.contrast_sentences import Change, Statement
+from wrist_stiffness.campaign.comparing.conditions import Condition
+from wrist_stiffness.campaign.comparing.sentences import Change, Statement
 from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.workflows.report.parts import against

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from wrist_stiffness.campaign.calibrating import Calibration, calibrate
+from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.lineage import Step

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparing import compare_models
-from wrist_stiffness.campaign.comparison import ComparedModel, Comparison, Size
+from wrist_stiffness.campaign.comparing.compare import compare_models
+from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, Size
+from wrist_stiffness.campaign.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import SOURCES
-from wrist_stiffness.campaign.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.workflows.calibrate import Run

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wrist_stiffness.campaign.folder import recordings_in
+from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import compare
 from wrist_stiffness.workflows.fleet import FleetRow, map_recordings

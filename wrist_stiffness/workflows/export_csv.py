@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.campaign.csv_columns import (
+from wrist_stiffness.campaign.reading.csv_columns import (
     LOAD,
     MOTORS,
     POSITION,
@@ -24,15 +24,15 @@ from wrist_stiffness.campaign.csv_columns import (
     seconds,
     writer_of,
 )
-from wrist_stiffness.campaign.machine_signals import machine_signals
-from wrist_stiffness.campaign.pose_track import (
+from wrist_stiffness.campaign.reading.machine_signals import machine_signals
+from wrist_stiffness.campaign.reading.pose_track import (
     base_transform,
     last_of_equal,
     measured_components,
 )
-from wrist_stiffness.campaign.reading import notes_of, require_topics
+from wrist_stiffness.campaign.reading.session import notes_of, require_topics
+from wrist_stiffness.campaign.reading.signals import Stamps
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
-from wrist_stiffness.campaign.signals import Stamps
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wrist_stiffness.campaign.extending import Extension, extend
+from wrist_stiffness.campaign.fitting.extend import Extension, extend
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect

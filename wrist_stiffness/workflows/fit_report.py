@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.fit_result import Fit, Fitted
-from wrist_stiffness.campaign.judging import SEEN, THIS_SESSION, Judged
+from wrist_stiffness.campaign.fitting.judge import SEEN, THIS_SESSION, Judged
+from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import AT_THE_FLOOR, against_floor, over_floor
 

@@ -68,7 +68,7 @@ def map_recordings(
     function : callable
         Of a path; can be pickled.
     paths : sequence of Path
-        Recordings (see `campaign.folder.recordings_in`).
+        Recordings (see `campaign.reading.folder.recordings_in`).
     scheduler_address : str, optional
         Of a running Dask scheduler, `tcp://HOST:PORT`; processes of this machine if None.
     workers : int, optional

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wrist_stiffness.campaign.csv_columns import (
+from wrist_stiffness.campaign.reading.csv_columns import (
     LOAD,
     MOTORS,
     POSITION,
@@ -22,7 +22,7 @@ from wrist_stiffness.campaign.csv_columns import (
     nanoseconds,
     reader_of,
 )
-from wrist_stiffness.campaign.marker_poses import LEAST_MARKERS
+from wrist_stiffness.campaign.reading.marker_poses import LEAST_MARKERS
 from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
 from wrist_stiffness.errors import InputError
@@ -95,7 +95,7 @@ def import_csv(
     Parameters
     ----------
     table : path
-        CSV file; its columns are those of `campaign.csv_columns`.
+        CSV file; its columns are those of `campaign.reading.csv_columns`.
     output : path
         rosbag2 folder, or file where it ends in `.mcap`.
     unloaded : bool

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.campaign.design_earlier import as_experiment
-from wrist_stiffness.campaign.design_information import MeasurementNoise
-from wrist_stiffness.campaign.design_question import Question, between, commissioning
-from wrist_stiffness.campaign.design_rivals import read_rivals
-from wrist_stiffness.campaign.design_timeline import Experiment, Pace, Timeline
-from wrist_stiffness.campaign.loads_file import read_loads
-from wrist_stiffness.campaign.planning import Conditions, Plan, plan
+from wrist_stiffness.campaign.planning.earlier import as_experiment
+from wrist_stiffness.campaign.planning.information import MeasurementNoise
+from wrist_stiffness.campaign.planning.loads_file import read_loads
+from wrist_stiffness.campaign.planning.plan import Conditions, Plan, plan
+from wrist_stiffness.campaign.planning.question import Question, between, commissioning
+from wrist_stiffness.campaign.planning.rivals import read_rivals
+from wrist_stiffness.campaign.planning.timeline import Experiment, Pace, Timeline
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from wrist_stiffness.campaign.folder import recordings_in
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.reading import read_session
+from wrist_stiffness.campaign.reading.folder import recordings_in
+from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import file_sha256

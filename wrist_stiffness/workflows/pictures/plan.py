@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.design_timeline import Timeline
+from wrist_stiffness.campaign.planning.timeline import Timeline
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparison import ComparedModel, lengths
+from wrist_stiffness.campaign.comparing.comparison import ComparedModel, lengths
 from wrist_stiffness.campaign.noise_floor import SOURCES
 from wrist_stiffness.diagnosis import Quantity
 from wrist_stiffness.workflows.compare import Compared

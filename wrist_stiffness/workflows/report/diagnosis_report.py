@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.campaign.contrast_sentences import Statement, Told, tell
+from wrist_stiffness.campaign.comparing.sentences import Statement, Told, tell
 from wrist_stiffness.campaign.noise_floor import noise_floor
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array

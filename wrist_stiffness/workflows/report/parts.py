@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isnan
 
-from wrist_stiffness.campaign.contrast_sentences import Change, Statement
+from wrist_stiffness.campaign.comparing.sentences import Change, Statement
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.dependence import Against

@@ -1,0 +1,1 @@
+"""How far models are off from measured sessions, where, and on what that depends."""

@@ -1,0 +1,99 @@
+"""Compare models with measured sessions: the whole way from sessions to sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, sizes
+from wrist_stiffness.campaign.comparing.headroom import held_out_process
+from wrist_stiffness.campaign.comparing.sentences import tell
+from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
+from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
+from wrist_stiffness.campaign.observing import Observed, as_units, predict_units, tabulate
+from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.error_model import ErrorModel
+
+Progress = Callable[[int, int], None]
+
+FEWEST_UNITS = 12
+"""From fewer dwells and moments the registrations alone could be anything."""
+
+
+def compare_models(
+    models: Sequence[tuple[str, ErrorModel]],
+    sessions: Sequence[MeasuredSession],
+    rng: np.random.Generator,
+    progress: Progress = lambda done, total: None,
+) -> Comparison:
+    """Say how far models are off from measured sessions, where and under which condition.
+
+    Parameters
+    ----------
+    models : sequence of (str, ErrorModel)
+        Name of each for the report, and the model; all of one wrist.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+    rng : numpy.random.Generator
+        For what chance gives.
+    progress : callable, optional
+        Told steps done and in all.
+
+    Returns
+    -------
+    Comparison
+        In the order of the models.
+
+    Raises
+    ------
+    InputError
+        If there is too little to compare, or the models are not of one wrist.
+    """
+    steps = 2 * len(models) + 2
+    progress(0, steps)
+    first = models[0][1]
+    cuts = tuple(as_units(first, session) for session in sessions)
+    calibrated = said_calibrated(sessions)
+    tables: list[tuple[Observed, Observations, tuple[str, ...]]] = []
+    for number, (name, model) in enumerate(models):
+        if not _same_wrist(model, first):
+            raise InputError(
+                f"model {name} is of another wrist than {models[0][0]}: its axes differ"
+            )
+        predicted = np.concatenate([predict_units(model, each) for each in cuts])
+        observed = tabulate(model, cuts, predicted)
+        units = observed.observations.n_units
+        if units < FEWEST_UNITS:
+            raise InputError(
+                f"{units} dwells and moments are too few to compare with, it needs {FEWEST_UNITS}"
+            )
+        set_ups = refit_set_up(model, observed, calibrated)
+        refitted = observed.observations.with_values(refitted_values(observed, set_ups))
+        tables.append((observed, refitted, tuple(each.sentence for each in set_ups)))
+        progress(number + 1, steps)
+    left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
+    floor = noise_floor(left)
+    progress(len(models) + 1, steps)
+    compared = []
+    for (name, _), (observed, refitted, absorbed) in zip(models, tables, strict=True):
+        told = tell(refitted, floor, rng)
+        compared.append(ComparedModel(name, observed.observations, refitted, absorbed, told))
+        progress(len(models) + 1 + len(compared), steps)
+    return Comparison(
+        tuple(each.name for each in cuts),
+        tuple(compared),
+        floor,
+        repeatability(tables[0][1]),
+        repeatability(by_side(tables[0][1])),
+        {key: size.rms for key, size in sizes(left).items()},
+    )
+
+
+def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:
+    """Tell whether the rigid wrists are the same; parts may differ, they are what is compared."""
+    first, second = one.table.geometry, other.table.geometry
+    return all(np.array_equal(first.axes[joint], second.axes[joint]) for joint in first.axes)

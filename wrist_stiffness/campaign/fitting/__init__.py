@@ -1,0 +1,1 @@
+"""Fit the parameters of a model to measured sessions: calibrate, extend, judge."""

@@ -1,0 +1,201 @@
+"""Add one effect to a model and fit it together with what is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from wrist_stiffness.campaign.fitting.calibrate import said_calibrated, told_model
+from wrist_stiffness.campaign.fitting.fit import fit, start_of
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
+from wrist_stiffness.campaign.fitting.judge import Judged, judged
+from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.recipes import recipe
+from wrist_stiffness.campaign.fitting.result import Fit, Fitted
+from wrist_stiffness.campaign.fitting.start_search import start_values
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
+from wrist_stiffness.campaign.observing import UnitSession, as_units
+from wrist_stiffness.diagnosis.sealed import bought, refuted
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+
+FAR = 3.0
+"""Standard deviations of its prior beyond which a parameter is farther off than usual."""
+
+MOVED = 2.0
+"""Uncertainties, of before, by which a parameter of the base must move to be named."""
+
+SIGNIFICANT = 2.0
+"""Uncertainties that tell something from nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A model with one more effect.
+
+    Parameters
+    ----------
+    effect : Effect
+        What was added, as it was given.
+    fit : Fit
+        Of everything together to all recordings.
+    before, after : Judged
+        Without and with the effect, by units that neither fit has seen.
+    """
+
+    effect: Effect
+    fit: Fit
+    before: Judged
+    after: Judged
+
+    @cached_property
+    def model(self) -> ErrorModel:
+        """The extended model of the newest session."""
+        return told_model(self.fit, keep=(self.effect.name,))
+
+    @cached_property
+    def parameters(self) -> tuple[Fitted, ...]:
+        """All that was fitted."""
+        return self.fit.parameters
+
+    @property
+    def own(self) -> tuple[Fitted, ...]:
+        """Parameters of the effect itself."""
+        return tuple(each for each in self.parameters if each.effect == self.effect.name)
+
+    @cached_property
+    def floor(self) -> NoiseFloor:
+        """Scatter of the units that judge."""
+        return noise_floor(self.after.observations)
+
+    @cached_property
+    def bought(self) -> dict[str, tuple[float, float]]:
+        """Fall of the held-out error and its standard uncertainty, by the key of the quantity."""
+        judge = self.after.fit
+        return {
+            q.key: bought(self.before.held_out(judge), self.after.held_out(judge), q)
+            for q in self.after.observations.reported
+        }
+
+    @property
+    def base_moved(self) -> tuple[tuple[Fitted, Fitted], ...]:
+        """Parameters of the base before and after, of those that the effect moved, farthest first.
+
+        Both from the recordings without the held-out part.
+        """
+        after = {(p.effect, p.key, p.session): p for p in self.after.fit.parameters}
+        pairs = [(p, after[p.effect, p.key, p.session]) for p in self.before.fit.parameters]
+        moved = [
+            (abs(b.value - a.value) / a.sigma, a, b)
+            for a, b in pairs
+            if abs(b.value - a.value) > MOVED * a.sigma
+        ]
+        return tuple((a, b) for _, a, b in sorted(moved, key=lambda each: -each[0]))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What speaks against the effect, a sentence each."""
+        out = []
+        law, place = self.effect.law, self.effect.component
+        for each in self.own:
+            if each.at_bound:
+                out.append(f"{each.key} lies on its bound: the data ask for what cannot be")
+            elif not each.excited:
+                out.append(f"{each.key} is not told by these recordings; needs {law.excited_by}")
+            elif abs(each.moved) > FAR:
+                check = law.check.replace("{place}", place)
+                out.append(f"{each.key} is {abs(each.moved):.1f} x its usual size: {check}")
+        told = [each for each in self.own if each.excited]
+        if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
+            out.append("none of its parameters differs from zero by more than chance")
+        judge = self.after.fit
+        without, with_it = self.before.held_out(judge), self.after.held_out(judge)
+        if refuted(without, with_it):
+            out.append("the error on the unseen part GROWS: leave this effect out")
+        elif not refuted(with_it, without):
+            out.append("the error on the unseen part does not fall beyond chance")
+        return tuple(out)
+
+
+def extend(
+    model: ErrorModel,
+    effect: Effect,
+    sessions: Sequence[MeasuredSession],
+    progress: Progress = silent,
+) -> Extension:
+    """Add an effect, fit it with everything else, and judge it by units that were not seen.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is there.
+    effect : Effect
+        What is added; its values are starts where its law knows no prior.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+    progress : callable
+        Told steps done and steps at most of each of three fits.
+
+    Returns
+    -------
+    Extension
+        Fitted and judged.
+
+    Raises
+    ------
+    InputError
+        If the model has the effect already or calibration fits it anyway, or the recordings lack a
+        signal that it needs.
+    """
+    free, held = commissioning(model, said_calibrated(sessions))
+    _require_new(model, effect, free)
+    units = tuple(as_units(model, session) for session in sessions)
+    _require_signals(model, effect, units)
+    base = FitProblem(model.with_effects(*held), units, free)
+    before = judged(base, progress=progress)
+    wide = replace(base, free=(*free, _free(effect, units)))
+    start = _with_effect(wide, before.fit, start_values(before.fit, effect))
+    after = judged(wide, start, progress)
+    everything = fit(wide, start_of(wide, after.fit.problem, after.fit.z), progress=progress)
+    return Extension(effect, everything, before, after)
+
+
+def _free(effect: Effect, units: Sequence[UnitSession]) -> FreeEffect:
+    """Return the effect with all parameters free that do anything in these recordings."""
+    signals = frozenset.intersection(*(frozenset(each.block.temperatures) for each in units))
+    known = all(np.isfinite(parameter.scale) for parameter in effect.parameters)
+    idle = recipe(effect.law, effect.component, signals).idle if known else ()
+    scale = {p.key: p.scale for p in effect.parameters if p.key not in idle}
+    return FreeEffect(effect, scale)
+
+
+def _with_effect(wide: FitProblem, base: Fit, values: dict[str, float]) -> tuple[FitProblem, Array]:
+    """Return the point of the base's fit with an effect's values added."""
+    problem = replace(wide, sessions=base.problem.sessions)
+    z = start_of(problem, base.problem, base.z)
+    for place, unknown in enumerate(problem.unknowns):
+        if unknown.free == len(problem.free) - 1 and unknown.key in values:
+            z[place] = (values[unknown.key] - unknown.mean) / unknown.step
+    return problem, z
+
+
+def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:
+    if any(own.name == effect.name for own in model.effects):
+        raise InputError(f"{effect.name}: the model has it already; 'calibrate' fits it again")
+    if any(each.effect.name == effect.name for each in free):
+        raise InputError(f"{effect.name}: 'calibrate' fits it, there is nothing to add")
+
+
+def _require_signals(model: ErrorModel, effect: Effect, units: Sequence[UnitSession]) -> None:
+    """Refuse an effect without its signals: its parameters would stay at nothing in silence."""
+    for each in units:
+        tried = model.with_effects().batch_with(each.block.take(slice(0, 2)), [(effect,)])[0]
+        lacking = [text for text in tried.warnings if "left out" in text]
+        if lacking:
+            raise InputError(f"{each.name}: {lacking[0].removesuffix(', left out')}")

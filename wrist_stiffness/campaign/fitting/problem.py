@@ -1,0 +1,227 @@
+"""What a fit compares: measured pose errors of the units, and what a model says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wrist_stiffness.campaign.columns import SessionModel
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
+from wrist_stiffness.campaign.fitting.shims import Shims
+from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.diagnosis.observations import Observations
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+
+NO_PRIOR = 1e-3
+"""Weight where a law knows no prior: a thousand times its first value, so that what the data do not
+excite stays where it is."""
+
+Progress = Callable[[int, int], None]
+
+STEP = 1e-2
+"""Step of the difference quotients, in standard deviations of the prior."""
+
+
+def silent(done: int, total: int) -> None:
+    """Show no progress."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that is fitted, counted in steps from the mean of its prior.
+
+    Parameters
+    ----------
+    free : int
+        Place of its effect among the free ones.
+    key : str
+        Name of the parameter.
+    session : int or None
+        Session whose own it is, None for the wrist's.
+    mean, step : float
+        Where it starts and its natural size, in the unit of its name.
+    weight : float
+        `step` over the standard deviation of the prior.
+    lower, upper : float
+        Bounds, in the unit of its name.
+    """
+
+    free: int
+    key: str
+    session: int | None
+    mean: float
+    step: float
+    weight: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """A model, sessions, and what may move.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Table and the effects that stay as they are.
+    sessions : tuple of UnitSession
+        In the order of time.
+    free : tuple of FreeEffect
+        What may move; none of them is among the model's effects.
+    """
+
+    model: ErrorModel
+    sessions: tuple[UnitSession, ...]
+    free: tuple[FreeEffect, ...]
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """All numbers that are fitted: the wrist's, then those of each session."""
+        found = []
+        for session in (None, *range(len(self.sessions))):
+            for place, free in enumerate(self.free):
+                if free.per_session == (session is None):
+                    continue
+                bounds = {p.key: p for p in free.effect.parameters}
+                found += [
+                    Unknown(
+                        place,
+                        key,
+                        session,
+                        free.effect.estimates[key].value,
+                        free.step[key],
+                        1.0 if np.isfinite(scale) else NO_PRIOR,
+                        bounds[key].lower,
+                        bounds[key].upper,
+                    )
+                    for key, scale in free.scale.items()
+                ]
+        return tuple(found)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds in steps, (p,)."""
+        lower = [(u.lower - u.mean) / u.step for u in self.unknowns]
+        upper = [(u.upper - u.mean) / u.step for u in self.unknowns]
+        return np.array(lower), np.array(upper)
+
+    @property
+    def weights(self) -> Array:
+        """Weights of the priors, (p,)."""
+        return np.array([unknown.weight for unknown in self.unknowns])
+
+    def effects(self, z: Array, session: int) -> tuple[Effect, ...]:
+        """Return the free effects as a session has them, gaps as shims leave them.
+
+        Parameters
+        ----------
+        z : (p,) float
+            Steps from the prior means.
+        session : int
+            Number of the session.
+        """
+        values: list[dict[str, float]] = [{} for _ in self.free]
+        for unknown, steps in zip(self.unknowns, z, strict=True):
+            if unknown.session in (None, session):
+                value = unknown.mean + float(steps) * unknown.step
+                values[unknown.free][unknown.key] = min(max(value, unknown.lower), unknown.upper)
+        found = [free.effect.with_values(own) for free, own in zip(self.free, values, strict=True)]
+        return self._shims.fitted(self._starts, found)
+
+    @cached_property
+    def _starts(self) -> tuple[Effect, ...]:
+        return tuple(free.effect for free in self.free)
+
+    @cached_property
+    def _shims(self) -> Shims:
+        return Shims.of(self.model, self._starts)
+
+    def residual(self, z: Array) -> Array:
+        """Return log(T_measured T_predicted^-1) of all units, (u, 6) at O in F [m, rad]."""
+        return self.rows(
+            [
+                self._residuals(number, [self.effects(z, number)])[0]
+                for number in range(len(self.sessions))
+            ]
+        )
+
+    def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
+        """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
+
+        By one-sided differences, away from the nearer bound.  Where neither the parameter's effect
+        nor the step needs the path, effects with a memory are left out of the difference: that is
+        far quicker, and good enough for the slope.
+
+        Parameters
+        ----------
+        z : (p,) float
+            Steps from the prior means.
+        places : collection of int, optional
+            Which unknowns are asked for; all by default.
+
+        Returns
+        -------
+        (u, 6, p or number of places) array
+            In the order of `places`.
+        """
+        asked = list(range(len(self.unknowns)) if places is None else places)
+        return self.rows([self._columns(number, z, asked) for number in range(len(self.sessions))])
+
+    def _columns(self, number: int, z: Array, asked: list[int]) -> Array:
+        """Return the columns of one session's units, (u, 6, number asked)."""
+        model, session = self._models[number], self.sessions[number]
+
+        def memoryless(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+            return tuple(effect for effect in effects if not model.remembers((effect,)))
+
+        whole = (*self.model.effects, *self.effects(z, number))
+        step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
+        moved, trials, by_path = [], [], []
+        for place in asked:
+            unknown = self.unknowns[place]
+            if unknown.session not in (None, number):
+                continue
+            other = z.copy()
+            other[place] += step[place]
+            trial = (*self.model.effects, *self.effects(other, number))
+            by_path.append(model.remembers((self.free[unknown.free].effect,)))
+            trials.append(trial if by_path[-1] else memoryless(trial))
+            moved.append(place)
+        path, quick, *changed = model.predicted([whole, memoryless(whole), *trials])
+        first = session.residual(path)
+        block = np.zeros((*first.shape, len(z)))
+        for place, on_path, twist in zip(moved, by_path, changed, strict=True):
+            change = session.residual(path + twist - (path if on_path else quick)) - first
+            block[:, :, place] = np.nan_to_num(change / step[place])
+        return block[:, :, asked]
+
+    @cached_property
+    def table(self) -> Observations:
+        """Conditions, known scatter and labels of the units, with what was measured as values."""
+        return self._tabulated.observations
+
+    @cached_property
+    def _tabulated(self) -> Observed:
+        units = sum(len(each.cut.dwell) for each in self.sessions)
+        return tabulate(self.model, self.sessions, np.zeros((units, 6)))
+
+    def rows(self, blocks: list[Array]) -> Array:
+        """Put the sessions' units together and keep those of the table."""
+        measured = [
+            np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1) for each in self.sessions
+        ]
+        return np.concatenate([block[rows] for block, rows in zip(blocks, measured, strict=True)])
+
+    def _residuals(self, number: int, additions: Sequence[Sequence[Effect]]) -> list[Array]:
+        session = self.sessions[number]
+        trials = [(*self.model.effects, *added) for added in additions]
+        return [session.residual(each) for each in self._models[number].predicted(trials)]
+
+    @cached_property
+    def _models(self) -> tuple[SessionModel, ...]:
+        return tuple(SessionModel(self.model, each, ()) for each in self.sessions)

@@ -1,0 +1,1 @@
+"""Plan the experiment that tells what the last one could not."""

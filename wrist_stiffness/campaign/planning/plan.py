@@ -1,0 +1,392 @@
+"""Plan an experiment: for commissioning, or between the rivals that a diagnosis left.
+
+What effects would leave is computed with the model on a pool of settings performed as one
+experiment; settings are chosen by their Gram matrices; what the chosen experiment will settle is
+computed again on its own path, in its own order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.campaign.planning.choice import LOOKED_AT, choose
+from wrist_stiffness.campaign.planning.information import (
+    RESOLVED,
+    Goal,
+    Information,
+    Layout,
+    MeasurementNoise,
+    calibrated,
+    carried_over,
+    discrimination,
+    improvement,
+    information,
+    wrong_bound,
+)
+from wrist_stiffness.campaign.planning.loads_file import Source
+from wrist_stiffness.campaign.planning.pool import (
+    Setting,
+    arrange,
+    draw_settings,
+    fixed_visits,
+    reference_pose,
+)
+from wrist_stiffness.campaign.planning.question import SESSION, TARE, Question
+from wrist_stiffness.campaign.planning.signatures import signatures
+from wrist_stiffness.campaign.planning.timeline import (
+    Experiment,
+    Pace,
+    Timeline,
+    Visit,
+    run_through,
+)
+from wrist_stiffness.campaign.planning.truths import after_data, as_asked
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.error_model import ErrorModel
+
+NEAREST = 2
+"""Rivals that a commissioning keeps apart from each effect: those that come nearest."""
+
+LONGER = 10.0
+"""What so many times the whole pool cannot separate counts as out of reach."""
+
+LONGEST_S = 3600.0
+"""Of a plan between rivals for which no duration is asked [s]."""
+
+SEEN = 3.0
+"""Discrimination from nothing at which an effect counts as excited."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Under which an experiment is planned.
+
+    Parameters
+    ----------
+    sources : tuple of Weight or Actuator
+        What the user can apply; nothing else is proposed.
+    pace : Pace
+        Speeds and durations.
+    noise : MeasurementNoise
+        Of one dwell.
+    seconds : float or None
+        Duration; None for as long as it takes, but not beyond `LONGEST_S`.
+    seed : int
+        The same seed gives the same plan.
+    """
+
+    sources: tuple[Source, ...]
+    pace: Pace
+    noise: MeasurementNoise
+    seconds: float | None
+    seed: int
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How well the plan answers one question.
+
+    Parameters
+    ----------
+    goal : Goal
+        The question.
+    discrimination : float
+        In standard deviations.
+    reachable : bool
+        Whether `LONGER` times the pool with these loads could settle it.
+    """
+
+    goal: Goal
+    discrimination: float
+    reachable: bool
+
+    @property
+    def settled(self) -> bool:
+        """Whether the plan settles it."""
+        return self.discrimination >= needed(self.goal)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An experiment and what it is good for.
+
+    Parameters
+    ----------
+    timeline : Timeline or None
+        What to do when; None where no such experiment could answer any of the questions.
+    visits : tuple of Visit
+        Chosen ones, in the order of their worth.
+    answers : tuple of Answer
+        To every question.
+    cannot : dict of str to str
+        Effects that no such experiment shows, with the signal that they need.
+    calibration : dict of str to float
+        By how much the uncertainty of each effect that is always refitted falls.
+    """
+
+    timeline: Timeline | None
+    visits: tuple[Visit, ...]
+    answers: tuple[Answer, ...]
+    cannot: Mapping[str, str]
+    calibration: Mapping[str, float]
+
+
+def needed(goal: Goal) -> float:
+    """Return the discrimination that settles a question."""
+    return RESOLVED if goal.rival else SEEN
+
+
+def plan(
+    model: ErrorModel,
+    question: Question,
+    conditions: Conditions,
+    earlier: Sequence[Experiment] = (),
+    progress: Progress | None = None,
+) -> Plan:
+    """Plan an experiment.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    question : Question
+        What is asked.
+    conditions : Conditions
+        Loads, durations, noise.
+    earlier : sequence of Experiment
+        What was measured on this wrist before, each with instruments set up anew.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    Plan
+        Not longer than asked for.
+
+    Raises
+    ------
+    InputError
+        If not even the fixed part fits into the duration.
+    LoadRangeError
+        If a load cannot be applied within the table's range.
+    """
+    workspace, pace = model.table.workspace, conditions.pace
+    rng = np.random.default_rng(conditions.seed)
+    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
+    fixed = fixed_visits(settings, pace, workspace)
+    whole = question.goals is None
+    order = rng.permutation(2 * len(settings))
+    pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
+    stage = _Stages(progress, 2 + len(earlier))
+    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
+    question = question.without(lacking)
+    before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
+    goals = question.goals
+    if goals is None:
+        goals = _all_goals(known)
+    start = np.zeros_like(known.total)
+    for each in before:
+        start += carried_over(each, (*SESSION, TARE))
+    if before:
+        truths = after_data(start, known.layout, question.alike, rng)
+        refuted = _refuted(start, known.layout, question.alike)
+        goals = tuple(goal for goal in goals if goal.truth not in refuted)
+    else:
+        truths = as_asked(known, question.alike)
+    grams, start, layout = truths.of(known.grams), truths.of(start), truths.layout
+    total = grams.sum(axis=0)
+    best = discrimination(start + LONGER * total, layout, goals)
+    reachable = {goal: bool(d >= needed(goal)) for goal, d in zip(goals, best, strict=True)}
+    aimed = [goal for goal in goals if reachable[goal]]
+    if not aimed and not whole:
+        least = [Answer(goal, float(d), False) for goal, d in zip(goals, best, strict=True)]
+        return Plan(None, (), tuple(least), lacking, {})
+    if whole:
+        aimed = _nearest(aimed, discrimination(total, layout, aimed))
+
+    def utility(gram: Array) -> Array:
+        right = 1.0 - wrong_bound(discrimination(gram, layout, aimed)).mean(axis=-1)
+        return right + calibrated(gram, layout) if whole else right
+
+    def enough(gram: Array) -> bool:
+        if conditions.seconds is not None:
+            return False
+        reached = discrimination(gram, layout, aimed)
+        return bool(np.all(reached >= [needed(goal) for goal in aimed]))
+
+    seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
+    least_s = pool.arranged([], rng).duration_s
+    if least_s > seconds:
+        raise InputError(
+            f"plan: {seconds / 60.0:g} minutes are less than the {least_s / 60.0:.1f} that "
+            "warm-up, reference poses and two long holds take"
+        )
+    chosen = choose(
+        pool.by_unit(grams),
+        pool.cost_s,
+        start + pool.fixed_gram(grams),
+        seconds - least_s,
+        utility,
+        enough,
+        rng,
+        LOOKED_AT if whole else len(pool.cost_s),
+        per_second=conditions.seconds is not None,
+    )
+    visits = pool.visits_of(chosen)
+    timeline = pool.arranged(visits, rng)
+    while timeline.duration_s > seconds:
+        visits = visits[: -pool.in_unit]
+        timeline = pool.arranged(visits, rng)
+    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
+    reached = discrimination(start + truths.of(final.total), layout, goals)
+    answers = [
+        Answer(goal, float(d), reachable[goal]) for goal, d in zip(goals, reached, strict=True)
+    ]
+    return Plan(
+        timeline,
+        tuple(visits),
+        tuple(answers),
+        lacking,
+        improvement(start + truths.of(final.total), layout),
+    )
+
+
+class _Stages:
+    """One progress for several evaluations of about the same length."""
+
+    def __init__(self, progress: Progress | None, count: int) -> None:
+        self._progress, self._count, self._begun = progress, count, 0
+
+    def next(self) -> Progress:
+        """Return the progress of the next evaluation."""
+        behind = self._begun
+        self._begun += 1
+
+        def told(done: int, total: int) -> None:
+            if self._progress is not None:
+                self._progress(behind * total + done, self._count * total)
+
+        return told
+
+
+class _Pool:
+    """All settings, performed as one experiment, to be chosen as pairs of visits or singly."""
+
+    def __init__(
+        self,
+        settings: Sequence[Setting],
+        fixed: Sequence[Visit],
+        order: NDArray[np.intp],
+        pace: Pace,
+        model: ErrorModel,
+        both_sides: bool,
+    ) -> None:
+        self._fixed, self._pace = fixed, pace
+        self._workspace = model.table.workspace
+        self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
+        self.in_unit = 2 if both_sides else 1
+        ordered = [*(self._visits[i] for i in order), *fixed]
+        reference = reference_pose(self._workspace)
+        self.timeline = run_through(ordered, self._workspace, pace, reference)
+        self._place = np.argsort(order)
+        visit_s = np.diff(self.timeline.ends, prepend=0.0)
+        self.cost_s = self.by_unit(visit_s)
+
+    def by_unit(self, of_visits: Array) -> Array:
+        """Return the sums (m, ...) over the visits of each unit of values (v, ...)."""
+        units = of_visits[self._place].reshape(-1, self.in_unit, *of_visits.shape[1:])
+        total: Array = units.sum(axis=1)
+        return total
+
+    def fixed_gram(self, grams: Array) -> Array:
+        """Return the sum over the visits that every plan has."""
+        total: Array = grams[len(self._place) :].sum(axis=0)
+        return total
+
+    def visits_of(self, chosen: Sequence[int]) -> list[Visit]:
+        """Return the visits of some units; a unit chosen twice is visited twice."""
+        places = (self.in_unit * unit + side for unit in chosen for side in range(self.in_unit))
+        return [replace(self._visits[place]) for place in places]
+
+    def arranged(self, visits: Sequence[Visit], rng: np.random.Generator) -> Timeline:
+        """Return the experiment of some visits."""
+        return arrange(visits, self._fixed, self._workspace, self._pace, rng)
+
+
+def evaluated(
+    model: ErrorModel,
+    question: Question,
+    experiment: Experiment,
+    noise: MeasurementNoise,
+    progress: Progress | None = None,
+) -> tuple[Information, dict[str, str]]:
+    """Return what an experiment tells of the effects in question.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    question : Question
+        What is asked.
+    experiment : Experiment
+        Its path.
+    noise : MeasurementNoise
+        Of one dwell.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    Information
+        Without the effects that lack a signal.
+    dict of str to str
+        Those, and the signal.
+    """
+    sets = [*((effect,) for effect in question.nuisances), *question.effects]
+    found = signatures(model, experiment.block, sets, progress)
+    count = len(question.nuisances)
+    lacking = {each.name: each.lacks for each in found[count:] if each.lacks}
+    shown = [each for each in found[count:] if not each.lacks]
+    known = information(experiment, found[:count], question.free, shown, model.table, noise)
+    return known, lacking
+
+
+def _refuted(gram: Array, layout: Layout, alike: Sequence[Sequence[str]]) -> set[str]:
+    """Return the members of classes that cannot make up what the first one left in the data."""
+    pairs = [
+        Goal(members[0], rival)
+        for members in alike
+        for rival in members[1:]
+        if members[0] in layout.truths and rival in layout.truths
+    ]
+    reached = discrimination(gram, layout, pairs)
+    return {pair.rival for pair, d in zip(pairs, reached, strict=True) if d >= RESOLVED}
+
+
+def _all_goals(known: Information) -> tuple[Goal, ...]:
+    names = list(known.layout.truths)
+    return (
+        *(Goal(name, "") for name in names),
+        *(Goal(one, other) for one in names for other in names if one != other),
+    )
+
+
+def _nearest(goals: Sequence[Goal], discriminations: Array) -> list[Goal]:
+    """Return of each truth its own visibility and its nearest rivals."""
+    kept: list[Goal] = []
+    order = np.argsort(discriminations, kind="stable")
+    counts: dict[str, int] = {}
+    for i in order:
+        goal = goals[i]
+        if goal.rival:
+            counts[goal.truth] = counts.get(goal.truth, 0) + 1
+        if not goal.rival or counts[goal.truth] <= NEAREST:
+            kept.append(goal)
+    return kept

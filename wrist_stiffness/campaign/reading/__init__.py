@@ -1,0 +1,1 @@
+"""From recordings and tables of this wrist to measured sessions."""

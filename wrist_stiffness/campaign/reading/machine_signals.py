@@ -1,0 +1,139 @@
+"""What the machine said beside the measured poses: angles, load, temperatures, covariates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.campaign.reading.signals import Signal, Stamps, in_order
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.errors import FrameError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSamples, WrenchSamples
+
+JOINT_GAP_S = 0.5
+"""Farthest joint state from a measured pose that still tells its angles [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MachineSignals:
+    """Signals of one recording by their own stamps.
+
+    Parameters
+    ----------
+    angles : Signal
+        Motor angles (m, 2) [rad].
+    speeds : Signal or None
+        Motor speeds (m, 2), where the joint states tell them [rad/s].
+    loads : Signal
+        Wrenches (l, 6) at O [N, N m].
+    load_on_platform : bool
+        Whether their components are in U.
+    temperatures, covariates : dict of str to Signal
+        By component, by name.
+    """
+
+    angles: Signal
+    speeds: Signal | None
+    loads: Signal
+    load_on_platform: bool
+    temperatures: Mapping[str, Signal]
+    covariates: Mapping[str, Signal]
+
+    def usable(
+        self, time_ns: Stamps, load_age_limit_s: float
+    ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+        """Tell at which stamps (n,) [ns] angles and load are known, and why not at the others."""
+        angles = self.angles.near(time_ns, round(JOINT_GAP_S * NANOSECONDS))
+        newest = self.loads.newest(time_ns)
+        age = time_ns - self.loads.time_ns[newest]
+        loads = (newest >= 0) & (age <= round(load_age_limit_s * NANOSECONDS))
+        reasons = []
+        for known, what in (
+            (angles, f"no joint state within {JOINT_GAP_S:g} s"),
+            (loads | ~angles, f"no load estimate in the {load_age_limit_s:g} s before"),
+        ):
+            if not known.all():
+                reasons.append(f"{np.sum(~known)} measured poses are not used: {what}")
+        return angles & loads, tuple(reasons)
+
+    def at(self, time_ns: Stamps) -> Block:
+        """Return the signals that belong to usable stamps (n,) [ns], which rise."""
+        return Block(
+            time_ns / NANOSECONDS,
+            self.angles.interpolated(time_ns),
+            self.loads.values[self.loads.newest(time_ns)],
+            None if self.speeds is None else self.speeds.interpolated(time_ns),
+            self.load_on_platform,
+            {name: _held(signal, time_ns) for name, signal in self.temperatures.items()},
+            {name: _held(signal, time_ns) for name, signal in self.covariates.items()},
+        )
+
+
+def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
+    """Return the signals of a recording, loads moved to O.
+
+    Parameters
+    ----------
+    samples : Samples
+        With joint states and loads.
+    frames : Frames
+        In which loads arrive.
+
+    Returns
+    -------
+    MachineSignals
+        Values that are not finite are left out.
+
+    Raises
+    ------
+    FrameError
+        If loads are in an unknown frame, or some in F and some in U.
+    """
+    loads, on_platform = _loads(samples.loads, frames)
+    return MachineSignals(
+        in_order(samples.joints.time_ns, samples.joints.position),
+        _speeds(samples.joints),
+        loads,
+        on_platform,
+        _slow(samples.temperatures),
+        _slow(samples.covariates),
+    )
+
+
+def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
+    wrench = np.empty_like(loads.wrench)
+    on_platform = {}
+    for name in np.unique(loads.frame_id).tolist():
+        # Moving a wrench to O is linear, so six unit wrenches tell all of it.
+        moved = [frames.load(name, unit[:3], unit[3:]) for unit in np.eye(6).tolist()]
+        rows = loads.frame_id == name
+        wrench[rows] = loads.wrench[rows] @ np.array([load.wrench for load in moved])
+        on_platform[name] = moved[0].on_platform
+    if len(set(on_platform.values())) > 1:
+        raise FrameError(
+            f"loads: frames {', '.join(on_platform)} are mixed; some turn with the platform"
+        )
+    return in_order(loads.time_ns, wrench), any(on_platform.values())
+
+
+def _speeds(joints: JointSamples) -> Signal | None:
+    """Return the speeds, None where drivers leave them out or at zero."""
+    speeds = in_order(joints.time_ns, joints.velocity)
+    whole = len(speeds) == len(in_order(joints.time_ns, joints.position))
+    return speeds if whole and np.any(speeds.values != 0.0) else None
+
+
+def _slow(samples: Mapping[str, ScalarSamples]) -> dict[str, Signal]:
+    signals = {name: in_order(one.time_ns, one.value) for name, one in samples.items()}
+    return {name: signal for name, signal in signals.items() if len(signal)}
+
+
+def _held(signal: Signal, time_ns: Stamps) -> Array:
+    """Return the newest values; before the first one, that one."""
+    return signal.values[np.maximum(signal.newest(time_ns), 0)]

@@ -1,0 +1,1 @@
+"""Find the effects that are missing in a model of this wrist."""

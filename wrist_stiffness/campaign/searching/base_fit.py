@@ -1,0 +1,269 @@
+"""The base is refitted before any search: registrations, zeros, tare, and the wrist's tolerances.
+
+Registrations are a millimetre and a fraction of a degree, and a flange touches or does not: so the
+fit repeats Gauss-Newton steps on the model itself, and only what is left is taken as linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import lstsq
+from scipy.stats import chi2
+
+from wrist_stiffness.campaign.columns import SessionModel
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.campaign.fitting.problem import FitProblem
+from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.registry import find_law
+
+SHIM_UM = 1.5
+"""Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
+
+MOST_STEPS = 12
+ENOUGH = 3e-3
+"""Relative fall of the sum of squares below which the fit has converged."""
+
+WIDE = 1e3
+"""Factor of the prior of what belongs to the base and is under suspicion."""
+
+SMALLEST_STEP = 1.0 / 16.0
+
+WANDER = np.repeat([0.5e-6, 5e-6], 3)
+"""Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
+
+MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class BaseProblem(FitProblem):
+    """The fit of a base.
+
+    Parameters
+    ----------
+    whole : ErrorModel
+        The model with all effects that it had.
+    """
+
+    whole: ErrorModel
+
+    @cached_property
+    def _factor(self) -> Array:
+        stated = self.table.covariance
+        if stated is None:
+            stated = np.diag(4.0 * WANDER**2)
+        return np.linalg.inv(np.linalg.cholesky(stated + np.diag(WANDER**2)))
+
+    def whiten(self, values: Array) -> Array:
+        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
+        columns = values if values.ndim == 3 else values[:, :, None]
+        measured = self.table.measured[:, :, None]
+        white = self._factor @ np.where(measured, np.nan_to_num(columns), 0.0)
+        flat: Array = white.reshape(-1, columns.shape[2])
+        return flat if values.ndim == 3 else flat[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class BaseFit:
+    """The base at its best, with further effects where some were fitted along.
+
+    Parameters
+    ----------
+    problem : BaseProblem
+        What was free.
+    z : (p,) float
+        Steps from the prior means.
+    residual : (u, 6) float
+        What is left, log(T_measured T_predicted^-1) at O in F [m, rad].
+    columns : (u, 6, p) float
+        Change of what is left by a step of each unknown, about `z` [m, rad].
+    extras : tuple of str
+        Names of the further effects.
+    cost : float
+        Weighted sum of squares with the priors' part, in units of the noise.
+    """
+
+    problem: BaseProblem
+    z: Array
+    residual: Array
+    columns: Array
+    extras: tuple[str, ...]
+    cost: float
+
+    @property
+    def prior_std(self) -> Array:
+        """Standard deviations of the priors of the base in steps, (p,); infinite for none."""
+        weight = self.problem.weights
+        names = [self.problem.free[u.free].effect.name for u in self.problem.unknowns]
+        widened = np.array([name in self.extras for name in names])
+        std = np.where(weight == 1.0, 1.0, np.inf)
+        return np.where(widened, np.where(self.of_base, 1.0 / WIDE, np.inf), std)
+
+    @property
+    def of_base(self) -> Array:
+        """Which unknowns belong to the base, (p,) bool."""
+        usual = {each.effect.name for each in free_base(self.problem.whole)[0]}
+        free = self.problem.free
+        return np.array([free[u.free].effect.name in usual for u in self.problem.unknowns])
+
+    def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
+        """Return the fitted effects of one session, also those that were held."""
+        own = self.problem.effects(self.z, session)
+        usual = {each.effect.name for each in free_base(self.problem.whole)[0]}
+        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in usual]
+        return (*self.problem.model.effects, *kept)
+
+    def model(self, session: int, with_extras: bool = True) -> SessionModel:
+        """Return the fitted model of one session, on its units."""
+        problem = self.problem
+        effects = self.effects(session, with_extras)
+        return SessionModel(problem.model, problem.sessions[session], effects)
+
+    def whiten(self, values: Array) -> Array:
+        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
+        return self.problem.whiten(values)
+
+    def without_extras(self) -> Observed:
+        """Return the table of what the base alone leaves where it was fitted with the extras."""
+        models = [self.model(n, with_extras=False) for n in range(len(self.problem.sessions))]
+        predicted = np.concatenate([each.predicted([each.effects])[0] for each in models])
+        return tabulate(self.problem.model, self.problem.sessions, predicted)
+
+
+def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
+    """Return what of the base is free, and the effects that stay as they are."""
+    free, held = commissioning(model)
+    own = {effect.name: effect for effect in held}
+    scale = Effect(find_law("load_scale"), "load_sensor")
+    shimmed = [
+        replace(each, scale=dict.fromkeys(each.scale, SHIM_UM))
+        if each.effect.law.id == "flange_contact"
+        else each
+        for each in free
+    ]
+    if scale.name not in own and all(each.effect.name != scale.name for each in free):
+        shimmed.append(free_all(scale))
+    return tuple(shimmed), held
+
+
+def fit_base(
+    model: ErrorModel,
+    sessions: tuple[UnitSession, ...],
+    extras: Sequence[Effect] = (),
+    start: BaseFit | None = None,
+) -> BaseFit:
+    """Fit registrations, zeros, tare and tolerances, within their priors.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its effects are starts, or held.
+    sessions : tuple of UnitSession
+        In the order of time.
+    extras : sequence of Effect, optional
+        Effects fitted along, without priors, from the values that they have.  One that belongs to
+        the base loses its prior.
+    start : BaseFit, optional
+        Where the base begins.
+    """
+    free, held = free_base(model)
+    added = {effect.name: effect for effect in extras}
+    usual = {each.effect.name for each in free}
+    widened = [
+        replace(f, scale={k: WIDE * v for k, v in f.scale.items()}) if f.effect.name in added else f
+        for f in free
+    ]
+    more = [
+        FreeEffect(effect, dict.fromkeys(_moving(effect), np.inf))
+        for name, effect in added.items()
+        if name not in usual
+    ]
+    whole = model.with_effects(*held)
+    bare = BaseProblem(whole, sessions, tuple(widened), model)
+    problem = BaseProblem(whole, sessions, (*widened, *more), model)
+    z = _start(problem, start)
+    lower, upper = problem.bounds
+    weights = problem.weights
+    residual = problem.residual(z)
+    for _ in range(MOST_STEPS):
+        columns = _columns(problem, bare, z)
+        left = problem.whiten(residual)
+        scale = 1.0 if extras else _robust_variance(left)
+        step = _step(problem.whiten(columns), left, z * weights, weights, scale)
+        before = _cost(left, z, weights, scale)
+        size = 1.0
+        while True:
+            trial = np.clip(z + size * step, lower, upper)
+            tried = problem.residual(trial)
+            after = _cost(problem.whiten(tried), trial, weights, scale)
+            if after < before or size <= SMALLEST_STEP:
+                break
+            size /= 2.0
+        if after >= before:
+            break
+        z, residual = trial, tried
+        if before - after < ENOUGH * before:
+            break
+    cost = _cost(problem.whiten(residual), z, weights, 1.0)
+    return BaseFit(problem, z, residual, _columns(problem, bare, z), tuple(added), cost)
+
+
+def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
+    """Return the columns of the base, as if no extras were there, and those of the extras.
+
+    What the extras do to the base's columns is of second order; play and friction would be solved
+    again for each of them.
+    """
+    of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
+    of_extras = [place for place, u in enumerate(problem.unknowns) if u.free >= len(bare.free)]
+    first = bare.columns(z[of_bare])
+    columns = np.zeros((*first.shape[:2], len(z)))
+    columns[:, :, of_bare] = first
+    if of_extras:
+        columns[:, :, of_extras] = problem.columns(z, places=of_extras)
+    return columns
+
+
+def _moving(effect: Effect) -> list[str]:
+    """Return the parameters of an effect that a fit may move: all but those that do nothing."""
+    return [p.key for p in effect.parameters]
+
+
+def _start(problem: BaseProblem, start: BaseFit | None) -> Array:
+    """Return where the unknowns begin: where another fit left them."""
+    if start is None:
+        return np.zeros(len(problem.unknowns))
+    old = {
+        (start.problem.free[u.free].effect.name, u.key, u.session): u.mean + z * u.step
+        for u, z in zip(start.problem.unknowns, start.z, strict=True)
+    }
+    names = [problem.free[u.free].effect.name for u in problem.unknowns]
+    return np.array(
+        [
+            (old.get((name, u.key, u.session), u.mean) - u.mean) / u.step
+            for name, u in zip(names, problem.unknowns, strict=True)
+        ]
+    )
+
+
+def _robust_variance(white: Array) -> float:
+    """Variance of what is left, at least that of the noise: priors then hold against an effect."""
+    seen = white[white != 0.0]
+    return max(1.0, float(np.median(seen**2)) / MEDIAN_CHI2)
+
+
+def _cost(white: Array, z: Array, prior: Array, scale: float) -> float:
+    return float(white @ white / scale + np.sum((prior * z) ** 2))
+
+
+def _step(columns: Array, left: Array, offset: Array, prior: Array, scale: float) -> Array:
+    root = np.sqrt(scale)
+    rows = np.vstack([columns / root, np.diag(prior)])
+    target = np.concatenate([-left / root, -offset])
+    return np.asarray(lstsq(rows, target, lapack_driver="gelsy")[0])

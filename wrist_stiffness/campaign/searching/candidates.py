@@ -1,0 +1,288 @@
+"""The catalogue as candidates of a diagnosis: columns of every law at every place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from wrist_stiffness.campaign.columns import Effects, SessionModel
+from wrist_stiffness.campaign.fitting.free_effects import BUILT
+from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
+from wrist_stiffness.campaign.units import Mask
+from wrist_stiffness.diagnosis import Candidate, Observations
+from wrist_stiffness.diagnosis import Parameter as Factor
+from wrist_stiffness.mechanism.components import MOTORS, Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.registry import catalogue
+
+LARGE = 5.0
+"""An effect so many times its usual size would still surprise nobody who looks for a fault."""
+
+FAR = 10.0
+"""What an estimate may be against the bounds of its law; at zero they stay."""
+
+TOLERANCES = {*(law for law, _ in BUILT), "load_scale"}
+"""Laws of the base: what they do within their priors is no finding, however well it shows."""
+
+SET_UP = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias")
+"""Refitted in every session before any search; there is nothing to find."""
+
+Progress = Callable[[int, int], None]
+Trial = tuple[Law, str, Values]
+
+
+def silent(done: int, total: int) -> None:
+    """Show no progress."""
+
+
+@dataclass(frozen=True, eq=False)
+class WristCandidate:
+    """A law at a place, its recipe, and its columns on all points of its grid.
+
+    Parameters
+    ----------
+    law : Law
+        The physics.
+    place : str
+        Component.
+    recipe : Recipe
+        How it became columns.
+    known : dict of shape to (u, 6, k) arrays
+        Columns on the grid [m, rad].
+    exact : callable, optional
+        shape -> columns, where they are known between the points of the grid.
+    seen : bool
+        Whether a fit has found it before, whatever its size.
+    """
+
+    law: Law
+    place: str
+    recipe: Recipe
+    known: Mapping[Shape, Array]
+    exact: Callable[[Shape], Array] | None = None
+    seen: bool = False
+
+    @property
+    def name(self) -> str:
+        """`law@place`."""
+        return f"{self.law.id}@{self.place}"
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """Every point of the grid."""
+        return _points(self.recipe)
+
+    def effect(self, found: Mapping[str, float], shape: Shape) -> Effect:
+        """Return the effect with which a fit may begin.
+
+        Parameters
+        ----------
+        found : dict of str to float
+            Factors of the columns by their names.
+        shape : tuple of float
+            Values of the shape parameters.
+        """
+        return effect_at(self.law, self.place, self.recipe.start(found, shape))
+
+    def effect_of(self, values: Mapping[str, float]) -> Effect:
+        """Return the effect with these values, each brought within its bounds."""
+        return effect_at(self.law, self.place, values)
+
+    def columns(self, units: Observations, shape: Shape) -> Array:
+        """Return the columns at a shape, linear between the points of the grid, (u, 6, k)."""
+        return self.at(shape)[units.rows]
+
+    def at(self, shape: Shape) -> Array:
+        """Return the columns of all units at a shape, (u, 6, k)."""
+        if self.exact:
+            return self.exact(shape)
+        if shape in self.known:
+            return self.known[shape]
+        corners, weights = [], []
+        for value, parameter in zip(shape, self.recipe.shape, strict=True):
+            grid = np.array(parameter.grid)
+            above = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))
+            share = float((value - grid[above - 1]) / (grid[above] - grid[above - 1]))
+            corners.append((parameter.grid[above - 1], parameter.grid[above]))
+            weights.append((1.0 - share, share))
+        total = np.zeros_like(next(iter(self.known.values())))
+        for corner, weight in zip(product(*corners), product(*weights), strict=True):
+            total = total + float(np.prod(weight)) * self.known[corner]
+        return total
+
+    def candidate(self) -> Candidate:
+        """Return it as the statistics take it."""
+        first = self.recipe.columns(tuple(p.grid[0] for p in self.recipe.shape))
+        law = self.law
+        factors = [c.factor for c in first]
+        return Candidate(
+            law.id,
+            self.place,
+            tuple(self._testable(f) for f in factors),
+            self.columns,
+            self.recipe.shape,
+            needs=law.excited_by,
+            evidence=law.sentence.format(place=self.place),
+            check=law.check,
+            compensable=compensable(law, self.place),
+        )
+
+    def _testable(self, factor: Factor) -> Factor:
+        """Return a factor with the size at which it must show to be tested, and its far bounds."""
+        plausible = factor.plausible
+        if self.seen or self.law.id in TOLERANCES or plausible is None:
+            size = None
+        else:
+            size = LARGE * plausible
+        far = (FAR * factor.lower, FAR * factor.upper)
+        return Factor(factor.name, *far, size, plausible)
+
+
+def compensable(law: Law, place: str) -> str:
+    """Tell whether the nodes can correct for an effect: `yes`, `needs_signal` or `no`."""
+    if place == "pose_sensor":
+        return "no"
+    return "needs_signal" if law.signals else "yes"
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where columns are taken: the base of each session on its units.
+
+    Parameters
+    ----------
+    models : tuple of SessionModel
+        With the effects of the base.
+    used : tuple of (u,) bool
+        Units of each session that are in the table.
+    """
+
+    models: tuple[SessionModel, ...]
+    used: tuple[Mask, ...]
+
+    @property
+    def signals(self) -> frozenset[str]:
+        """Components with a thermometer in every session."""
+        names = [set(each.session.block.temperatures) for each in self.models]
+        return frozenset(set.intersection(*names))
+
+    def changes(self, trials: Sequence[Trial], progress: Progress = silent) -> Array:
+        """Return the change of the predictions by each trial, (t, u, 6) [m, rad].
+
+        Parameters
+        ----------
+        trials : sequence of (Law, str, dict)
+            A law at a place with values of its parameters; an effect that the base has already
+            gets these values on top of its own.
+        progress : callable, optional
+            Told (done, total).
+        """
+        blocks = []
+        for number, (model, rows) in enumerate(zip(self.models, self.used, strict=True)):
+            sets = [_with(model.effects, *trial) for trial in trials]
+            found = np.stack(model.changes(sets)) if sets else np.empty((0, len(rows), 6))
+            blocks.append(np.nan_to_num(found[:, rows]))
+            progress(number + 1, len(self.models))
+        return np.concatenate(blocks, axis=1)
+
+    def mean(self, signal: Callable[[SessionModel], Array]) -> Array:
+        """Return a signal of each unit of the table, (u, ...)."""
+        return np.concatenate(
+            [signal(m)[rows] for m, rows in zip(self.models, self.used, strict=True)]
+        )
+
+
+def wrist_candidates(
+    point: Point,
+    absent: Collection[str],
+    near: Mapping[str, Mapping[str, float]],
+    progress: Progress = silent,
+) -> tuple[WristCandidate, ...]:
+    """Evaluate the whole catalogue about a point.
+
+    Parameters
+    ----------
+    point : Point
+        The base.
+    absent : collection of str
+        Effects that cannot be candidates: the model has them, and they are no part of the base.
+    near : dict of str to dict
+        Values of some effects, by name, about which their columns are wanted.
+    progress : callable
+        Told (done, total).
+    """
+    plans = [
+        (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
+        for law in catalogue().values()
+        if law.id not in SET_UP
+        for place in law.places
+        if f"{law.id}@{place}" not in absent
+    ]
+    trials: dict[tuple[object, ...], int] = {}
+    listed: list[Trial] = []
+
+    def index(law: Law, place: str, values: Values) -> int:
+        key = (law.id, place, *sorted(values.items()))
+        if key not in trials:
+            trials[key] = len(listed)
+            listed.append((law, place, values))
+        return trials[key]
+
+    for law, place, own in plans:
+        for column in (c for shape in _points(own) for c in own.columns(shape)):
+            if law.id != WAVE:
+                index(law, place, column.trial)
+                if column.origin:
+                    index(law, place, column.origin)
+    changes = point.changes(listed, progress)
+    found = []
+    for law, place, own in plans:
+        if law.id == WAVE:
+            wave = _wave(point, place)
+            found.append(WristCandidate(law, place, own, {}, wave, f"{law.id}@{place}" in near))
+            continue
+        known = {}
+        for shape in _points(own):
+            stack = []
+            for column in own.columns(shape):
+                change = changes[index(law, place, column.trial)]
+                if column.origin:
+                    change = change - changes[index(law, place, column.origin)]
+                stack.append(change / column.size)
+            known[shape] = np.stack(stack, axis=-1)
+        found.append(WristCandidate(law, place, own, known, seen=f"{law.id}@{place}" in near))
+    return tuple(found)
+
+
+WAVE = "transmission_error"
+"""Its columns are those of a turned motor times a wave: exact at every order."""
+
+
+def _wave(point: Point, place: str) -> Callable[[Shape], Array]:
+    turn = point.changes([(catalogue()["encoder_offset"], place, {"offset_mdeg": 1.0})])[0]
+    angle = point.mean(lambda model: model.still.theta[:, MOTORS.index(place)])
+
+    def columns(shape: Shape) -> Array:
+        phase = shape[0] * angle
+        wave = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+        return turn[:, :, None] * wave[:, None, :]
+
+    return columns
+
+
+def _points(own: Recipe) -> list[Shape]:
+    return list(product(*(parameter.grid for parameter in own.shape)))
+
+
+def _with(effects: Effects, law: Law, place: str, values: Mapping[str, float]) -> Effects:
+    """Return effects with one more, added to its like where the base has it."""
+    added = effect_at(law, place, values)
+    for number, own in enumerate(effects):
+        if own.name == added.name:
+            both = {key: own.estimates[key].value + values[key] for key in values}
+            return (*effects[:number], effect_at(law, place, both), *effects[number + 1 :])
+    return (*effects, added)

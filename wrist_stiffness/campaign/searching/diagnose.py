@@ -1,0 +1,263 @@
+"""Find the physical effects that are missing in a model of this wrist.
+
+The statistics are linear, the wrist is not: so the point about which its effects become columns is
+sought first, by fits of the leading candidates with their own laws, the base along with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import QUANTITIES, Observed, UnitSession, as_units
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
+from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
+from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Screen
+from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+
+Progress = Callable[[int, int], None]
+
+WANDER_SHARES = (0.7, 0.5, 0.35)
+"""Root mean square of slope, curvature and third order of a wander, against its own."""
+
+MOST_EXTRAS = 3
+"""Effects with which the point is sought."""
+
+LEADING = 0.3
+"""Candidates that explain this share of what the best explains are fitted too."""
+
+CLOSE, MOST_REFITTED = 0.6, 2
+"""So many candidates that gain nearly as much as the best are fitted with the whole base: what the
+base took up of one of them shows only then."""
+
+WORTH = 30.0
+"""Fall of the sum of squares, in units of the noise, that is worth moving the point for."""
+
+
+@dataclass(frozen=True, eq=False)
+class WristDiagnosis:
+    """Answer of a diagnosis on the wrist.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What the statistics say.
+    observed : Observed
+        Table of what the refitted base leaves.
+    effects : tuple of Effect
+        Best member of each finding, with the values found: where a fit may begin.
+    base : BaseFit
+        The refitted base.
+    """
+
+    diagnosis: Diagnosis
+    observed: Observed
+    effects: tuple[Effect, ...]
+    base: BaseFit
+
+
+def silent(done: int, total: int) -> None:
+    """Show no progress."""
+
+
+def diagnose_sessions(
+    model: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    rng: np.random.Generator,
+    settings: Settings | None = None,
+    progress: Progress = silent,
+) -> WristDiagnosis:
+    """Find the effects of the catalogue that a model misses.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    sessions : sequence of MeasuredSession
+        In the order of time; the last one judges what the others found, the end of the only one
+        where there is one.
+    rng : numpy.random.Generator
+        Source of chance.
+    settings : Settings, optional
+        Thresholds.
+    progress : callable, optional
+        Told (done, total) while the catalogue is evaluated.
+    """
+    if not sessions:
+        raise InputError("no session to diagnose")
+    units = tuple(as_units(model, session) for session in sessions)
+    base, candidates = seek_point(model, units, progress)
+    observed = base.without_extras()
+    result = diagnose(
+        _table(base, observed),
+        tuple(each.candidate() for each in candidates),
+        _nuisances(base),
+        rng,
+        settings,
+    )
+    result = replace(result, absorbed=_absorbed(base, [session.name for session in sessions]))
+    known = {each.name: each for each in candidates}
+    fitted = _fitted_extras(base)
+    effects = tuple(
+        fitted.get(each.name) or _started(known[each.name], each.parameters)
+        for each in result.findings
+    )
+    return WristDiagnosis(result, observed, effects, base)
+
+
+def seek_point(
+    model: ErrorModel, units: tuple[UnitSession, ...], progress: Progress
+) -> tuple[BaseFit, tuple[WristCandidate, ...]]:
+    """Return the base, fitted along with effects that make a difference, and the catalogue there.
+
+    The catalogue is evaluated about the base alone, once to lead and once where the base ends up;
+    an effect found has its columns at its values.
+    """
+    base = fit_base(model, units)
+    absent = _absent(base)
+    candidates = wrist_candidates(_point(base), absent, {}, progress)
+    extras: tuple[Effect, ...] = ()
+    while len(extras) < MOST_EXTRAS:
+        screen = Screen(base, _point(base))
+        taken = {each.name for each in extras}
+        leaders = screen.leaders([each for each in candidates if each.name not in taken])
+        chosen = [each for each in leaders if each[0] > max(WORTH, LEADING * leaders[0][0])]
+        fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
+        if not fits:
+            break
+        fits.sort(key=lambda each: -each.gain)
+        close = [each for each in fits if each.gain > CLOSE * fits[0].gain][:MOST_REFITTED]
+        trials = [(fit_base(model, units, (*extras, each.effect), base), each) for each in close]
+        trial, best = min(trials, key=lambda each: each[0].cost + each[1].price)
+        if base.cost - trial.cost < WORTH + best.price:
+            break
+        base, extras = trial, tuple(_fitted_extras(trial).values())
+    if extras:
+        candidates = wrist_candidates(_point(base), absent, _near(model, extras), progress)
+    return base, candidates
+
+
+def _near(model: ErrorModel, extras: tuple[Effect, ...]) -> dict[str, Mapping[str, float]]:
+    """Return the values found, of effects that are no part of the base."""
+    usual = {each.effect.name for each in free_base(model)[0]}
+    return {
+        each.name: {key: own.value for key, own in each.estimates.items()}
+        for each in extras
+        if each.name not in usual
+    }
+
+
+def _fitted_extras(base: BaseFit) -> dict[str, Effect]:
+    """Return the effects fitted along with the base, by their names."""
+    return {each.name: each for each in base.effects(0) if each.name in base.extras}
+
+
+def _point(base: BaseFit) -> Point:
+    """Return the fitted base, without the effects fitted along."""
+    sessions = base.problem.sessions
+    used = tuple(each.measured for each in sessions)
+    return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
+
+
+def _absent(base: BaseFit) -> set[str]:
+    """Return effects that the model holds fast: a second one of the name cannot be added."""
+    return {effect.name for effect in base.problem.model.effects}
+
+
+def _absorbed(base: BaseFit, sessions: list[str]) -> tuple[str, ...]:
+    """Tell how far each part of the base moved the prediction, and itself against its prior."""
+    groups: dict[str, list[int]] = {}
+    for place, unknown in enumerate(base.problem.unknowns):
+        if base.of_base[place]:
+            name = base.problem.free[unknown.free].effect.name
+            where = "" if unknown.session is None else f" in {sessions[unknown.session]}"
+            groups.setdefault(name + where, []).append(place)
+    sentences = []
+    for name, places in groups.items():
+        moved = base.columns[:, :, places] @ base.z[places]
+        sizes = [
+            f"{q.per_si * np.sqrt(np.mean(np.sum(moved[:, list(q.components)] ** 2, axis=1))):.2f}"
+            f" {q.unit} of {q.name}"
+            for q in QUANTITIES
+        ]
+        sentences.append(f"{name}: {', '.join(sizes)}{_against_prior(base, places)}")
+    return tuple(sentences)
+
+
+def _against_prior(base: BaseFit, places: list[int]) -> str:
+    """Tell of the parameter of a tolerance that moved furthest; nothing where all are free."""
+    known = [place for place in places if np.isfinite(base.prior_std[place])]
+    if not known:
+        return ""
+    far = max(known, key=lambda place: abs(base.z[place] / base.prior_std[place]))
+    unknown = base.problem.unknowns[far]
+    value = unknown.mean + base.z[far] * unknown.step
+    share = abs(base.z[far] / base.prior_std[far])
+    return f" ({unknown.key} = {value:.3g}, {share:.1f} standard deviations of its prior)"
+
+
+def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
+    shape = tuple(parameters[each.name][0] for each in candidate.recipe.shape)
+    return candidate.effect({name: value for name, (value, _) in parameters.items()}, shape)
+
+
+def _table(base: BaseFit, observed: Observed) -> Observations:
+    """Return what is left with the wrist's tolerances at their prior means again, to first order.
+
+    So the priors of the statistics, which lie about zero, are the priors of the wrist.
+    """
+    own = np.isfinite(base.prior_std) & _of_wrist(base) & base.of_base
+    values = observed.observations.values - base.columns[:, :, own] @ base.z[own]
+    return observed.observations.with_values(values)
+
+
+def _of_wrist(base: BaseFit) -> np.ndarray:
+    return np.array([unknown.session is None for unknown in base.problem.unknowns])
+
+
+def _nuisances(base: BaseFit) -> tuple[Nuisance, ...]:
+    """Return the refitted base as columns; registrations, zeros and tare are free anew."""
+    groups: dict[tuple[str, bool], dict[str, list[int]]] = {}
+    for place, unknown in enumerate(base.problem.unknowns):
+        if base.of_base[place]:
+            name = base.problem.free[unknown.free].effect.name
+            group = groups.setdefault((name, unknown.session is not None), {})
+            group.setdefault(unknown.key, []).append(place)
+    found = [
+        _nuisance(base, name, per_session, list(keys.values()))
+        for (name, per_session), keys in groups.items()
+    ]
+    return (*found, _wander(base))
+
+
+def _nuisance(base: BaseFit, name: str, per_session: bool, places: list[list[int]]) -> Nuisance:
+    # What is left falls where a prediction rises.  Each session has its own rows.
+    columns = -np.stack([base.columns[:, :, each].sum(axis=2) for each in places], axis=-1)
+    prior = None if per_session else tuple(base.prior_std[[each[0] for each in places]].tolist())
+    return Nuisance(name, lambda units: columns[units.rows], prior, per_session)
+
+
+def _wander(base: BaseFit) -> Nuisance:
+    """Return the instrument's slow wander over a session: it is no drift.
+
+    Legendre polynomials of the time with the sizes that a wander of a minute or so has.
+    """
+    columns = []
+    for session in base.problem.sessions:
+        time = session.mean(session.block.time)[session.measured]
+        span = max(float(np.ptp(time)), 1e-9)
+        wave = legvander(2.0 * (time - time.min()) / span - 1.0, len(WANDER_SHARES))[:, 1:]
+        size = np.where(session.wander > 0.0, session.wander, 0.5 * np.nan_to_num(session.white))
+        rise = np.sqrt(2.0 * np.arange(1, len(WANDER_SHARES) + 1) + 1.0) * WANDER_SHARES
+        each = (wave * rise)[:, None, :, None] * np.diag(size)[None, :, None, :]
+        columns.append(each.reshape(len(time), 6, -1))
+    rows = np.concatenate(columns)
+    prior = (1.0,) * rows.shape[2]
+    return Nuisance("slow wander", lambda units: rows[units.rows], prior, per_session=True)
