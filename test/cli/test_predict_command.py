@@ -98,7 +98,7 @@ def test_both_evaluations_agree_within_the_stated_error(tmp_path, capsys):
         (["--angles", "0", "0", "--load", "0", "nan", "0"], "nan"),
         (["--angles", "0", "0", "--load", "1", "2"], "3 or 6 numbers, not 2"),
         (["missing.yaml", "--angles", "0", "0"], "missing.yaml: cannot be read"),
-        (["--angles", "0", "0", "--json", "nowhere/out.json"], "nowhere/out.json: folder nowhere does not exist"),
+        (["--angles", "0", "0", "--json", "nowhere/out.json"], "folder nowhere does not exist"),
     ],
 )
 def test_refuses(tmp_path, monkeypatch, refused, options, named):
