@@ -1,0 +1,84 @@
+"""A fit is judged by units that it has not seen: what they say cannot move it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
+from wrist_stiffness.campaign.fitting.judge import ANOTHER_SESSION, THIS_SESSION, judged
+from wrist_stiffness.campaign.fitting.problem import FitProblem
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.shipped import shipped_file
+
+SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
+POSES = 60
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def session_of(model, seed):
+    """Return poses measured one by one on a wrist that is the model."""
+    rng = np.random.default_rng(seed)
+    theta = np.radians(rng.uniform(-30.0, 30.0, (POSES, 2)))
+    load = rng.normal(size=(POSES, 6)) * np.repeat([0.5, 0.01], 3)
+    block = Block(2.0 * np.arange(POSES), theta, load)
+    noise = rng.normal(size=(POSES, 6)) * SIGMA
+    rotation, shift = exp_twist(model.batch(block).measured)
+    nominal = model.table.mechanism.forward(theta).platform
+    return MeasuredSession(
+        f"day_{seed}", block, shift + noise[:, :3], rotation @ nominal, np.diag(SIGMA**2)
+    )
+
+
+def moved(session, rows):
+    """Return the session with some shifts that grow with the load: another, softer wrist."""
+    shift = session.shift.copy()
+    shift[rows] += 2e-5 * session.block.load[rows, :3]
+    return replace(session, shift=shift)
+
+
+def found(model, sessions):
+    free = [
+        FreeEffect(Effect(find_law("link_stiffness"), "link_1"), {"flexibility_percent": 30.0}),
+        FreeEffect(
+            Effect(find_law("measurement_frame"), "pose_sensor"),
+            {key.key: 1e3 for key in find_law("measurement_frame").parameters("pose_sensor")},
+            per_session=True,
+        ),
+    ]
+    units = tuple(as_units(model, each) for each in sessions)
+    return judged(FitProblem(model, units, tuple(free)))
+
+
+@pytest.mark.parametrize("days", [1, 2])
+def test_what_is_put_aside_cannot_move_the_fit(model, days):
+    honest = [session_of(model, seed) for seed in range(days)]
+    before = found(model, honest)
+    aside = slice(0, None) if days > 1 else before.rows
+    after = found(model, [*honest[:-1], moved(honest[-1], aside)])
+    assert before.by == (ANOTHER_SESSION if days > 1 else THIS_SESSION)
+
+    def stiffness(result):
+        return [p.value for p in result.fit.parameters if p.effect == "link_stiffness@link_1"]
+
+    assert stiffness(after) == stiffness(before)
+    # ... while it is judged by them.
+    assert after.rms["s_um"] > 3.0 * before.rms["s_um"]
+
+
+def test_what_is_not_put_aside_moves_it(model):
+    honest = session_of(model, 0)
+    before = found(model, [honest])
+    seen = np.setdiff1d(np.arange(POSES), before.rows)
+    after = found(model, [moved(honest, seen)])
+    assert after.fit.parameters != before.fit.parameters
