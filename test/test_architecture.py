@@ -15,7 +15,7 @@ ROOMS_USED = {
     "fem": {"mechanism", "lookup"},
     "model": {"mechanism", "lookup"},
     "compensation": ONLINE,
-    "diagnosis": ONLINE,
+    "diagnosis": set(),
     "campaign": ONLINE | {"compensation", "diagnosis", "recording"},
     "recording": set(),
     "simulation": {"mechanism", "lookup", "recording"},

@@ -227,3 +227,9 @@ def test_a_crowd_of_lookalikes_names_nothing(rng):
     assert (crowd.verdict, crowd.findings) == ("unknown", ())
     (named,) = diagnose(table, (line("z"), *twins[:3]), (offset(),), rng, few).findings
     assert len(named.names) == 3
+
+
+def test_permutations_by_which_nothing_could_be_found_are_refused():
+    with pytest.raises(InputError, match="99 permutations .* at least 199"):
+        Settings(permutations=99)
+    Settings(permutations=199)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from wrist_stiffness.errors import InputError
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -29,6 +31,11 @@ class Settings:
         from what nobody thought of.
     outlier_limit : float
         Distance from the rich model, in robust standard deviations, of a lost beam.
+
+    Raises
+    ------
+    InputError
+        If the permutations are too few for any effect ever to be significant.
     """
 
     alpha: float = 0.005
@@ -40,3 +47,11 @@ class Settings:
     most_findings: int = 8
     most_members: int = 8
     outlier_limit: float = 7.0
+
+    def __post_init__(self) -> None:
+        """Refuse settings by which nothing can be found."""
+        if (self.permutations + 1) * self.alpha < 1.0:
+            raise InputError(
+                f"{self.permutations} permutations cannot tell a chance of {self.alpha:g}; "
+                f"at least {round(1.0 / self.alpha) - 1} are needed"
+            )
