@@ -57,7 +57,6 @@ setup(
         "fem": ["netgen-mesher>=6.2.2404", "scikit-fem>=10", "pymetis>=2025.1"],
         "plot": ["matplotlib>=3.8"],
         "fleet": ["distributed>=2024.5", "cloudpickle>=3"],
-        "workbench": ["nicegui>=2", "plotly>=5"],
         "bench": ["scikit-learn>=1.3"],
         "verify": ["acrod>=1.2", "rosbags>=0.10"],
         # colcon finds pytest through this extra and would run no test without it.

@@ -17,8 +17,10 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.planning.loads_file import read_loads
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 
@@ -229,16 +231,19 @@ def test_a_wrong_document_is_found(block, fault, tmp_path):
     assert (fault in found) if fault else found == ""
 
 
-def test_model_files_of_the_document_can_be_read(tmp_path):
+def test_files_of_the_document_can_be_read(tmp_path):
     shutil.copy(shipped_file("precomputed/palmieri2015.npz"), tmp_path / "my_wrist.npz")
     examples = re.findall(
         r"^```yaml\n(.*?)^```$", (ROOT / "docs/files.md").read_text(), re.M | re.S
     )
     assert examples
     for number, example in enumerate(examples):
-        path = tmp_path / f"model_{number}.yaml"
+        path = tmp_path / f"example_{number}.yaml"
         path.write_text(example)
-        assert load_model(path).effects
+        if "\nloads:" in example:
+            assert read_loads(path, np.array([0.0, 0.0, -9.81]), force_limit=5.0)
+        else:
+            assert load_model(path).effects
 
 
 PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]

@@ -14,6 +14,7 @@ from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import remarks_of
+from wrist_stiffness.workflows.fit_report import plus_minus
 from wrist_stiffness.workflows.provenance import Provenance
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
 from wrist_stiffness.workflows.verdict import class_of, verdict_lines
@@ -160,7 +161,7 @@ def _table(result: Diagnosis) -> list[str]:
 def _finding_lines(place: int, finding: Finding) -> list[str]:
     out = [f"{place}. {class_of(finding)}", f"   {finding.evidence}"]
     out += [
-        f"   {name} = {value:.4g} +- {error:.2g}"
+        f"   {name} = {plus_minus(value, error)}"
         for name, (value, error) in finding.parameters.items()
     ]
     if finding.check:
