@@ -26,7 +26,7 @@ def test_the_verdict_comes_first_and_the_file_says_the_same(capsys, tmp_path):
     assert finding["buys_mdeg"][0] > 5 * finding["buys_mdeg"][1] > 0
     assert values["after"]["rmse_phi_mdeg"] < 1.3 * values["noise_floor"]["phi_mdeg"]
     assert values["provenance"]["recordings"]
-    assert "backlash at motor_2" in page.read_text()
+    assert "backlash@motor_2" in page.read_text()
 
 
 def test_a_recording_that_is_not_there_is_one_line(capsys, tmp_path):
