@@ -96,6 +96,7 @@ def test_nothing_missing_is_said_first(observations):
 def test_unknown_tells_on_what_it_depends(observations):
     rest = Unexplained(("humidity", "T_link_1"), 0.31, "the conditions predict it")
     page = page_of(replace(RESULT, verdict="unknown", unexplained=rest), observations)
+    assert "check it on the machine before you add it" in page
     assert "31 % of the structure above the noise is explained by no known effect." in page
     assert "It depends on humidity, T_link_1." in page
     assert "Missing in the model" in page

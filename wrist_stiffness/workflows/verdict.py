@@ -13,7 +13,11 @@ def verdict_lines(result: Diagnosis) -> list[str]:
     if result.verdict == "effect":
         return [f"Missing in the model: {found}."]
     if found:
-        return [f"Missing in the model: {found}.", "Something else that no known effect explains."]
+        return [
+            f"Missing in the model: {found}.",
+            "Something else that no known effect explains. As long as it is not understood, what "
+            "is named may stand in for it: check it on the machine before you add it.",
+        ]
     return ["Something is missing that no known effect explains."]
 
 
