@@ -130,9 +130,10 @@ def seek_point(
         leaders = screen.leaders([each for each in candidates if each.name not in taken])
         chosen = [each for each in leaders if each[0] > max(WORTH, LEADING * leaders[0][0])]
         fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
-        if not fits:
-            break
         fits.sort(key=lambda each: -each.gain)
+        # Columns may promise what the law itself, within its bounds, does not keep.
+        if not fits or fits[0].gain <= 0.0:
+            break
         close = [each for each in fits if each.gain > CLOSE * fits[0].gain][:MOST_REFITTED]
         trials = [(fit_base(model, units, (*extras, each.effect), base), each) for each in close]
         trial, best = min(trials, key=lambda each: each[0].cost + each[1].price)
