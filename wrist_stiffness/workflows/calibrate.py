@@ -15,6 +15,7 @@ from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.workflows.fit_report import (
     Errors,
     far_lines,
+    fit_values,
     left_lines,
     parameter_values,
     told_lines,
@@ -96,16 +97,7 @@ class Calibrated:
         """Return what programs read, with units in the names."""
         found = self.calibration
         return {
-            "schema": 1,
-            **self.errors.as_values(("before", "after")),
-            "judged_by": found.judged.by,
-            "sessions": [
-                {"name": session.name, "remarks": list(session.remarks)}
-                for session in self.sessions
-            ],
-            "lost": found.fit.lost,
-            "misfit": found.fit.misfit,
-            "settled": found.fit.arrived,
+            **fit_values(self.errors, found.judged, self.sessions, found.fit),
             "calibrated_otherwise": list(found.calibrated),
             "parameters": parameter_values(found.parameters),
         }

@@ -21,6 +21,7 @@ from wrist_stiffness.model.registry import find_law, law_from_file
 from wrist_stiffness.workflows.calibrate import Run, writable
 from wrist_stiffness.workflows.fit_report import (
     Errors,
+    fit_values,
     left_lines,
     parameter_values,
     plus_minus,
@@ -188,20 +189,11 @@ class Extended:
         """Return what programs read, with units in the names."""
         found = self.extension
         return {
-            "schema": 1,
-            **self.errors.as_values(("before", "after")),
-            "judged_by": found.after.by,
+            **fit_values(self.errors, found.after, self.sessions, found.fit),
             "buys": {key: list(gain) for key, gain in found.bought.items()},
             "effect": found.effect.law.id,
             "component": found.effect.component,
             "warnings": list(found.warnings),
-            "sessions": [
-                {"name": session.name, "remarks": list(session.remarks)}
-                for session in self.sessions
-            ],
-            "lost": found.fit.lost,
-            "misfit": found.fit.misfit,
-            "settled": found.fit.arrived,
             "parameters": parameter_values(found.parameters),
             "base_moved": [
                 {

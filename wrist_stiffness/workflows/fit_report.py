@@ -174,6 +174,23 @@ def parameter_values(parameters: Iterable[Fitted]) -> list[dict[str, Any]]:
     return values
 
 
+def fit_values(
+    errors: Errors, judged: Judged, sessions: Iterable[MeasuredSession], found: Fit
+) -> dict[str, Any]:
+    """Return what programs read of any fit, with units in the names."""
+    return {
+        "schema": 1,
+        **errors.as_values(("before", "after")),
+        "judged_by": judged.by,
+        "sessions": [
+            {"name": session.name, "remarks": list(session.remarks)} for session in sessions
+        ],
+        "lost": found.lost,
+        "misfit": found.misfit,
+        "settled": found.arrived,
+    }
+
+
 def plus_minus(value: float, sigma: float) -> str:
     """Return a value and its uncertainty with two digits of the latter."""
     digits = 3
