@@ -1,11 +1,13 @@
 """One more effect from the catalogue, a file or a formula: found, judged, written, used."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.fitting.calibrate import calibrate
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import InputError
@@ -212,3 +214,17 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     assert "what is left is no more than the noise" in capsys.readouterr().out
     summary = replay(RECORDING, output, tmp_path / "out.mcap")
     assert summary.predictions == summary.joint_states > 0
+
+
+def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_by):
+    backlash = CatalogueEffect("backlash@motor_1")
+    session = session_of(model, backlash.effect([]).with_values({"width_mdeg": 60.0}))
+    notes = {"calibrated": [*SET_UP, *BUILT, "encoder_offset"]}
+    found, output = extend_by(backlash, replace(session, notes=notes))
+    (width,) = found.extension.parameters
+    assert abs(width.value - 60.0) < 3.5 * width.sigma < 7.0
+    assert found.extension.after.rms["phi_mdeg"] < 1.3 * found.errors.floor["phi_mdeg"]
+    assert found.extension.before.rms["phi_mdeg"] > 2.0 * found.extension.after.rms["phi_mdeg"]
+    assert [effect.name for effect in load_model(output).effects] == ["backlash@motor_1"]
+    with pytest.raises(InputError, match="nothing is left to calibrate: .*'calibrated'"):
+        calibrate(model, [replace(session, notes=notes)])

@@ -60,7 +60,7 @@ class NoiseModel:
         measured = observations.measured
         filled = np.where(measured[:, :, None], columns, 0.0)
         white = self._filter(observations, self.factors(observations) @ filled, measured)
-        return white.reshape(-1, columns.shape[2])
+        return white.reshape(measured.size, columns.shape[2])
 
     def filtered(self, observations: Observations, columns: Array) -> Array:
         """Columns (n, q) filtered in time only, like a component that was always measured."""

@@ -104,6 +104,11 @@ def calibrate(
     """
     calibrated = said_calibrated(sessions)
     free, held = commissioning(model, calibrated)
+    if not free:
+        raise InputError(
+            f"nothing is left to calibrate: the notes of the recordings say under {CALIBRATED!r} "
+            f"that {', '.join(calibrated)} need no fit"
+        )
     units = tuple(as_units(model, session) for session in sessions)
     problem = FitProblem(model.with_effects(*held), units, free)
     if hold_out:

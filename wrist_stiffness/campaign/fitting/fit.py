@@ -72,12 +72,10 @@ def fit(
     Raises
     ------
     InputError
-        If no parameter is free, or fewer numbers were measured than parameters without a prior.
+        If fewer numbers were measured than parameters without a prior.
     """
     table, weight = problem.table, problem.weights
     unseen = np.zeros(table.n_units, dtype=bool) if held_out is None else held_out
-    if not len(weight):
-        raise InputError("fit: no parameter is free")
     if (measured := table.measured[~unseen].sum()) < max(1, np.count_nonzero(weight < 1.0)):
         raise InputError(f"fit: only {measured} numbers were measured")
     if start is not None:
@@ -244,6 +242,8 @@ def _descended(
         white = linear.noise.whiten(seen, residual[:, :, None])
         return float((white**2).sum() + ((problem.weights * z) ** 2).sum())
 
+    if not len(z):
+        return z, residual, z, 0.0
     lower, upper = problem.bounds
     move = lsq_linear(linear.rows, linear.target, (lower - z, upper - z), method="bvls").x
     now = squares(z, residual)
