@@ -147,7 +147,7 @@ def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
         ("component: joint_3", "component: joint_9", "component 'joint_9' is not one of joint_1"),
         ("component: joint_3", "component: motor_1", "component 'motor_1' is not one of joint_1"),
         ("clearance_um", "clearance_mm", "unknown parameter clearance_mm; it has clearance_um"),
-        ("[12.1, 0.4]", "[1200, 0.4]", "clearance_um = 1200 is outside 0 to 500"),
+        ("[12.1, 0.4]", "[12000, 0.4]", "clearance_um = 12000 is outside 0 to 2000"),
         ("[12.1, 0.4]", "[12.1, -1]", "uncertainty -1 of clearance_um"),
         ("[12.1, 0.4]", "[12.1]", "is not a list of 2 finite numbers"),
         ("[12.1, 0.4]", "[.nan, 0.1]", "is not a list of 2 finite numbers"),

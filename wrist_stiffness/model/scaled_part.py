@@ -23,7 +23,7 @@ class ScaledPart(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the fraction."""
-        return (Parameter("flexibility_percent", -90.0, 900.0, 30.0, linear=False),)
+        return (Parameter("flexibility_percent", -90.0, 10000.0, 30.0, linear=False),)
 
     def part_factor(self, values: Mapping[str, float]) -> float:
         """Return 1 + fraction."""

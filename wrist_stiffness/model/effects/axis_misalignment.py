@@ -42,8 +42,8 @@ class AxisMisalignment(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return shifts and tilts along and about the felt directions."""
         return (
-            *(symmetric(f"shift_{axis}_um", 1000.0, 30.0) for axis in FELT[place]),
-            *(symmetric(f"tilt_{axis}_mdeg", 1000.0, 50.0) for axis in FELT[place]),
+            *(symmetric(f"shift_{axis}_um", 5000.0, 30.0) for axis in FELT[place]),
+            *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in FELT[place]),
         )
 
     def advance(

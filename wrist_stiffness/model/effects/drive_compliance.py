@@ -24,7 +24,7 @@ class DriveCompliance(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the compliance."""
-        return (Parameter("compliance_mdeg_per_Nm", 0.0, 1e5, 500.0),)
+        return (Parameter("compliance_mdeg_per_Nm", 0.0, 1e6, 500.0),)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

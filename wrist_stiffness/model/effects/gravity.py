@@ -36,7 +36,7 @@ class Gravity(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return mass and centre of gravity in the body at home, and the tilt of the base."""
         centre = tuple(Parameter(f"{a}_mm", -500.0, 500.0, 20.0, linear=False) for a in "xyz")
-        mass = Parameter("mass_g", -500.0, 2000.0, 30.0, linear=False)
+        mass = Parameter("mass_g", -500.0, 20000.0, 30.0, linear=False)
         if place != "platform":
             return (mass, *centre)
         tilt = (Parameter(key, -2e5, 2e5, 1000.0, linear=False) for key in TILTS)

@@ -34,7 +34,7 @@ class JointClearance(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the diametral clearance."""
-        return (Parameter("clearance_um", 0.0, 500.0, 20.0),)
+        return (Parameter("clearance_um", 0.0, 2000.0, 20.0),)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

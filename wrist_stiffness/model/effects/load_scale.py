@@ -22,7 +22,7 @@ class LoadScale(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the excess."""
-        return (Parameter("scale_percent", -50.0, 100.0, 3.0, linear=False),)
+        return (Parameter("scale_percent", -50.0, 3000.0, 3.0, linear=False),)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

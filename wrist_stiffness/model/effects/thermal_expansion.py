@@ -34,7 +34,7 @@ class ThermalExpansion(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the coefficient of expansion and how the part warms."""
         mean = {"platform": 23.0}.get(place, 11.5)
-        return (Parameter("expansion_ppm_per_K", 0.0, 300.0, 5.0, mean=mean), *WARMTH)
+        return (Parameter("expansion_ppm_per_K", 0.0, 30000.0, 5.0, mean=mean), *WARMTH)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

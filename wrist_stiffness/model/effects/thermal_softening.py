@@ -26,7 +26,7 @@ class ThermalSoftening(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the growth of flexibility by the temperature, and how the part warms."""
-        return (Parameter("softening_percent_per_K", -5.0, 20.0, 1.0), *WARMTH)
+        return (Parameter("softening_percent_per_K", -5.0, 100.0, 1.0), *WARMTH)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

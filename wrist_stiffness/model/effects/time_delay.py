@@ -34,7 +34,7 @@ class TimeDelay(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the delay."""
-        return (Parameter("delay_ms", -200.0, 200.0, 10.0, linear=place != "pose_sensor"),)
+        return (Parameter("delay_ms", -1000.0, 1000.0, 10.0, linear=place != "pose_sensor"),)
 
     def stage_at(self, place: str) -> Stage:
         """Return what a late stamp of this place changes."""
