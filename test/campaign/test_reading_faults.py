@@ -1,5 +1,7 @@
 """Bad recordings: a clear error, or a result that says what it could not use."""
 
+import json
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -225,3 +227,16 @@ def test_what_is_left_of_a_cut_recording_is_used_and_said(tmp_path, campaign, ta
     session = read_session(path, table)
     assert 1000 < len(session) < 4000
     assert "the recording is damaged" in session.remarks[0]
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_a_recording_of_another_geometry_is_said(tmp_path, campaign, complete, table, same):
+    own = table.geometry.sha256
+    campaign.with_note(json.dumps({"geometry_sha256": own if same else "f" * 64}))
+    remarks = read_session(campaign.written(tmp_path / "bag"), table).remarks
+    if same:
+        assert remarks == ()
+    else:
+        (remark,) = remarks
+        assert f"ffffffffffff..., the table's geometry {own[:12]}" in remark
+        assert "another wrist, or its geometry was changed" in remark

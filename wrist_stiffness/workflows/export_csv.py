@@ -32,6 +32,7 @@ from wrist_stiffness.campaign.reading.pose_track import (
 )
 from wrist_stiffness.campaign.reading.session import notes_of, require_topics
 from wrist_stiffness.campaign.reading.signals import Stamps
+from wrist_stiffness.campaign.reading.static_frames import frames_of
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -118,9 +119,11 @@ def export_csv(
     samples = read_samples(source, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(source, samples, remaps or {})
     notes, _ = notes_of(samples)
-    machine = machine_signals(samples, settings.frames)
-    time_ns, measured, names, markers = _measured(samples, settings.frames)
-    usable, remarks = machine.usable(time_ns, settings.load_age_limit_s)
+    frames, unusable = frames_of(source, remaps or {}, settings.frames)
+    machine = machine_signals(samples, frames)
+    time_ns, measured, names, markers = _measured(samples, frames)
+    usable, unknown = machine.usable(time_ns, settings.load_age_limit_s)
+    remarks = (*unusable, *unknown)
     if not usable.any():
         raise InputError(f"{source.path}: no measured pose can be used: {'; '.join(remarks)}")
     time_ns, measured = time_ns[usable], measured[usable]

@@ -210,6 +210,7 @@ def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
     """Return the free facts that a user would know about the recording."""
     return {
         "wrist": table.geometry.name,
+        "geometry_sha256": table.geometry.sha256,
         "pose_sensor": settings.instrument,
         "load_source": "ft",
         "session": "simulated",

@@ -171,8 +171,11 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
         axes = block_diagonal(turn)
         covariance = axes @ covariance @ axes.T
     remarks = []
-    if np.any(huge[:, 3:].any(axis=1) & ~huge[:, 3:].all(axis=1)):
-        remarks.append(f"{what}: orientations that are measured in part only are not used")
+    if partly := int((huge[:, 3:].any(axis=1) & ~huge[:, 3:].all(axis=1)).sum()):
+        remarks.append(
+            f"{what}: {partly} of {len(shift)} orientations are measured in part only (one turn has "
+            "a huge variance): all three turns of these are left out"
+        )
     lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
     return _in_time_order(poses.time_ns, shift + origin, rotation, covariance, what, lost, remarks)
 

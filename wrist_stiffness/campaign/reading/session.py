@@ -27,6 +27,7 @@ from wrist_stiffness.campaign.reading.pose_track import PoseTrack, pose_track
 from wrist_stiffness.campaign.reading.registration import agreement
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps
 from wrist_stiffness.campaign.reading.spikes import spikes
+from wrist_stiffness.campaign.reading.static_frames import frames_of
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.table_range import beyond_range
 from wrist_stiffness.compensation.intake import BASE_FRAME, Frames
@@ -47,6 +48,9 @@ from wrist_stiffness.recording.topics import (
 )
 
 Mask = NDArray[np.bool_]
+
+GEOMETRY = "geometry_sha256"
+"""Key of the notes: checksum of the geometry file of the wrist that was recorded."""
 
 ANGLES_USED = 20_000
 """Joint states that are enough to tell the offset of the clocks."""
@@ -105,7 +109,8 @@ def read_session(
     joints : sequence of str
         Joint names of motor 1 and 2.
     frames : Frames, optional
-        Sensor frames of loads, poses and markers, beside `wrist_base` and `wrist_platform`.
+        Sensor frames of loads, poses and markers, beside `wrist_base`, `wrist_platform` and those
+        on the recording's `/tf_static`.
     load_age_limit_s : float
         Oldest load that still belongs to a measured pose [s].
 
@@ -128,16 +133,19 @@ def read_session(
     samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(recording, samples, remaps or {})
     notes, unread = notes_of(samples)
+    known, unusable = frames_of(recording, remaps or {}, frames or Frames())
     try:
-        machine = machine_signals(samples, frames or Frames())
+        machine = machine_signals(samples, known)
         markers = table.geometry.platform.readout_points
-        track = pose_track(samples, markers, frames or Frames())
+        track = pose_track(samples, markers, known)
         session = _session(recording.path.name, machine, track, table, load_age_limit_s)
     except (InputError, RecordingError) as error:
         raise type(error)(f"{recording.path}: {error}") from error
     damage = [f"the recording is damaged: {recording.damage}"] if recording.damage else []
     faults = [str(fault) for fault in samples.faults]
-    return replace(session, notes=notes, remarks=(*damage, *unread, *faults, *session.remarks))
+    other = _another_geometry(notes, table)
+    said = (*damage, *unread, *other, *unusable, *faults, *session.remarks)
+    return replace(session, notes=notes, remarks=said)
 
 
 def _session(
@@ -325,6 +333,17 @@ def _spikes(time: Array, shift: Array, rotation: Array, rigid: Array, step: floa
 
 def _period_s(time_ns: Stamps) -> float:
     return float(np.median(np.diff(time_ns))) / NANOSECONDS if len(time_ns) > 1 else 0.0
+
+
+def _another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
+    """Return a warning where the notes name another geometry: a table may have been made anew."""
+    said, own = notes.get(GEOMETRY), table.geometry.sha256
+    if said in (None, own):
+        return []
+    return [
+        f"note {GEOMETRY!r} is {str(said)[:12]}..., the table's geometry {own[:12]}... "
+        f"({table.geometry.name}): the recording is of another wrist, or its geometry was changed"
+    ]
 
 
 def notes_of(samples: Samples) -> tuple[dict[str, Any], list[str]]:

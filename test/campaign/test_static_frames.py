@@ -1,0 +1,79 @@
+"""Sensors speak in frames that a recording's `/tf_static` places, as the nodes hear it."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.compensation.intake import Frames, SensorFrame
+from wrist_stiffness.errors import FrameError
+from wrist_stiffness.recording.messages import (
+    Header,
+    Quaternion,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
+from wrist_stiffness.workflows.export_csv import export_csv
+
+TURN = Rotation.from_euler("xyz", [40.0, -25.0, 70.0], degrees=True)
+ORIGIN = np.array([1.2, -0.4, 0.3])
+
+
+def placed(parent, child, place, turn, scale=1.0):
+    quaternion = Quaternion(*(scale * turn.as_quat()).tolist())
+    transform = Transform(Vector3(*np.asarray(place).tolist()), quaternion)
+    return TransformStamped(Header(0, parent), child, transform)
+
+
+@pytest.fixture
+def tracked(campaign):
+    """Poses in a tracker's frame, which hangs at a stand on the wrist's base."""
+    campaign.frame_id = "tracker"
+    campaign.shift = 1e-5 * np.random.default_rng(0).standard_normal((799, 3))
+    campaign.with_joints().with_loads()
+    turn = TURN.as_matrix()
+    rotation = turn.T @ campaign.rigid(campaign.pose_ns)
+    return campaign.with_poses((campaign.shift - ORIGIN) @ turn, rotation)
+
+
+def test_poses_are_turned_by_a_chain_of_fixed_transforms(tmp_path, tracked, table):
+    stand = np.array([0.5, 0.0, 0.1])
+    start = tracked.joint_ns[0]
+    chain = (
+        placed("stand", "tracker", ORIGIN - stand, TURN),
+        placed("wrist_base", "stand", stand, Rotation.identity()),
+    )
+    for step in chain:
+        tracked.add("/tf_static", start, TFMessage((step,)))
+    path = tracked.written(tmp_path / "bag")
+    session = read_session(path, table)
+    np.testing.assert_allclose(session.shift, tracked.shift, atol=1e-15)
+    np.testing.assert_allclose(session.rotation, tracked.rigid(tracked.pose_ns), atol=1e-13)
+    export_csv(path, tmp_path / "poses.csv", table)
+    first = np.genfromtxt(tmp_path / "poses.csv", delimiter=",", names=True)[0]
+    assert first["x_mm"] == pytest.approx(1e3 * tracked.shift[0, 0], abs=1e-12)
+    # What the user maps goes before what the recording says.
+    mapped = Frames({"tracker": SensorFrame("wrist_base", TURN.as_matrix(), ORIGIN + 1e-3)})
+    moved = read_session(path, table, frames=mapped)
+    np.testing.assert_allclose(moved.shift, tracked.shift + 1e-3, atol=1e-15)
+
+
+def test_another_name_of_the_topic_is_followed(tmp_path, tracked, table):
+    step = placed("wrist_base", "tracker", ORIGIN, TURN)
+    tracked.add("/cell/tf_static", tracked.joint_ns[0], TFMessage((step,)))
+    path = tracked.written(tmp_path / "bag")
+    session = read_session(path, table, remaps={"/tf_static": "/cell/tf_static"})
+    np.testing.assert_allclose(session.shift, tracked.shift, atol=1e-15)
+    with pytest.raises(FrameError, match="'tracker'"):
+        read_session(path, table)
+
+
+def test_a_transform_that_is_none_is_said(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses()
+    broken = placed("wrist_base", "ft", ORIGIN, TURN, scale=0.5)
+    campaign.add("/tf_static", campaign.joint_ns[0], TFMessage((broken,)))
+    (remark,) = read_session(campaign.written(tmp_path / "bag"), table).remarks
+    assert remark.startswith("/tf_static: static transform wrist_base -> ft:")
+    assert remark.endswith("not used")
