@@ -17,6 +17,9 @@ FEW = 4
 STRIDE = 8
 """Neighbours in time share most of their contact state: one in so many guesses for all."""
 
+WIDTH = 8
+"""Samples whose numbers of held sectors round up to the same multiple are solved together."""
+
 MAX_EXCHANGES = 12
 """Block exchanges of the whole stack; samples that are not done then are solved one by one."""
 
@@ -41,9 +44,10 @@ class Held:
     def of(cls, approach: Array, active: NDArray[np.bool_]) -> Held:
         """Return the held state for flexibilities A (n, m, m) [m/N]."""
         stiffness = np.zeros_like(approach)
-        for rows, held in _patterns(active):
-            own = np.ix_(rows, held, held)
-            stiffness[own] = np.linalg.inv(approach[own])
+        for rows, places, held, matrix in _held(approach, active):
+            both = held[:, :, None] & held[:, None, :]
+            inverse = np.where(both, np.linalg.inv(matrix), 0.0)
+            stiffness[rows[:, None, None], places[:, :, None], places[:, None, :]] = inverse
         return cls(active, stiffness)
 
 
@@ -136,25 +140,36 @@ def forces_of(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
         Forces, linear in `gap`; zero where not held [N].
     """
     force = np.zeros_like(gap)
-    for rows, held in _patterns(closed):
-        own = np.ix_(rows, held)
-        matrix = approach[np.ix_(rows, held, held)]
-        force[own] = np.linalg.solve(matrix, -gap[own][..., None])[..., 0]
+    for rows, places, held, matrix in _held(approach, closed):
+        own = rows[:, None], places
+        force[own] = np.linalg.solve(matrix, np.where(held, -gap[own], 0.0)[..., None])[..., 0]
     return force
 
 
-def _patterns(
-    closed: NDArray[np.bool_],
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield the rows of each contact state that occurs, and its sectors, unless it has none."""
-    if len(closed) == 1:
-        held = np.flatnonzero(closed[0])
-        if len(held):
-            yield np.zeros(1, dtype=np.intp), held
-        return
-    patterns, which = np.unique(np.packbits(closed, axis=1), axis=0, return_inverse=True)
-    for number in range(len(patterns)):
-        rows = np.flatnonzero(which.ravel() == number)
-        held = np.flatnonzero(closed[rows[0]])
-        if len(held):
-            yield rows, held
+def _held(
+    approach: Array, closed: NDArray[np.bool_]
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_], Array]]:
+    """Yield stacks of samples that hold about as many sectors: one factorisation each.
+
+    Yields
+    ------
+    rows : (r,) int
+        The samples.
+    places : (r, k) int
+        Their k sectors, the held ones first.
+    held : (r, k) bool
+        Which of these are held.
+    matrix : (r, k, k) float
+        A of the held sectors; the others have an equation of their own, 1.
+    """
+    n, m = closed.shape
+    count = np.count_nonzero(closed, axis=1)
+    stack = -(-count // WIDTH)
+    for number in np.flatnonzero(np.bincount(stack)[1:]) + 1:
+        rows = np.flatnonzero(stack == number)
+        k = min(int(number) * WIDTH, m)
+        places = np.argsort(~closed[rows], axis=1, kind="stable")[:, :k]
+        held = np.arange(k) < count[rows, None]
+        square = (rows * m)[:, None, None] * m + m * places[:, :, None] + places[:, None, :]
+        both = held[:, :, None] & held[:, None, :]
+        yield rows, places, held, np.where(both, approach.take(square), np.eye(k))

@@ -1,0 +1,86 @@
+"""Flange contact of many samples at once against non-negative least squares, one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import nnls
+
+from wrist_stiffness.model.contacts import FEW, STRIDE, WIDTH, Held, forces_of, solve_contacts
+
+ROUNDING = 1e-9
+"""Relative; times the condition number of the flexibilities, 100."""
+
+COUNTS = (1, FEW, FEW + 1, STRIDE * FEW + 7)
+SECTORS = (1, WIDTH - 1, WIDTH, 2 * WIDTH + 3)
+
+stacks = st.tuples(st.integers(0, 10**6), st.sampled_from(COUNTS), st.sampled_from(SECTORS))
+
+
+def problems(seed, n, m):
+    """Return flexibilities, gaps that hold from none to all sectors, and random contact states."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(n, m, m)))[0]
+    approach = 1e-7 * (turn * np.logspace(0.0, -2.0, m)) @ np.swapaxes(turn, 1, 2)
+    gap = 1e-6 * (rng.normal(size=(n, m)) + rng.uniform(-3.0, 3.0, size=(n, 1)))
+    return approach, gap, rng.random((n, m)) < rng.random((n, 1))
+
+
+def by_least_squares(approach, gap):
+    """Return the minimum of the potential energy: |L'f + L^-1 gap| over f >= 0."""
+    lower = np.linalg.cholesky(approach)
+    return nnls(lower.T, -np.linalg.solve(lower, gap), maxiter=100 * len(gap))[0]
+
+
+def scale(approach, gap):
+    """Return a force to measure errors of each sample against, (n, 1)."""
+    stiffest = np.diagonal(approach, axis1=1, axis2=2).max(axis=1, keepdims=True)
+    return np.abs(gap).max(axis=1, keepdims=True) / stiffest
+
+
+@settings(max_examples=60, deadline=None)
+@given(stacks)
+def test_every_guess_leads_to_the_least_energy(case):
+    approach, gap, state = problems(*case)
+    wanted = np.array([by_least_squares(a, g) for a, g in zip(approach, gap, strict=True)])
+    guesses = (None, state[0], state, Held.of(approach, state))
+    for guess in guesses:
+        force, active = solve_contacts(approach, gap, guess)
+        tolerance = 100.0 * ROUNDING * np.maximum(scale(approach, gap), wanted)
+        assert np.all(np.abs(force - wanted) <= tolerance)
+        assert np.array_equal(active, force > 0.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(stacks)
+def test_forces_close_what_is_held_and_nothing_else(case):
+    approach, gap, state = problems(*case)
+    force = forces_of(approach, gap, state)
+    opening = gap + (approach @ force[..., None])[..., 0]
+    assert np.all(force[~state] == 0.0)
+    assert np.all(np.abs(opening[state]) <= ROUNDING * np.abs(gap).max())
+
+
+@settings(max_examples=60, deadline=None)
+@given(stacks)
+def test_the_stiffness_of_a_state_gives_its_forces(case):
+    approach, gap, state = problems(*case)
+    stiffness = Held.of(approach, state).stiffness
+    assert np.all(stiffness[~state] == 0.0)
+    np.testing.assert_allclose(stiffness, np.swapaxes(stiffness, 1, 2), rtol=1e-9, atol=1e-4)
+    force = -(stiffness @ gap[..., None])[..., 0]
+    tolerance = 100.0 * ROUNDING * scale(approach, gap)
+    assert np.all(np.abs(force - forces_of(approach, gap, state)) <= tolerance)
+
+
+def test_no_flange_no_force():
+    force, active = solve_contacts(np.zeros((9, 0, 0)), np.zeros((9, 0)), None)
+    assert force.shape == active.shape == (9, 0)
+
+
+@pytest.mark.parametrize("n", [1, 7])
+def test_all_open_is_no_work(n):
+    approach = np.tile(1e-7 * np.eye(3), (n, 1, 1))
+    force, active = solve_contacts(approach, np.ones((n, 3)), None)
+    assert not force.any()
+    assert not active.any()
