@@ -12,7 +12,7 @@ from wrist_stiffness.campaign.fitting.calibrate import said_calibrated, told_mod
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting.recipes import recipe
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.fitting.start_search import start_values
@@ -30,6 +30,12 @@ FAR = 3.0
 
 MOVED = 2.0
 """Uncertainties, of before, by which a parameter of the base must move to be named."""
+
+WORTH_WIDENING = 1.5
+"""A prior is made wider if its parameters are so many times its width."""
+
+MOST_WIDENINGS, MOST_WIDENED = 3, 100.0
+"""Rounds, and how much wider a prior may become."""
 
 SIGNIFICANT = 2.0
 """Uncertainties that tell something from nothing."""
@@ -161,9 +167,45 @@ def extend(
     before = judged(base, progress=progress)
     wide = replace(base, free=(*free, _free(effect, units)))
     start = _with_effect(wide, before.fit, start_values(before.fit, effect))
-    after = judged(wide, start, progress)
+    wide, after = _judged_at_size(wide, start, progress)
     everything = fit(wide, start_of(wide, after.fit.problem, after.fit.z), progress=progress)
     return Extension(effect, everything, before, after)
+
+
+def _judged_at_size(
+    wide: FitProblem, start: tuple[FitProblem, Array], progress: Progress
+) -> tuple[FitProblem, Judged]:
+    """Judge the fit with the priors of the effect, the last one, as wide as it turns out large.
+
+    A prior of the usual size would hold a fault that is far beyond it back; and what is held back
+    goes into whatever else is free, most of all into the tare.  A common factor on all parameters
+    is the most probable one (empirical Bayes): those that are not told still stay at nothing.
+    """
+    after = judged(wide, start, progress)
+    for _ in range(MOST_WIDENINGS):
+        beyond = _beyond_prior(after.fit)
+        own = wide.free[-1]
+        widening = min(own.widening * beyond, MOST_WIDENED)
+        if beyond < WORTH_WIDENING or widening <= own.widening:
+            break
+        wide = replace(wide, free=(*wide.free[:-1], replace(own, widening=widening)))
+        after = judged(wide, (after.fit.problem, after.fit.z), progress)
+    return wide, after
+
+
+def _beyond_prior(found: Fit) -> float:
+    """Return the root mean square of the last effect's sizes in widths of their priors."""
+    last = len(found.problem.free) - 1
+    sizes = {p.key for p in found.problem.free[last].effect.parameters if p.linear}
+    places = [
+        place
+        for place, unknown in enumerate(found.problem.unknowns)
+        if unknown.free == last and unknown.key in sizes and unknown.weight > NO_PRIOR
+    ]
+    if not places:
+        return 0.0
+    square = found.z[places] ** 2 + np.diag(found.covariance)[places]
+    return float(np.sqrt(np.mean(found.problem.weights[places] ** 2 * square)))
 
 
 def _free(effect: Effect, units: Sequence[UnitSession]) -> FreeEffect:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.campaign.fitting.wander import found_wander, with_wander
 from wrist_stiffness.diagnosis.noise import estimate_noise
@@ -76,7 +76,7 @@ def fit(
     """
     table, weight = problem.table, problem.weights
     unseen = np.zeros(table.n_units, dtype=bool) if held_out is None else held_out
-    if (measured := table.measured[~unseen].sum()) < max(1, np.count_nonzero(weight < 1.0)):
+    if (measured := table.measured[~unseen].sum()) < max(1, np.count_nonzero(weight <= NO_PRIOR)):
         raise InputError(f"fit: only {measured} numbers were measured")
     if start is not None:
         return _settled(problem, start, unseen, NOISE_ROUNDS, progress)

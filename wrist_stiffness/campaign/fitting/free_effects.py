@@ -45,11 +45,14 @@ class FreeEffect:
         infinite for none.  A parameter that is left out keeps its value.
     per_session : bool
         Whether every session has values of its own.
+    widening : float
+        By how much the priors are wider than usual, of parameters that say how large the effect is.
     """
 
     effect: Effect
     scale: Mapping[str, float] = field(default_factory=dict)
     per_session: bool = False
+    widening: float = 1.0
 
     @property
     def step(self) -> dict[str, float]:

@@ -16,6 +16,7 @@ from wrist_stiffness.diagnosis.observations import Observations
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import Parameter
 
 NO_PRIOR = 1e-3
 """Weight where a law knows no prior: a thousand times its first value, so that what the data do not
@@ -61,6 +62,12 @@ class Unknown:
     upper: float
 
 
+def _weight(free: FreeEffect, parameter: Parameter, scale: float) -> float:
+    if not np.isfinite(scale):
+        return NO_PRIOR
+    return 1.0 / free.widening if parameter.linear else 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class FitProblem:
     """A model, sessions, and what may move.
@@ -95,7 +102,7 @@ class FitProblem:
                         session,
                         free.effect.estimates[key].value,
                         free.step[key],
-                        1.0 if np.isfinite(scale) else NO_PRIOR,
+                        _weight(free, bounds[key], scale),
                         bounds[key].lower,
                         bounds[key].upper,
                     )

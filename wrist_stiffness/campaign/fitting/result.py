@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.problem import FitProblem
+from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem
 from wrist_stiffness.campaign.fitting.wander import with_wander
 from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.whitening import NoiseModel
@@ -37,6 +37,8 @@ class Fitted:
         Estimate and one standard uncertainty, in the unit of the name.
     prior, prior_sigma : float
         Mean and standard deviation of the prior.
+    usual : float
+        Standard deviation of the law's own prior; that of the fit may be wider.
     at_bound : bool
         Whether the estimate lies on a bound of what is possible.
     together : tuple of str
@@ -50,6 +52,7 @@ class Fitted:
     sigma: float
     prior: float
     prior_sigma: float
+    usual: float
     at_bound: bool
     together: tuple[str, ...]
 
@@ -60,8 +63,8 @@ class Fitted:
 
     @property
     def moved(self) -> float:
-        """How far it went from the mean of its prior, in standard deviations of the prior."""
-        return (self.value - self.prior) / self.prior_sigma
+        """How far it went from the mean of its prior, in standard deviations that are usual."""
+        return (self.value - self.prior) / self.usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +143,7 @@ class Fit:
                     float(sigma[place]) * unknown.step,
                     value - float(z) * unknown.step,
                     unknown.step / unknown.weight,
+                    unknown.step / (1.0 if unknown.weight > NO_PRIOR else NO_PRIOR),
                     min(value - unknown.lower, unknown.upper - value) < near,
                     tuple(names[i] for i in np.flatnonzero(correlation[place] > TOGETHER)),
                 )
