@@ -10,6 +10,7 @@ from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Compari
 from wrist_stiffness.campaign.comparing.headroom import held_out_process
 from wrist_stiffness.campaign.comparing.sentences import tell
 from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
+from wrist_stiffness.campaign.comparing.wiring import told_mistake
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
@@ -77,6 +78,8 @@ def compare_models(
         progress(number + 1, steps)
     left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
     floor = noise_floor(left)
+    best, (_, refitted, _) = models[-1][1], tables[-1]
+    mistake = told_mistake(best, cuts, calibrated, refitted, floor.rms(refitted))
     progress(len(models) + 1, steps)
     compared = []
     for (name, _), (observed, refitted, absorbed) in zip(models, tables, strict=True):
@@ -90,6 +93,7 @@ def compare_models(
         repeatability(tables[0][1]),
         repeatability(by_side(tables[0][1])),
         {key: size.rms for key, size in sizes(left).items()},
+        mistake,
     )
 
 

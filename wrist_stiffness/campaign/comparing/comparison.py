@@ -121,6 +121,8 @@ class Comparison:
         dwell was repeated.
     process : dict of str to float
         What a Gaussian process over the conditions leaves of the first model's error.
+    mistake : str
+        A sentence on a sign, unit or name that may be wrong in the recordings; empty for none.
     """
 
     sessions: tuple[str, ...]
@@ -129,6 +131,7 @@ class Comparison:
     repeated: dict[str, float]
     repeated_by_side: dict[str, float]
     process: dict[str, float]
+    mistake: str = ""
 
     @cached_property
     def floor(self) -> dict[str, float]:
@@ -165,6 +168,8 @@ class Comparison:
             lines.append(f"{model.name} is off by {' and '.join(parts)} (RMS): {means}.")
         if len(self.models) > 1:
             lines += [self._fall(q) for q in self.quantities]
+        if self.mistake:
+            lines.append(self.mistake)
         return tuple(lines)
 
     def _fall(self, quantity: Quantity) -> str:

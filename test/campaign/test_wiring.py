@@ -1,0 +1,91 @@
+"""A sign, unit or name that a cell got wrong is told, and nothing else is taken for one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.comparing.compare import compare_models
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.registry import find_law
+
+POSES = 60
+NOISE = np.repeat([0.7e-6, np.radians(1e-3)], 3)
+
+
+@pytest.fixture(scope="module")
+def model(table):
+    return ErrorModel("wrist", table, "closed_form")
+
+
+def session(model, effects=(), on_platform=False):
+    """Poses measured one by one under random loads."""
+    rng = np.random.default_rng(3)
+    theta = rng.uniform(-0.6, 0.6, (POSES, 2))
+    load = rng.normal(size=(POSES, 6)) * np.repeat([0.5, 0.01], 3)
+    block = Block(2.0 * np.arange(POSES), theta, load, load_on_platform=on_platform)
+    noise = rng.normal(size=(POSES, 6)) * NOISE
+    bent, shift = exp_twist(model.with_effects(*effects).batch(block).measured)
+    wobble, _ = exp_twist(np.hstack([np.zeros((POSES, 3)), noise[:, 3:]]))
+    rotation = wobble @ bent @ model.table.mechanism.forward(theta).platform
+    return MeasuredSession("day", block, shift + noise[:, :3], rotation, np.diag(NOISE**2))
+
+
+def told(model, measured):
+    return compare_models([("m", model)], [measured], np.random.default_rng(0)).mistake
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (-1.0, "with the load's sign turned the error falls from"),
+        (1e-3, "with the load times 1000"),
+        (1.0 / 9.80665, "is it in kilograms?"),
+    ],
+    ids=["sign", "kN", "kg"],
+)
+def test_a_load_of_a_wrong_sign_or_unit_is_told(model, factor, words):
+    measured = session(model)
+    block = replace(measured.block, load=factor * measured.block.load)
+    assert words in told(model, replace(measured, block=block))
+
+
+def test_a_load_in_the_other_frame_is_told(model):
+    measured = session(model, on_platform=True)
+    block = replace(measured.block, load_on_platform=False)
+    assert "the load in the other frame" in told(model, replace(measured, block=block))
+
+
+def test_positions_in_millimetres_are_told(model):
+    points = replace(session(model), rotation=np.full((POSES, 3, 3), np.nan))
+    sentence = told(model, replace(points, shift=1e3 * points.shift))
+    assert "with positions divided by 1000" in sentence
+    assert "are they in mm?" in sentence
+
+
+def test_swapped_motors_are_told_where_no_rotation_names_them(model):
+    points = replace(session(model), rotation=np.full((POSES, 3, 3), np.nan))
+    swapped = replace(points.block, theta=points.block.theta[:, ::-1])
+    assert "with the motors swapped" in told(model, replace(points, block=swapped))
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("bushing_stiffness@joint_1", {"flexibility_percent": 300.0}),
+        ("gravity@platform", {"mass_g": 200.0}),
+        ("backlash@motor_1", {"width_mdeg": 100.0}),
+        ("load_scale@load_sensor", {"scale_percent": 90.0}),
+        ("load_bias@load_sensor", {"fz_N": -2.0}),
+    ],
+)
+def test_a_missing_effect_is_no_mistake(model, effect, values):
+    law, _, place = effect.partition("@")
+    hidden = Effect(find_law(law), place).with_values(values)
+    found = compare_models([("m", model)], [session(model, (hidden,))], np.random.default_rng(0))
+    assert found.over_floor(found.models[0]) > 2.0
+    assert found.mistake == ""

@@ -1,0 +1,152 @@
+"""Signs, units and names that a cell got wrong: which of them would explain the error.
+
+No set-up explains a load of the wrong sign, and no effect is as large.  So the few usual mistakes
+are tried on what was measured, and one that explains most of the error is told.  It is never
+applied: whoever wired the cell has to look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.campaign.comparing.comparison import sizes
+from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
+from wrist_stiffness.campaign.observing import UnitSession, predict_units, tabulate
+from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.error_model import ErrorModel
+
+WORTH_ASKING = 2.0
+"""Error over the noise floor from which a mistake is looked for."""
+
+CLEAR = 0.5
+"""A mistake is told if the error without it is less than this share."""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One thing that is easily got wrong.
+
+    Parameters
+    ----------
+    without : str
+        The data without it, after "with".
+    check : str
+        Where to look.
+    block : callable
+        From the recorded signals to those without it.
+    shift_factor : float
+        The same for the measured positions.
+    """
+
+    without: str
+    check: str
+    block: Callable[[Block], Block] = lambda block: block
+    shift_factor: float = 1.0
+
+    def put_right(self, session: UnitSession) -> UnitSession:
+        """Return the session without the mistake."""
+        cut = replace(session.cut, block=self.block(session.block))
+        return replace(session, cut=cut, shift=self.shift_factor * session.shift)
+
+    def concerns(self, session: UnitSession) -> bool:
+        """Tell whether the session could have it: a measured rotation names its own motors."""
+        same_angles = self.block(session.block).theta is session.block.theta
+        return same_angles or not np.isfinite(session.turn).any()
+
+
+def _load(factor: float) -> Callable[[Block], Block]:
+    return lambda block: replace(block, load=factor * block.load)
+
+
+MISTAKES = (
+    Mistake(
+        "the load's sign turned",
+        "does the sensor show what acts on the platform, or the reaction (acts_on: environment)?",
+        _load(-1.0),
+    ),
+    Mistake("the load times 1000", "is it in kN and kN m?", _load(1e3)),
+    Mistake("the load times 9.81", "is it in kilograms?", _load(9.80665)),
+    Mistake(
+        "the load in the other frame",
+        "does the load sensor turn with the platform (wrist_platform) or not (wrist_base)?",
+        lambda block: replace(block, load_on_platform=not block.load_on_platform),
+    ),
+    Mistake(
+        "the motors swapped",
+        "--joint names motor 1 first",
+        lambda block: replace(block, theta=block.theta[:, ::-1]),
+    ),
+    Mistake("positions divided by 1000", "are they in mm? A recording has m", shift_factor=1e-3),
+)
+
+
+def told_mistake(
+    model: ErrorModel,
+    sessions: Sequence[UnitSession],
+    calibrated: Sequence[str],
+    left: Observations,
+    floor: dict[str, float],
+) -> str:
+    """Return the mistake that explains most of the error in a sentence, empty for none.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        With which the sessions are compared.
+    sessions : sequence of UnitSession
+        As they were recorded.
+    calibrated : sequence of str
+        Effects of the set-up that are not refitted.
+    left : Observations
+        Residuals of the units after the refit.
+    floor : dict of str to float
+        Noise floor by the key of the quantity.
+    """
+    before = {key: size.rms for key, size in sizes(left).items()}
+    if _over(before, floor, 1.0) < WORTH_ASKING:
+        return ""
+    best = (CLEAR * _over(before, floor, 1.0), "")
+    for mistake in MISTAKES:
+        after = _without(mistake, model, sessions, calibrated)
+        if after and (size := _over(after, floor, mistake.shift_factor)) < best[0]:
+            fall = " and ".join(
+                f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
+                for q in left.reported
+            )
+            best = (
+                size,
+                f"Look at the set-up first: with {mistake.without} the error falls {fall}; "
+                f"{mistake.check}",
+            )
+    return best[1]
+
+
+def _over(rms: dict[str, float], floor: dict[str, float], shift_factor: float) -> float:
+    """Return the error over its floor, all quantities together."""
+    # A smaller unit makes noise and error smaller alike.
+    scale = {"s_um": shift_factor}
+    ratio: Array = np.array([rms[k] / (floor[k] * scale.get(k, 1.0)) for k in rms if floor[k] > 0])
+    return float(np.sqrt(np.mean(ratio**2))) if len(ratio) else 0.0
+
+
+def _without(
+    mistake: Mistake,
+    model: ErrorModel,
+    sessions: Sequence[UnitSession],
+    calibrated: Sequence[str],
+) -> dict[str, float]:
+    """Return the error that is left without a mistake, empty where it cannot be one."""
+    if not all(mistake.concerns(session) for session in sessions):
+        return {}
+    right = tuple(mistake.put_right(session) for session in sessions)
+    if not all(model.accepts(session.block).all() for session in right):
+        return {}
+    observed = tabulate(model, right, np.concatenate([predict_units(model, s) for s in right]))
+    set_ups = refit_set_up(model, observed, calibrated)
+    refitted = observed.observations.with_values(refitted_values(observed, set_ups))
+    return {key: size.rms for key, size in sizes(refitted).items()}
