@@ -173,8 +173,8 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
     remarks = []
     if partly := int((huge[:, 3:].any(axis=1) & ~huge[:, 3:].all(axis=1)).sum()):
         remarks.append(
-            f"{what}: {partly} of {len(shift)} orientations are measured in part only (a turn has a "
-            "huge variance): all three turns of these are left out"
+            f"{what}: {partly} of {len(shift)} orientations are measured in part only (a huge "
+            "variance for some turn): all three turns of these are left out"
         )
     lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
     return _in_time_order(poses.time_ns, shift + origin, rotation, covariance, what, lost, remarks)
