@@ -98,6 +98,11 @@ class CorrectionStream(Stream):
         self._held = np.zeros(2)
         self._enabled = enabled
 
+    def _used(self, model: ErrorModel) -> ErrorModel:
+        """Leave out what is wrong with a measurement alone: commands are no measurement."""
+        of_wrist = [each for each in model.effects if not each.law.of_measurement(each.component)]
+        return model if len(of_wrist) == len(model.effects) else model.with_effects(*of_wrist)
+
     @property
     def enabled(self) -> bool:
         """Whether commands are corrected; switching it on takes the present load as payload."""

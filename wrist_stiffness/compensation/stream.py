@@ -50,13 +50,20 @@ class Stream:
     @property
     def model(self) -> ErrorModel | None:
         """The model; one that is put in its place remembers nothing yet."""
-        return self._running.model if self._running else None
+        return self._model
 
     @model.setter
     def model(self, model: ErrorModel | None) -> None:
+        self._model = model
         self._running = (
-            None if model is None else RunningModel(model, self.temperatures, self.covariates)
+            None
+            if model is None
+            else RunningModel(self._used(model), self.temperatures, self.covariates)
         )
+
+    def _used(self, model: ErrorModel) -> ErrorModel:
+        """Return what of a model counts for this stream."""
+        return model
 
     @property
     def settings(self) -> StreamSettings:

@@ -103,6 +103,10 @@ class Law(ABC):
         """Return what the law changes at a place."""
         return self.stage
 
+    def of_measurement(self, place: str) -> bool:
+        """Return whether it is in what sensors say of the motion; the wrist itself is right."""
+        return self.stage_at(place) == "sensor"
+
     def changed(
         self,
         parts: ElasticComponents,

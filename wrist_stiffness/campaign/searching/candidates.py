@@ -144,7 +144,7 @@ class WristCandidate:
 
 def compensable(law: Law, place: str) -> str:
     """Tell whether the nodes can correct for an effect: `yes`, `needs_signal` or `no`."""
-    if place == "pose_sensor":
+    if law.of_measurement(place):
         return "no"
     return "needs_signal" if law.signals else "yes"
 

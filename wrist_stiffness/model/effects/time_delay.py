@@ -40,6 +40,10 @@ class TimeDelay(Law):
         """Return what a late stamp of this place changes."""
         return STAGE[place]
 
+    def of_measurement(self, place: str) -> bool:
+        """Return True but for the load: a late encoder stamp does not move the motor."""
+        return place != "load_sensor"
+
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
