@@ -89,3 +89,21 @@ def test_a_missing_effect_is_no_mistake(model, effect, values):
     found = compare_models([("m", model)], [session(model, (hidden,))], np.random.default_rng(0))
     assert found.over_floor(found.models[0]) > 2.0
     assert found.mistake == ""
+
+
+def test_a_unit_that_makes_all_numbers_small_is_no_mistake(model):
+    soft = Effect(find_law("bushing_stiffness"), "joint_1").with_values(
+        {"flexibility_percent": 1000.0}
+    )
+    points = replace(session(model, (soft,)), rotation=np.full((POSES, 3, 3), np.nan))
+    found = compare_models([("m", model)], [points], np.random.default_rng(0))
+    assert found.over_floor(found.models[0]) > 2.0
+    assert found.mistake == ""
+
+
+def test_what_explains_a_little_is_not_told(model):
+    """Beside a large error of a gear the frame of the load hardly matters."""
+    wave = Effect(find_law("encoder_eccentricity"), "motor_1").with_values({"cos_2_mdeg": 300.0})
+    measured = session(model, (wave,), on_platform=True)
+    block = replace(measured.block, load_on_platform=False)
+    assert told(model, replace(measured, block=block)) == ""
