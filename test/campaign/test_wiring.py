@@ -93,7 +93,7 @@ def test_a_missing_effect_is_no_mistake(model, effect, values):
 
 def test_a_unit_that_makes_all_numbers_small_is_no_mistake(model):
     soft = Effect(find_law("bushing_stiffness"), "joint_1").with_values(
-        {"flexibility_percent": 1000.0}
+        {"flexibility_percent": 2000.0}
     )
     points = replace(session(model, (soft,)), rotation=np.full((POSES, 3, 3), np.nan))
     found = compare_models([("m", model)], [points], np.random.default_rng(0))
