@@ -244,3 +244,7 @@ def test_an_effect_where_it_cannot_be_names_the_places(effect, named, tmp_path, 
     argv = ["simulate", "-o", str(tmp_path / "a"), "--seconds", "1", "--effect", effect]
     assert main(argv) == 2
     assert named in capsys.readouterr().err
+
+
+def test_a_secret_is_told_and_not_recorded(refused):
+    assert "leave out -o" in refused("simulate", "--reveal", "3", "-o", "riddle")

@@ -338,7 +338,7 @@ CASES = {
     "block that is empty": (
         "platform",
         None,
-        ": None is not a mapping",
+        " is empty",
     ),
 }
 
@@ -364,7 +364,7 @@ def test_missing_source_is_named(block):
         (b"name: !!python/object/apply:os.getcwd []", "not a YAML file"),
         (b"schema: 1\nschema: 2\n", "key 'schema' is given twice"),
         (b"? [a, b]\n: 1\n", "not a YAML file"),
-        (b"", "None is not a mapping"),
+        (b"", " is empty"),
         (b"- 1\n- 2\n", "[1, 2] is not a mapping"),
         (b"just words", "'just words' is not a mapping"),
     ],

@@ -186,6 +186,14 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
             "fzz is neither a signal .* nor a covariate .*--start fzz=VALUE",
         ),
         (FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * (", {}), "formula"),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * mean(fz)", {}),
+            "unknown function mean; known are sin, cos",
+        ),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * __import__('os').x()", {}),
+            "only numbers, names, .* and the functions sin, cos, .* are allowed",
+        ),
     ],
 )
 def test_what_cannot_be_added_is_one_clear_line(model, extend_by, addition, message, tmp_path):

@@ -90,6 +90,8 @@ def _run(arguments: argparse.Namespace) -> int:
         simulate_recording,
     )
 
+    if arguments.reveal is not None and arguments.output is not None:
+        raise InputError("--reveal tells a secret and writes no recording: leave out -o")
     check_bounds(arguments.seconds, arguments.rate)
     table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
     settings = CellSettings(

@@ -85,6 +85,8 @@ class Block:
     def __init__(
         self, values: Any, place: str, error: type[WristError], sources: tuple[str, ...]
     ) -> None:
+        if values is None:
+            raise error(f"{place} is empty: keys with values are expected")
         if not isinstance(values, Mapping):
             raise error(f"{place}: {_short(values)} is not a mapping of keys to values")
         self.values: Mapping[Any, Any] = values

@@ -54,10 +54,12 @@ def names_in(text: str) -> frozenset[str]:
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, or is no formula whatever its names stand for.
     """
     used = {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
-    return frozenset(used - FUNCTIONS.keys())
+    names = frozenset(used - FUNCTIONS.keys())
+    Formula(text, tuple(names))
+    return names
 
 
 def _parsed(text: str) -> ast.expr:
@@ -153,7 +155,11 @@ class Formula:
             for argument in node.args:
                 self._check(argument, depth + 1)
         else:
-            raise self._refusal(node, "only numbers, names, + - * / ** and functions are allowed")
+            raise self._refusal(
+                node,
+                "only numbers, names, + - * / **, parentheses and the functions "
+                f"{', '.join(FUNCTIONS)} are allowed",
+            )
 
     def _refusal(self, node: ast.expr, why: str) -> InputError:
         return InputError(f"formula {self.text!r}, column {node.col_offset + 1}: {why}")
