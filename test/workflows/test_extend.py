@@ -1,12 +1,14 @@
 """One more effect from the catalogue, a file or a formula: found, judged, written, used."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.comparing.compare import compare_models
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.cli.main import main
@@ -21,6 +23,7 @@ from wrist_stiffness.workflows.extend import (
     CatalogueEffect,
     FileEffect,
     FormulaEffect,
+    direction_of,
     extend_model,
 )
 from wrist_stiffness.workflows.read_sessions import Recordings
@@ -236,3 +239,52 @@ def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_b
     assert [effect.name for effect in load_model(output).effects] == ["backlash@motor_1"]
     with pytest.raises(InputError, match="nothing is left to calibrate: .*'calibrated'"):
         calibrate(model, [replace(session, notes=notes)])
+
+
+@pytest.mark.parametrize(
+    ("words", "direction"),
+    [
+        (["along +z"], [0, 0, 1, 0, 0, 0]),
+        (["along", "y"], [0, 1, 0, 0, 0, 0]),
+        (["about -x"], [0, 0, 0, -1, 0, 0]),
+        (["about (-0.38, -0.88, 0.29)"], [0, 0, 0, -0.38, -0.88, 0.29]),
+        (["along", "0.6", "0", "-0.8"], [0.6, 0, -0.8, 0, 0, 0]),
+        (["0", "0", "1e-6", "-1", "0", "0"], [0, 0, 1e-6, -1, 0, 0]),
+    ],
+)
+def test_a_direction_is_taken_in_the_words_of_compare(words, direction):
+    assert direction_of(words) == direction
+
+
+@pytest.mark.parametrize(
+    "words", ["", "up", "along", "along +w", "along 1 2", "about 1 2 3 4", "1 2 3", "0 0 1 0 0 z"]
+)
+def test_a_direction_that_is_none_is_one_line(words):
+    with pytest.raises(InputError, match="write six numbers .* or as compare says 'along"):
+        direction_of(words.split())
+
+
+@pytest.mark.parametrize(
+    ("screw", "kind"),
+    [([0, 0, -1, 0, 0, 0], "along"), ([0, 0, 0, 0.6, 0, -0.8], "about")],
+    ids=["shift", "turn"],
+)
+def test_what_compare_prints_is_what_extend_takes(model, extend_by, screw, kind):
+    """A plate moves with the humidity; the sentence's own words name its direction."""
+    true = FormulaEffect("plate", "frame", screw, f"plate_{UNIT[kind]} * humidity", {}).effect(
+        ["humidity"]
+    )
+    session = session_of(model, true.with_values({f"plate_{UNIT[kind]}": 2.0}))
+    found = compare_models([("m", model)], [session], np.random.default_rng(0))
+    (told,) = (text for text in found.models[0].told.sentences if "humidity, " in text)
+    words = re.search(rf"{kind} (\(.*?\)|[+-][xyz])", told)[0]
+    assert direction_of([words]) == pytest.approx(screw, abs=0.05)
+    addition = FormulaEffect(
+        "plate", "frame", direction_of([words]), f"plate_{UNIT[kind]} * humidity", {}
+    )
+    extended, _ = extend_by(addition, session)
+    (size,) = extended.extension.own
+    assert size.value == pytest.approx(2.0, rel=0.05)
+
+
+UNIT = {"along": "um", "about": "mdeg"}

@@ -23,7 +23,7 @@ examples:
   wrist-stiffness extend wrist_7.yaml --effect joint_clearance@joint_3 --fit monday -o worn.yaml
   wrist-stiffness extend wrist_7.yaml --effect-file laws.py:Twist@platform --fit monday -o own.yaml
   wrist-stiffness extend wrist_7.yaml --formula 'sag_mdeg * tanh(fz / soft_N)' --component link_2 \\
-      --direction 0 0 0 1 0 0 --start soft_N=0.5 --fit monday -o own.yaml
+      --direction 'about +x' --start soft_N=0.5 --fit monday -o own.yaml
 
 In a formula every name that is no signal and no covariate of the recordings is a parameter. A
 parameter whose name ends in a unit (_um, _mdeg, _N ...) is in SI units inside the formula."""
@@ -51,11 +51,11 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     own.add_argument("--component", help="where it is")
     own.add_argument(
         "--direction",
-        nargs=6,
-        type=float,
+        nargs="+",
         metavar="D",
-        help="screw for a value of 1: translation [m], rotation [rad], at O in the component's "
-        "home frame",
+        help="which way, in the words of compare ('along +z', 'about (-0.38, -0.88, 0.29)'), or "
+        "the screw for a value of 1 in six numbers, translation [m] and rotation [rad]; at O in "
+        "the component's home frame",
     )
     own.add_argument("--name", default="own_formula", help="its name (default: own_formula)")
     own.add_argument(
@@ -95,7 +95,12 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _addition(arguments: argparse.Namespace) -> Addition:
     from wrist_stiffness.errors import InputError
-    from wrist_stiffness.workflows.extend import CatalogueEffect, FileEffect, FormulaEffect
+    from wrist_stiffness.workflows.extend import (
+        CatalogueEffect,
+        FileEffect,
+        FormulaEffect,
+        direction_of,
+    )
 
     if arguments.formula is None:
         if arguments.component or arguments.direction or arguments.start:
@@ -112,6 +117,5 @@ def _addition(arguments: argparse.Namespace) -> Addition:
             start[name] = float(number)
         except ValueError as error:
             raise InputError(f"--start {text}: write PARAMETER=NUMBER") from error
-    return FormulaEffect(
-        arguments.name, arguments.component, arguments.direction, arguments.formula, start
-    )
+    direction = direction_of(arguments.direction)
+    return FormulaEffect(arguments.name, arguments.component, direction, arguments.formula, start)

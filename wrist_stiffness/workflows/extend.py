@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +32,10 @@ from wrist_stiffness.workflows.fit_report import (
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
 
 Progress = Callable[[int, int], None]
+
+KINDS = ("along", "about")
+AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
+"""How `compare` names directions."""
 
 MOST_MOVED = 8
 """Parameters of the base that are told of, those that moved farthest."""
@@ -116,6 +121,46 @@ class FormulaEffect:
         law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
         estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
         return Effect(law, self.component, estimates)
+
+
+def direction_of(words: Sequence[str]) -> list[float]:
+    """Return the screw that a user names: six numbers, or in the words of `compare`.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Six numbers; or "along" (a shift) or "about" (a turn) with an axis such as "+z" or three
+        numbers such as "(-0.38, -0.88, 0.29)".
+
+    Returns
+    -------
+    list of 6 float
+        Translation [m], rotation [rad], for a value of 1.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    text = " ".join(words)
+    kind, *rest = re.sub(r"[(),]", " ", text).split() or [""]
+    axis = AXIS.fullmatch(" ".join(rest)) if kind in KINDS else None
+    if axis:
+        size = -1.0 if axis["sign"] == "-" else 1.0
+        three = [size * (axis["name"] == name) for name in "xyz"]
+    else:
+        try:
+            three = [float(word) for word in (rest if kind in KINDS else [kind, *rest])]
+        except ValueError:
+            three = []
+    if kind in KINDS and len(three) == 3:
+        return [*three, 0.0, 0.0, 0.0] if kind == "along" else [0.0, 0.0, 0.0, *three]
+    if kind in KINDS or len(three) != 6:
+        raise InputError(
+            f"--direction {text}: write six numbers (translation, rotation), or as compare says "
+            "'along +z', 'about (-0.38, -0.88, 0.29)'"
+        )
+    return three
 
 
 def at_component(text: str) -> tuple[str, str]:
