@@ -168,7 +168,7 @@ def test_wrench_through_a_component_is_the_transpose_of_its_influence(model):
     )
     rng = np.random.default_rng(1)
     screw = rng.normal(size=(1, 6))
-    free = at.through - at.own_weight
+    free = at.through - at.statics.own_weight
     push = at.contact_force @ at.parts.sectors.slide
     for limb, k in (("limb_1", 0), ("limb_2", 2)):
         twist, gap = at.carried(Contribution(**{limb: screw}))

@@ -51,7 +51,7 @@ def test_softer_bushing_under_closed_flanges_is_a_softer_table(model, make, join
     parts = replace(table.components, flexibility=flexibility, contact=contact)
     softer = replace(model, table=replace(table, components=parts), effects=(effects[1],))
     block = make.rest(POSE, LOAD)
-    found, _ = evaluate(model.with_effects(*effects), block, None)
+    found = evaluate(model.with_effects(*effects), block, None)
     assert found.active[0, table.components.sectors.component == ELASTIC.index(joint)].any()
     assert np.allclose(found.twist, softer.batch(block).twist, rtol=1e-9, atol=1e-18)
 
@@ -206,7 +206,7 @@ def test_contact_is_solved_with_everything_in_it(model, make):
         make.effect("load_bias@load_sensor", fx_N=0.2),
     )
     block = make.block(temperatures={"link_2": np.linspace(20.0, 40.0, 60)})
-    result, _ = evaluate(loaded, block, None)
+    result = evaluate(loaded, block, None)
     gap = result.situation.free[1]
     opening = gap + (result.situation.operators.approach @ result.force[..., None])[..., 0]
     scale = np.abs(gap).max()

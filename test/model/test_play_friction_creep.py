@@ -55,7 +55,7 @@ def test_flanges_push_the_pin_back_within_its_play(model, make, joint):
     """The pin is in balance with walls and flanges, and no flange bears more than a few loads."""
     loaded = model.with_effects(make.effect(f"joint_clearance@{joint}", clearance_um=2e6 * RADIAL))
     block = make.block(25)
-    result, _ = evaluate(loaded, block, None)
+    result = evaluate(loaded, block, None)
     at = result.situation
     assert result.active.any()
     assert result.force.max() < 3.0
@@ -192,12 +192,12 @@ def test_slide_locks_when_the_load_comes_at_rest(free_model, make):
     theta = np.tile(np.radians([20.0, -10.0]), (2, 1))
     load = np.array([np.zeros(6), [0.6, -0.5, -1.0, 0.0, 0.0, 0.0]])
     block = Block(np.arange(2.0), theta, load)
-    free, _ = evaluate(free_model, block, None)
+    free = evaluate(free_model, block, None)
     wanted = np.diff(free.situation.slides[:, number])[0]
     locked = free_model.with_effects(
         make.effect(f"joint_friction@{joint}", coefficient=2.0, preload_N=100.0, presliding_um=0.01)
     )
-    held, _ = evaluate(locked, block, None)
+    held = evaluate(locked, block, None)
     at = held.situation
     slid = at.slides[1, number] - free.situation.slides[0, number]
     assert abs(wanted) > 1e-8

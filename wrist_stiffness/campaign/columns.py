@@ -66,7 +66,7 @@ class SessionModel:
         if effect.name not in self._memories:
             first = self.session.block.take(slice(0, 1))
             usual = Effect(effect.law, effect.component)
-            _, memory = evaluate(self.model.with_effects(usual), first, None)
+            memory = evaluate(self.model.with_effects(usual), first, None).memory
             self._memories[effect.name] = memory.states[0] is not None
         return self._memories[effect.name]
 

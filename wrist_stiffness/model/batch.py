@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.evaluation import Evaluable, Memory, evaluate
+from wrist_stiffness.model.evaluation import evaluate, evaluate_beside, seen_by
 from wrist_stiffness.model.prediction import BlockPrediction
+from wrist_stiffness.model.stages import Evaluable, Memory
 
 CHUNK = 2048
 """Samples evaluated at a time: about 150 MB of operators with 24 flange sectors."""
+
+STACK = 8192
+"""Samples, counted once for each model, whose contacts are solved together."""
 
 
 def predicted(
@@ -39,13 +43,20 @@ def predicted(
     memories: list[Memory | None] = [None] * len(models)
     warnings: list[dict[str, None]] = [{} for _ in models]
     for start in range(0, len(usable), CHUNK):
-        part = slice(start, start + CHUNK)
-        first = None
-        for i, model in enumerate(models):
-            result, memories[i] = evaluate(model, usable.take(part), memories[i], first)
-            first = first or result
-            twists[i, rows[part]], measured[i, rows[part]] = result.twist, result.measured
-            warnings[i].update(dict.fromkeys(result.warnings))
+        part = usable.take(slice(start, start + CHUNK))
+        own = rows[start : start + CHUNK]
+        first = evaluate(models[0], part, memories[0])
+        beside = max(1, STACK // len(part))
+        groups = [slice(begin, begin + beside) for begin in range(1, len(models), beside)]
+        for group in (slice(0, 1), *groups):
+            found = [first]
+            if group.start:
+                found = evaluate_beside(models[group], memories[group], first)
+            memories[group] = [each.memory for each in found]
+            twists[group, own] = [each.twist for each in found]
+            measured[group, own] = seen_by(found)
+            for known, each in zip(warnings[group], found, strict=True):
+                known.update(dict.fromkeys(each.warnings))
     return [
         BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]))
         for i in range(len(models))

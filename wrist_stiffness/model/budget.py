@@ -17,7 +17,7 @@ from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.contacts import forces_of
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.law import Contribution
 from wrist_stiffness.model.situation import Situation
 
@@ -99,10 +99,10 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     configuration = model.table.workspace.configuration(sample.theta)
     model.table.check_load(sample.load.wrench)
     block = sample.block
-    result, _ = evaluate(model, block, None)
+    result = evaluate(model, block, None)
     at = result.situation
-    force = forces_of(at.operators.approach, at.told[1], result.active)
-    through = at.own_weight + component_wrenches(configuration, at.parts, at.load, force)
+    force = forces_of(at.operators.approach, at.statics.told[1], result.active)
+    through = at.statics.own_weight + component_wrenches(configuration, at.parts, at.load, force)
     screws = at.screws_under(through, force)
     carried = block_diagonal(at.influence.of_components()) @ screws[..., None]
     twists = carried[0, :, :, 0]
@@ -117,11 +117,9 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
             if effect.law.constant:
                 added, _ = effect.law.advance(at, effect.component, effect.si, None)
             twist = _felt(at, added, result.active)
-        spread = [
-            evaluate(model.with_effects(*before, other, *after), block, None, result)[0].measured[0]
-            - result.measured[0]
-            for other in effect.varied
-        ]
+        moved = [model.with_effects(*before, other, *after) for other in effect.varied]
+        varied = evaluate_beside(moved, [None] * len(moved), result)
+        spread = [other.measured[0] - result.measured[0] for other in varied]
         effects.append(Share(effect.name, twist, np.reshape(spread, (-1, 6))))
     elastic = [Share(name, twists[k], np.empty((0, 6))) for k, name in enumerate(ELASTIC)]
     total = twists.sum(axis=0) + sum((share.twist for share in effects), np.zeros(6))

@@ -82,21 +82,21 @@ def solve_contacts(
         If an input is not finite or a matrix is not positive definite.
     """
     n, m = gap.shape
-    closed = gap < 0.0
     if isinstance(guess, Held):
-        force, closed[:] = -(guess.stiffness @ gap[..., None])[..., 0], guess.active
-    else:
-        if guess is not None and guess.ndim == 2:
-            closed[:] = guess
-        elif n > STRIDE * FEW:
-            coarse = solve_contacts(approach[::STRIDE], gap[::STRIDE], guess)[1]
-            closed[:] = np.repeat(coarse, STRIDE, axis=0)[:n]
-        elif guess is not None:
-            closed[:] = guess
-        force = forces_of(approach, gap, closed) if n > FEW else np.zeros((n, m))
+        force, closed = solve_alike(approach, gap[..., None], guess)
+        return force[..., 0], closed[..., 0]
+    closed = gap < 0.0
+    if guess is not None and guess.ndim == 2:
+        closed[:] = guess
+    elif n > STRIDE * FEW:
+        coarse = solve_contacts(approach[::STRIDE], gap[::STRIDE], guess)[1]
+        closed[:] = np.repeat(coarse, STRIDE, axis=0)[:n]
+    elif guess is not None:
+        closed[:] = guess
+    force = forces_of(approach, gap, closed) if n > FEW else np.zeros((n, m))
     open_rows = np.arange(n)
-    if (n > FEW or isinstance(guess, Held)) and m:
-        wrong = _wrong(approach, gap, force, closed)
+    if n > FEW and m:
+        wrong = _wrong_rows(approach, gap, force, closed)
         for _ in range(MAX_EXCHANGES):
             closed[open_rows] ^= wrong
             open_rows = open_rows[wrong.any(axis=1)]
@@ -104,22 +104,61 @@ def solve_contacts(
                 return np.maximum(force, 0.0), closed
             left = approach[open_rows], gap[open_rows]
             force[open_rows] = forces_of(*left, closed[open_rows])
-            wrong = _wrong(*left, force[open_rows], closed[open_rows])
+            wrong = _wrong_rows(*left, force[open_rows], closed[open_rows])
     for row in open_rows:
         force[row], closed[row] = solve_contact(approach[row], gap[row], closed[row].copy())
     return force, closed
 
 
+def solve_alike(approach: Array, gap: Array, held: Held) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve t contact problems of n samples that share their flexibilities.
+
+    Parameters
+    ----------
+    approach : (n, m, m) float
+        A [m/N].
+    gap : (n, m, t) float
+        Openings without contact forces [m].
+    held : Held
+        A contact state near those of the solutions, with the same A.
+
+    Returns
+    -------
+    force : (n, m, t) float
+        Not negative [N].
+    active : (n, m, t) bool
+        Sectors in contact.
+    """
+    force = -(held.stiffness @ gap)
+    closed = np.repeat(held.active[..., None], gap.shape[-1], axis=-1)
+    if gap.shape[1]:
+        wrong = _wrong(approach, gap, force, held.active[..., None])
+        row, problem = np.nonzero(wrong.any(axis=1))
+        if len(row):
+            closed ^= wrong
+            force[row, :, problem], closed[row, :, problem] = solve_contacts(
+                approach[row], gap[row, :, problem], closed[row, :, problem]
+            )
+    return np.maximum(force, 0.0), closed
+
+
 def _wrong(
     approach: Array, gap: Array, force: Array, closed: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Tell where a held sector pulls or an open one overlaps, (n, m)."""
-    opening = gap + (approach @ force[..., None])[..., 0]
+    """Tell where a held sector pulls or an open one overlaps, (n, m, t)."""
+    opening = gap + approach @ force
     size = np.max(np.abs(gap), axis=1, keepdims=True)
-    stiffest = np.max(np.diagonal(approach, axis1=1, axis2=2), axis=1, keepdims=True)
+    stiffest = np.max(np.diagonal(approach, axis1=1, axis2=2), axis=1)[:, None, None]
     pulls = force < -RELATIVE_TOLERANCE * size / stiffest
     overlaps = opening < -RELATIVE_TOLERANCE * size
     return np.where(closed, pulls, overlaps)
+
+
+def _wrong_rows(
+    approach: Array, gap: Array, force: Array, closed: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Tell the same of one problem a sample, (n, m)."""
+    return _wrong(approach, gap[..., None], force[..., None], closed[..., None])[..., 0]
 
 
 def forces_of(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:

@@ -20,11 +20,12 @@ from wrist_stiffness.model.batch import predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import Memory, constants_of, evaluate
+from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.situation import lengths
+from wrist_stiffness.model.stages import Memory, constants_of, share
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,6 @@ class ErrorModel:
             return self.table.single_pose
         return SinglePoseStatics(self.parts, self.table.geometry.gravity, own.screws, own.gap)
 
-    @property
-    def _changes_of_parts(self) -> list[Effect]:
-        return [effect for effect in self.effects if effect.stage == "parts"]
-
     @cached_property
     def variations(self) -> tuple[ErrorModel, ...]:
         """The model with each uncertain parameter moved by its standard uncertainty.
@@ -119,12 +116,14 @@ class ErrorModel:
         Those of effects in `joint` are left out.
         """
         together = () if self.joint is None else self.joint.effects
-        return tuple(
+        moved = [
             self.with_effects(*self.effects[:number], other, *self.effects[number + 1 :])
             for number, effect in enumerate(self.effects)
             if effect.name not in together
             for other in effect.varied
-        )
+        ]
+        share([self, *moved])
+        return tuple(moved)
 
     @cached_property
     def relative_error(self) -> float:
@@ -241,9 +240,7 @@ class ErrorModel:
             One for each addition.
         """
         models = [self.with_effects(*self.effects, *extra) for extra in additions]
-        for model in models[1:]:
-            if model._changes_of_parts == models[0]._changes_of_parts:
-                model.__dict__["parts"] = models[0].parts
+        share(models)
         return predicted(models, block, self.accepts(block))
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
@@ -363,18 +360,15 @@ class Session:
         configuration = model.table.workspace.configuration(sample.theta)
         model.table.check_load(sample.load.wrench)
         pose = configuration if model.evaluation == "closed_form" else None
-        result, later = evaluate(model, sample.block, memory, pose=pose)
+        result = evaluate(model, sample.block, memory, pose)
         twist, others = result.twist[0], self._others
 
         @cache
         def varied() -> tuple[Array, list[Memory]]:
             before: list[Memory | None] = [*others] if others else [None] * len(model.variations)
-            found = [
-                evaluate(other, sample.block, own, result)
-                for other, own in zip(model.variations, before, strict=True)
-            ]
-            covariance = model._spread(twist, [moved.twist[0] for moved, _ in found])
-            return covariance, [after for _, after in found]
+            found = evaluate_beside(model.variations, before, result)
+            covariance = model._spread(twist, [moved.twist[0] for moved in found])
+            return covariance, [moved.memory for moved in found]
 
         left, right = result.situation.sensor
         prediction = Prediction(
@@ -386,7 +380,7 @@ class Session:
             lambda: varied()[0],
             warnings=result.warnings,
         )
-        return prediction, later, varied
+        return prediction, result.memory, varied
 
 
 def _only(rows: Array | None) -> Array | None:

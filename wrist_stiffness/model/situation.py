@@ -11,18 +11,12 @@ from numpy.typing import NDArray
 from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.energy import component_wrenches
-from wrist_stiffness.mechanism.influence import Influence, influence
+from wrist_stiffness.mechanism.influence import Influence
 from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
-from wrist_stiffness.mechanism.statics import (
-    ContactOperators,
-    component_rotations,
-    contact_operators,
-    slides,
-    turned_flexibilities,
-    weight_response,
-)
+from wrist_stiffness.mechanism.statics import ContactOperators, component_rotations, slides
 from wrist_stiffness.mechanism.vectors import block_diagonal, dot
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.contacts import Held, forces_of, solve_contacts
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
@@ -39,18 +33,8 @@ class Situation:
 
     Parameters
     ----------
-    block : Block
-        The samples, with speeds.
-    load : (n, 6) float
-        What the load sensor says, in F at O [N, N m].
-    configuration : Configuration
-        Of shape (n,).
-    evaluation : str
-        `closed_form` or `spline`.
-    table : Table
-        Geometry and mechanism.
-    parts : ElasticComponents
-        Elastic parts as they are with the model's effects.
+    statics : BlockStatics
+        Samples, configurations, and what the table says of them with the model's elastic parts.
     constants : Constants
         Sum of what the model's constant effects add.
     given : Contribution
@@ -59,38 +43,62 @@ class Situation:
         First guess of the contact state.
     """
 
-    block: Block
-    load: Array
-    configuration: Configuration
-    evaluation: Evaluation
-    table: Table
-    parts: ElasticComponents
+    statics: BlockStatics
     constants: Constants = Constants()
     given: Contribution = NOTHING
     guess: NDArray[np.bool_] | Held | None = None
 
-    @cached_property
+    @property
+    def block(self) -> Block:
+        """The samples, with speeds."""
+        return self.statics.block
+
+    @property
+    def load(self) -> Array:
+        """What the load sensor says, in F at O, (n, 6) [N, N m]."""
+        return self.statics.load
+
+    @property
+    def configuration(self) -> Configuration:
+        """Configurations of shape (n,)."""
+        return self.statics.configuration
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """`closed_form` or `spline`."""
+        return self.statics.evaluation
+
+    @property
+    def table(self) -> Table:
+        """Geometry and mechanism."""
+        return self.statics.table
+
+    @property
+    def parts(self) -> ElasticComponents:
+        """Elastic parts as they are with the model's effects."""
+        return self.statics.parts
+
+    @property
     def operators(self) -> ContactOperators:
-        """Elastic operators of shape (n,), of the parts as they are with the model's effects."""
-        if self.evaluation == "spline":
-            return self.table.operators_at(self.configuration, "spline")
-        return contact_operators(self.configuration, self.parts, self.table.geometry.gravity)
+        """Elastic operators of shape (n,)."""
+        return self.statics.operators
+
+    @property
+    def influence(self) -> Influence:
+        """Projectors of the configurations."""
+        return self.statics.influence
+
+    @property
+    def jacobian(self) -> Array:
+        """Jacobian of the platform's angular velocity, (n, 3, 2)."""
+        return self.statics.jacobian
 
     @cached_property
     def acting(self) -> Contribution:
         """All that constant effects and earlier stages added."""
         return self.given + self.constants.at(self.configuration)
 
-    @cached_property
-    def influence(self) -> Influence:
-        """Projectors of the configurations."""
-        return influence(self.configuration)
-
-    @cached_property
-    def _turned_flexibility(self) -> Array:
-        return turned_flexibilities(self.configuration, self.parts)
-
-    @cached_property
+    @property
     def speed(self) -> Array:
         """Motor speeds, (n, 2) [rad/s]."""
         speed = self.block.theta_dot
@@ -142,22 +150,9 @@ class Situation:
         return Contribution(**{LIMB[motor]: screw})
 
     @cached_property
-    def own_weight(self) -> Array:
-        """Wrench of own weight through the elastic components, (n, 8, 6) [N, N m]."""
-        return weight_response(self.configuration, self.parts, self.table.geometry.gravity).wrench
-
-    @cached_property
-    def told(self) -> tuple[Array, Array]:
-        """Twist and gaps under the told load and own weight alone, slides free, (n, 6), (n, m)."""
-        column, operators = self.load[..., None], self.operators
-        twist = operators.weight_twist + (operators.compliance @ column)[..., 0]
-        gap = operators.gap + (np.swapaxes(operators.force_twist, -1, -2) @ column)[..., 0]
-        return twist, gap
-
-    @cached_property
     def free(self) -> tuple[Array, Array]:
         """Twist and gaps under all that earlier stages added, slides free, (n, 6), (n, m)."""
-        (twist, gap), added = self.told, self.carried(self.acting)
+        (twist, gap), added = self.statics.told, self.carried(self.acting)
         return twist + added[0], gap + added[1]
 
     @cached_property
@@ -171,7 +166,7 @@ class Situation:
 
         Own weight and contact included, (n, 8, 6) at O in F [N, N m].
         """
-        through = self.own_weight + component_wrenches(
+        through = self.statics.own_weight + component_wrenches(
             self.configuration, self.parts, self.wrench, self.contact_force
         )
         return through if self.acting.through is None else through + self.acting.through
@@ -190,7 +185,7 @@ class Situation:
     def elastic_screw(self, place: str) -> Array:
         """Return C_k W_k of a link or bushing, (n, 6) at O in F [m, rad]."""
         k = ELASTIC.index(place)
-        return (self._turned_flexibility[:, k] @ self.through[:, k, :, None])[..., 0]
+        return (self.statics.turned_flexibility[:, k] @ self.through[:, k, :, None])[..., 0]
 
     def screws_under(self, through: Array, force: Array) -> Array:
         """Return the elastic screw of each component; a bushing's flanges belong to it.
@@ -207,7 +202,7 @@ class Situation:
         (n, 8, 6) float
             At O in F [m, rad].
         """
-        screws: Array = (self._turned_flexibility @ through[..., None])[..., 0]
+        screws: Array = (self.statics.turned_flexibility @ through[..., None])[..., 0]
         own = self.parts.sectors.component
         turn = block_diagonal(component_rotations(self.configuration).take(own, axis=-3))
         pressed = np.einsum("nmij,mj,nm->nmi", turn, self.parts.sectors.screw, force)
@@ -273,7 +268,7 @@ class Situation:
             twist += (self.operators.compliance @ column)[..., 0]
             gap += (np.swapaxes(self.operators.force_twist, -1, -2) @ column)[..., 0]
         if added.through is not None:
-            bent = (self._turned_flexibility @ added.through[..., None])[..., 0]
+            bent = (self.statics.turned_flexibility @ added.through[..., None])[..., 0]
             twist += _halves(projectors.of_components(), bent).sum(axis=-2)
             gap += slides(projectors, bent) @ sectors.slide.T
             for sector, k in enumerate(sectors.component):
@@ -314,7 +309,7 @@ class Situation:
             [rad/(N m)].
         """
         row = self.influence.slides()[..., PASSIVE_JOINTS.index(joint), :]
-        flexibility = self._turned_flexibility
+        flexibility = self.statics.turned_flexibility
         slide = np.einsum("nki,nkij,nkj->n", row, flexibility[..., :3, :3], row)
         turn = np.einsum("nki,nkij,nkj->n", row, flexibility[..., 3:, 3:], row)
         return slide, turn
@@ -330,11 +325,6 @@ class Situation:
                 [row * force[:, None, None], row * torque[:, None, None]], axis=-1
             )
         )
-
-    @cached_property
-    def jacobian(self) -> Array:
-        """Jacobian of the platform's angular velocity, (n, 3, 2)."""
-        return self.table.mechanism.jacobian(self.configuration)
 
     def covariate(self, name: str) -> Array:
         """Return a covariate, (n,)."""

@@ -1,0 +1,94 @@
+"""What the table says of a block, whatever effects are there, those of the elastic parts aside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.influence import Influence, influence
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.statics import (
+    ContactOperators,
+    contact_operators,
+    turned_flexibilities,
+    weight_response,
+)
+from wrist_stiffness.model.block import Block
+
+
+@dataclass(frozen=True, eq=False)
+class BlockStatics:
+    """n samples at their configurations with elastic parts.
+
+    Models that share it share the work: nothing is computed before it is asked for, or twice.
+
+    Parameters
+    ----------
+    block : Block
+        The samples, with speeds.
+    load : (n, 6) float
+        What the load sensor says, in F at O [N, N m].
+    configuration : Configuration
+        Of shape (n,).
+    evaluation : str
+        `closed_form` or `spline`.
+    table : Table
+        Geometry and mechanism.
+    parts : ElasticComponents
+        Elastic parts as they are with a model's effects.
+    """
+
+    block: Block
+    load: Array
+    configuration: Configuration
+    evaluation: Evaluation
+    table: Table
+    parts: ElasticComponents
+
+    def with_parts(self, parts: ElasticComponents) -> BlockStatics:
+        """Return the statics of the same samples with other parts."""
+        other = replace(self, parts=parts)
+        # The free slides make the wrist isostatic: its own weight finds its way without springs.
+        for name in ("influence", "jacobian", "own_weight"):
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
+
+    @cached_property
+    def operators(self) -> ContactOperators:
+        """Elastic operators of shape (n,)."""
+        if self.evaluation == "spline":
+            return self.table.operators_at(self.configuration, "spline")
+        return contact_operators(self.configuration, self.parts, self.table.geometry.gravity)
+
+    @cached_property
+    def influence(self) -> Influence:
+        """Projectors of the configurations."""
+        return influence(self.configuration)
+
+    @cached_property
+    def turned_flexibility(self) -> Array:
+        """Flexibility of each component at O in F, (n, 8, 6, 6) [m/N, rad/N, rad/(N m)]."""
+        return turned_flexibilities(self.configuration, self.parts)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Jacobian of the platform's angular velocity, (n, 3, 2)."""
+        return self.table.mechanism.jacobian(self.configuration)
+
+    @cached_property
+    def own_weight(self) -> Array:
+        """Wrench of own weight through the elastic components, (n, 8, 6) [N, N m]."""
+        return weight_response(self.configuration, self.parts, self.table.geometry.gravity).wrench
+
+    @cached_property
+    def told(self) -> tuple[Array, Array]:
+        """Twist and gaps under the told load and own weight alone, slides free, (n, 6), (n, m)."""
+        column, operators = self.load[..., None], self.operators
+        twist = operators.weight_twist + (operators.compliance @ column)[..., 0]
+        gap = operators.gap + (np.swapaxes(operators.force_twist, -1, -2) @ column)[..., 0]
+        return twist, gap

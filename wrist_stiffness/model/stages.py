@@ -1,0 +1,311 @@
+"""Carry a model's effects through the stages at a block: what each one sees, adds and remembers.
+
+Models at one block often share effects.  What an effect did is taken over where the other one saw
+the same thing: the same object, with the same state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.block_statics import BlockStatics
+from wrist_stiffness.model.constants import Constants
+from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.law import STAGES
+from wrist_stiffness.model.situation import Situation, lengths
+
+FIRST_ORDER_LIMIT = 2e-3
+"""A screw that turns by more than this has left first order [rad]."""
+
+SAMPLE_STAGES = STAGES[1:]
+
+
+class Evaluable(Protocol):
+    """What an evaluation must know of a model."""
+
+    @property
+    def table(self) -> Table:
+        """Elastic lookup of the wrist."""
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """`closed_form` or `spline`."""
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """In the order in which they entered."""
+
+    @property
+    def parts(self) -> ElasticComponents:
+        """Elastic parts with the effects that change them."""
+
+    @property
+    def constants(self) -> Constants:
+        """What the constant effects add together."""
+
+    @property
+    def single_pose(self) -> SinglePoseStatics:
+        """The closed form for one pose at a time, with the constants' screws and gaps."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What an evaluation leaves for the next block.
+
+    Parameters
+    ----------
+    states : tuple
+        State of each effect.
+    time : float
+        Of the last sample [s].
+    theta : (2,) float
+        Its motor angles [rad].
+    active : (m,) bool
+        Its contact state.
+    """
+
+    states: tuple[Any, ...]
+    time: float
+    theta: Array
+    active: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Advanced:
+    """What one effect did at a block.
+
+    Parameters
+    ----------
+    effect : Effect
+        Which one.
+    at : Situation
+        What it saw.
+    before, after : object
+        Its state.
+    added : Contribution
+        What it added.
+    warnings : tuple of str
+        That it lacks a signal, or that it is past first order.
+    """
+
+    effect: Effect
+    at: Situation
+    before: Any
+    added: Contribution
+    after: Any
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Staged:
+    """A model's effects at a block after all stages; what they do to the platform is still open.
+
+    Parameters
+    ----------
+    situations : tuple of Situation
+        Before the first stage, and after each one.
+    advanced : tuple of Advanced or None
+        Of each effect; None for constant ones, which were put together before.
+    warnings : tuple of str
+        Of all effects.
+    """
+
+    situations: tuple[Situation, ...]
+    advanced: tuple[Advanced | None, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def last(self) -> Situation:
+        """With all that the effects added."""
+        return self.situations[-1]
+
+    @cached_property
+    def known(self) -> dict[int, Advanced]:
+        """What the effects did, by their identities."""
+        return {id(each.effect): each for each in self.advanced if each is not None}
+
+    def added(self, stage: str) -> list[Contribution]:
+        """Return what the effects of a stage added."""
+        return [e.added for e in self.advanced if e is not None and e.effect.stage == stage]
+
+    def memory(self, active: NDArray[np.bool_]) -> Memory:
+        """Return what is left for the next block, with the contact state (n, m)."""
+        block = self.last.block
+        states = tuple(None if each is None else each.after for each in self.advanced)
+        return Memory(states, float(block.time[-1]), block.theta[-1], active[-1])
+
+
+def staged(
+    model: Evaluable, start: Situation, memory: Memory | None, like: Staged | None = None
+) -> Staged:
+    """Carry a model's effects through the stages.
+
+    Parameters
+    ----------
+    model : Evaluable
+        Effects, and what the constant ones add together.
+    start : Situation
+        The block with what the constant effects add.
+    memory : Memory or None
+        What the block before left, None at the start.
+    like : Staged, optional
+        Another model at the same block.
+    """
+    states = memory.states if memory else (None,) * len(model.effects)
+    changing = [n for n, effect in enumerate(model.effects) if not effect.law.constant]
+    advanced: list[Advanced | None] = [None] * len(model.effects)
+    situations, warnings = [start], list(model.constants.warnings)
+    for number, stage in enumerate(SAMPLE_STAGES):
+        at, added = situations[-1], []
+        for n in (n for n in changing if model.effects[n].stage == stage):
+            found = _advanced(model.effects[n], at, states[n], like)
+            advanced[n] = found
+            added.append(found.added)
+            warnings += found.warnings
+        situations.append(_after(at, added, like, number))
+    return Staged(tuple(situations), tuple(advanced), tuple(warnings))
+
+
+def _advanced(effect: Effect, at: Situation, state: Any, like: Staged | None) -> Advanced:
+    # A user's own law may write into its state.
+    known = None if like is None or effect.law.foreign else like.known.get(id(effect))
+    if known is not None and known.at is at and known.before is state:
+        return known
+    try:
+        added, after = _advanced_by(effect, at, state)
+    except MissingSignalError as missing:
+        lacking = f"{effect.name}: {missing.signal} is missing, left out"
+        return Advanced(effect, at, state, NOTHING, state, (lacking,))
+    return Advanced(effect, at, state, added, after, _first_order(effect, added))
+
+
+def _after(
+    at: Situation, added: Sequence[Contribution], like: Staged | None, number: int
+) -> Situation:
+    """Return the situation after a stage."""
+    if not added:
+        return at
+    if like is not None and like.situations[number] is at:
+        other = like.added(SAMPLE_STAGES[number])
+        if len(other) == len(added) and all(map(_same, other, added)):
+            return like.situations[number + 1]
+    return replace(at, given=sum(added, at.given))
+
+
+def _same(one: object, other: object) -> bool:
+    return one is other
+
+
+def constants_of(
+    effects: Sequence[Effect],
+    table: Table,
+    parts: ElasticComponents,
+    known: dict[int, Contribution] | None = None,
+) -> Constants:
+    """Put the constant ones of some effects together, as they are at home.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of a model.
+    table : Table
+        Geometry and mechanism.
+    parts : ElasticComponents
+        Elastic parts as they are with the model's effects.
+    known : dict of int to Contribution, optional
+        What effects add at home, by their identities, for models that share them; filled.
+    """
+    constants = Constants()
+    known = {} if known is None else known
+    home: Situation | None = None
+    for effect in effects:
+        if not effect.law.constant:
+            continue
+        # Only a user's own law may look at the parts.
+        if effect.law.foreign or id(effect) not in known:
+            home = home or _home(table, parts)
+            known[id(effect)], _ = _advanced_by(effect, home, None)
+        added = known[id(effect)]
+        constants = constants.with_home(effect.component, added, _first_order(effect, added))
+    return constants
+
+
+def share(models: Sequence[Evaluable]) -> None:
+    """Let models of one table share what follows from effects that they share with the first."""
+    home: dict[int, Contribution] = {}
+    for model in models:
+        for name, chosen in (("parts", _of_parts), ("constants", _of_constants)):
+            if chosen(model) == chosen(models[0]):
+                model.__dict__[name] = getattr(models[0], name)
+        if "constants" not in model.__dict__:
+            own = constants_of(model.effects, model.table, model.parts, home)
+            model.__dict__["constants"] = own
+
+
+def _of_parts(model: Evaluable) -> list[Effect]:
+    return [effect for effect in model.effects if effect.stage == "parts"]
+
+
+def _of_constants(model: Evaluable) -> list[Effect]:
+    """Return the effects that decide what the constant ones add together."""
+    constant = [effect for effect in model.effects if effect.law.constant]
+    return constant + _of_parts(model) if any(e.law.foreign for e in constant) else constant
+
+
+def _home(table: Table, parts: ElasticComponents) -> Situation:
+    block = Block(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 6)), np.zeros((1, 2)))
+    home = table.mechanism.forward(block.theta)
+    return Situation(BlockStatics(block, block.load, home, "closed_form", table, parts))
+
+
+def with_speeds(block: Block, memory: Memory | None) -> Block:
+    """Return the block with motor speeds, by backward differences where it has none."""
+    if block.theta_dot is not None:
+        return block
+    first = (block.time[0], block.theta[0]) if memory is None else (memory.time, memory.theta)
+    interval = np.diff(block.time, prepend=first[0])[:, None]
+    step = np.diff(block.theta, axis=0, prepend=first[1][None])
+    speed = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
+    return replace(block, theta_dot=speed)
+
+
+def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution, Any]:
+    """Call a law; whatever goes wrong in a user's own becomes an error that names it."""
+    if not effect.law.foreign:
+        return effect.law.advance(at, effect.component, effect.si, state)
+    try:
+        added, state = effect.law.advance(at, effect.component, effect.si, state)
+        added.check(len(at.block), len(at.parts.sectors.gap))
+    except MissingSignalError:
+        raise
+    except WristError as error:
+        raise InputError(f"{effect.name}: {error}") from error
+    except Exception as error:
+        raise InputError(f"{effect.name}: {type(error).__name__}: {error}") from error
+    return added, state
+
+
+def _first_order(effect: Effect, added: Contribution) -> tuple[str, ...]:
+    turned = [
+        float(np.max(lengths(screw[:, 3:])))
+        for screw in (added.limb_1, added.limb_2, added.both)
+        if screw is not None
+    ]
+    if turned and max(turned) > FIRST_ORDER_LIMIT:
+        return (
+            f"{effect.name}: turns by {1e3 * max(turned):.2f} mrad, past the first order "
+            f"({1e3 * FIRST_ORDER_LIMIT:g} mrad) in which it is carried",
+        )
+    return ()
