@@ -22,7 +22,12 @@ from wrist_stiffness.workflows.fit_report import (
     untold_lines,
     used_lines,
 )
-from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+from wrist_stiffness.workflows.read_sessions import (
+    Recordings,
+    read_sessions,
+    recording_sha256,
+    was_fitted_to,
+)
 
 Progress = Callable[[int, int], None]
 
@@ -142,7 +147,8 @@ def calibrate_model(
     parent = load_model(model)
     sessions = read_sessions(recordings, parent.table, progress)
     step = run.step(model, sessions)
-    found = calibrate(parent, tuple(sessions.values()), hold_out, progress)
+    again = was_fitted_to(parent, sessions)
+    found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
     save_model(child, output)
     return Calibrated(found, tuple(sessions.values()), output)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.model_file import file_sha256, load_model
@@ -16,7 +17,12 @@ from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import remarks_of
 from wrist_stiffness.workflows.fit_report import plus_minus
 from wrist_stiffness.workflows.provenance import Provenance
-from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+from wrist_stiffness.workflows.read_sessions import (
+    Recordings,
+    read_sessions,
+    recording_sha256,
+    was_fitted_to,
+)
 from wrist_stiffness.workflows.verdict import class_of, verdict_lines
 
 if TYPE_CHECKING:
@@ -134,9 +140,10 @@ def diagnose_recordings(
     """
     loaded = load_model(model)
     sessions = read_sessions(recordings, loaded.table, progress("reading"))
+    known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
     rng = np.random.default_rng(SEED)
     answer = diagnose_sessions(
-        loaded, list(sessions.values()), rng, progress=progress("trying effects")
+        known, list(sessions.values()), rng, progress=progress("trying effects")
     )
     hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
     return Diagnosed(

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.extend import Extension, extend
+from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
@@ -29,7 +30,7 @@ from wrist_stiffness.workflows.fit_report import (
     told_lines,
     used_lines,
 )
-from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, was_fitted_to
 
 Progress = Callable[[int, int], None]
 
@@ -296,6 +297,7 @@ def extend_model(
     covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
     effect = addition.effect(sorted(covariates))
     step = run.step(model, sessions)
-    found = extend(parent, effect, measured, progress)
+    known = unfitted(parent) if was_fitted_to(parent, sessions) else parent
+    found = extend(known, effect, measured, progress)
     save_model(replace(found.model, lineage=(*parent.lineage, step)), output)
     return Extended(found, measured)

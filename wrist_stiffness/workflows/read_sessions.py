@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256
 
 
@@ -78,6 +79,12 @@ def read_sessions(
         for path, session in found.items()
     }
     return dict(sorted(named.items(), key=lambda item: float(item[1].block.time[0])))
+
+
+def was_fitted_to(model: ErrorModel, recordings: Iterable[Path]) -> bool:
+    """Tell whether a model was fitted to one of these recordings, whatever they are called now."""
+    known = {sha256 for step in model.lineage for sha256 in step.recordings.values()}
+    return any(recording_sha256(path) in known for path in recordings)
 
 
 def recording_sha256(path: Path) -> str:

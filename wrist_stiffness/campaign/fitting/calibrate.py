@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
-from wrist_stiffness.campaign.fitting.free_effects import commissioning
+from wrist_stiffness.campaign.fitting.free_effects import commissioning, unfitted
 from wrist_stiffness.campaign.fitting.judge import Judged, judged, judged_by_itself
 from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
-from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.campaign.observing import UnitSession, as_units
 from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
@@ -77,6 +77,7 @@ def calibrate(
     sessions: Sequence[MeasuredSession],
     hold_out: bool = False,
     progress: Progress = silent,
+    again: bool = False,
 ) -> Calibration:
     """Fit what differs from session to session and from wrist to wrist.
 
@@ -91,6 +92,9 @@ def calibrate(
         fifth of the only one.
     progress : callable
         Told steps done and steps at most.
+    again : bool
+        Whether the model was fitted to one of these sessions before: then what it found is no
+        knowledge to begin with.
 
     Returns
     -------
@@ -103,21 +107,22 @@ def calibrate(
         If nothing is measured, or nothing is free.
     """
     calibrated = said_calibrated(sessions)
-    free, held = commissioning(model, calibrated)
+    start = unfitted(model) if again else model
+    free, held = commissioning(start, calibrated)
     if not free:
         raise InputError(
             f"nothing is left to calibrate: the notes of the recordings say under {CALIBRATED!r} "
             f"that {', '.join(calibrated)} need no fit"
         )
     units = tuple(as_units(model, session) for session in sessions)
-    problem = FitProblem(model.with_effects(*held), units, free)
+    problem = FitProblem(start.with_effects(*held), units, free)
     if hold_out:
         seen = judged(problem, progress=progress)
         found = fit(problem, start_of(problem, seen.fit.problem, seen.fit.z), progress=progress)
     else:
         found = fit(problem, progress=progress)
         seen = judged_by_itself(found)
-    return Calibration(found, as_it_stands(problem, seen), seen, calibrated)
+    return Calibration(found, as_it_stands(model, units, seen), seen, calibrated)
 
 
 def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:
@@ -137,9 +142,12 @@ def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:
     return tuple(sorted(set.intersection(*said))) if said else ()
 
 
-def as_it_stands(problem: FitProblem, seen: Judged) -> dict[str, float]:
-    """Return the error of the start on the units that judge, RMS by the key of the quantity."""
-    residual = problem.table.with_values(problem.residual(np.zeros(len(problem.unknowns))))
+def as_it_stands(
+    model: ErrorModel, units: tuple[UnitSession, ...], seen: Judged
+) -> dict[str, float]:
+    """Return the error of a model on the units that judge, RMS by the key of the quantity."""
+    problem = FitProblem(model, units, ())
+    residual = problem.table.with_values(problem.residual(np.empty(0)))
     rows = np.isin(problem.table.rows, seen.rows)
     values = np.where(seen.observations.measured, residual.values[rows], np.nan)
     left = HeldOut(values, np.empty(0))

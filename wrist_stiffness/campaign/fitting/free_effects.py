@@ -117,3 +117,20 @@ def commissioning(
         if name not in free and (again := refitted(effect)).scale:
             free[name] = again
     return tuple(free.values()), tuple(own[name] for name in own if name not in free)
+
+
+def unfitted(model: ErrorModel) -> ErrorModel:
+    """Return a model without what a fit has found of its set-up and of the wrist's tolerances.
+
+    For another fit to the same data.  They would count twice, first as knowledge; and what stood in
+    for a missing effect would go on standing in for it, at no price.
+    """
+    laws = {law for law, _ in (*SET_UP, *BUILT)}
+    return model.with_effects(
+        *(
+            effect
+            for effect in model.effects
+            if effect.law.id not in laws
+            or all(estimate.sigma == 0.0 for estimate in effect.estimates.values())
+        )
+    )
