@@ -16,6 +16,7 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import QUANTITIES, Observed, UnitSession, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
+from wrist_stiffness.campaign.searching.refit import refit, withdrawn
 from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Screen
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
@@ -52,9 +53,9 @@ class WristDiagnosis:
     observed : Observed
         Table of what the refitted base leaves.
     effects : tuple of Effect
-        Best member of each finding, with the values found: where a fit may begin.
+        Best member of each finding, fitted with its own law.
     base : BaseFit
-        The refitted base.
+        Fitted along with these.
     """
 
     diagnosis: Diagnosis
@@ -104,12 +105,17 @@ def diagnose_sessions(
     )
     result = replace(result, absorbed=_absorbed(base, [session.name for session in sessions]))
     known = {each.name: each for each in candidates}
-    fitted = _fitted_extras(base)
-    effects = tuple(
-        fitted.get(each.name) or _started(known[each.name], each.parameters)
+    found = _fitted_extras(base)
+    named = [
+        found.get(each.name) or _started(known[each.name], each.parameters)
         for each in result.findings
-    )
-    return WristDiagnosis(result, observed, effects, base)
+    ]
+    share = (settings or Settings()).sealed_share
+    final = refit(model, base, named, share)
+    effects = _fitted_extras(final)
+    result = withdrawn(result, len(effects))
+    kept = tuple(effects[each.name] for each in result.findings)
+    return WristDiagnosis(result, observed, kept, final)
 
 
 def seek_point(

@@ -1,0 +1,147 @@
+"""What was named is fitted with its own law, and stays only if it foretells what it has not seen.
+
+The search compares columns, which are tangents.  The values by which the nodes would compensate
+come from the laws themselves, the base along with them; and nothing is added to a model that makes
+the units put aside worse than the base alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wrist_stiffness.campaign.observing import UnitSession
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.units import Mask
+from wrist_stiffness.diagnosis import Diagnosis
+from wrist_stiffness.diagnosis.sealed import sealed_units
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+
+Sessions = tuple[UnitSession, ...]
+
+ROUGH = 2.0
+"""Variance of what is left, in units of the noise, from which a law is not taken as exact."""
+
+
+def refit(
+    model: ErrorModel, base: BaseFit, named: Sequence[Effect], sealed_share: float
+) -> BaseFit:
+    """Return the base fitted along with as much of what was named as holds.
+
+    Where the laws leave much more than noise, what entered last is taken out for as long as the
+    units put aside come out worse with the effects than without.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What was known beforehand.
+    base : BaseFit
+        From the search: where the fit begins.
+    named : sequence of Effect
+        In the order of entry, with the values from which they begin.
+    sealed_share : float
+        Part of a single session that is put aside; of several it is the last one.
+    """
+    kept = list(named)
+    fitted = _along(model, base, kept)
+    if not kept or _variance(fitted) < ROUGH:
+        return fitted
+    sessions = fitted.problem.sessions
+    aside = sealed_units(fitted.problem.table, sealed_share)
+    seen = blanked(sessions, aside)
+    alone = unseen(fit_base(model, seen), sessions, aside, fitted)
+    while kept:
+        trial = fit_base(model, seen, kept, fitted)
+        if unseen(trial, sessions, aside, fitted) < alone:
+            break
+        kept.pop()
+        fitted = _along(model, base, kept)
+    return fitted
+
+
+def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
+    if {each.name for each in named} == set(base.extras):
+        return base
+    # A base that had effects along which are not named stands where those left it.
+    return fit_base(model, base.problem.sessions, named, base if named else None)
+
+
+def _variance(fitted: BaseFit) -> float:
+    """Return the variance of what is left, in units of the noise."""
+    left = fitted.whiten(fitted.residual)
+    return float(left @ left / max(np.count_nonzero(left), 1))
+
+
+def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
+    """Return an answer without the findings that entered last, and say so.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        With all its findings.
+    kept : int
+        How many of them stay.
+    """
+    gone, stay = result.findings[kept:], result.findings[:kept]
+    if not gone:
+        return result
+    after = {
+        key: error - sum(finding.buys[key][0] for finding in stay)
+        for key, error in result.before.items()
+    }
+    sentences = [result.unexplained.evidence] if result.unexplained.evidence else []
+    sentences += [f"{each.name} with its own law makes the sealed part worse" for each in gone]
+    unexplained = replace(result.unexplained, evidence="; ".join(sentences))
+    return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
+
+
+def blanked(sessions: Sessions, aside: Mask) -> Sessions:
+    """Return the sessions with nothing measured in units put aside, (u,) bool of the table."""
+    parts, start = [], 0
+    for each in sessions:
+        rows = np.flatnonzero(each.measured)
+        own = rows[aside[start : start + len(rows)]]
+        start += len(rows)
+        shift, turn = each.shift.copy(), each.turn.copy()
+        shift[own], turn[own] = np.nan, np.nan
+        parts.append(replace(each, shift=shift, turn=turn))
+    return tuple(parts)
+
+
+def unseen(fitted: BaseFit, sessions: Sessions, aside: Mask, whole: BaseFit) -> float:
+    """Return the weighted sum of squares of units put aside.
+
+    What is set up anew in a session of which the fit saw nothing is taken from the fit that saw
+    all, and refitted to first order; everything else keeps its value.
+
+    Parameters
+    ----------
+    fitted : BaseFit
+        To the units that were left.
+    sessions : tuple of UnitSession
+        With all that was measured.
+    aside : (u,) bool
+        Units of the table that were put aside.
+    whole : BaseFit
+        A fit to all units.
+    """
+    problem = replace(fitted.problem, sessions=sessions)
+    known = {_key(whole, n): z for n, z in enumerate(whole.z)}
+    blank = {n for n, each in enumerate(fitted.problem.sessions) if not each.measured.any()}
+    fresh = [n for n, unknown in enumerate(problem.unknowns) if unknown.session in blank]
+    z = fitted.z.copy()
+    z[fresh] = [known[_key(fitted, n)] for n in fresh]
+    rows = np.repeat(aside, 6)
+    left = problem.whiten(problem.residual(z))[rows]
+    if fresh:
+        columns = problem.whiten(problem.columns(z, places=fresh))[rows]
+        left = left + columns @ np.linalg.lstsq(columns, -left, rcond=1e-9)[0]
+    return float(left @ left)
+
+
+def _key(fitted: BaseFit, number: int) -> tuple[str, str, int | None]:
+    unknown = fitted.problem.unknowns[number]
+    return fitted.problem.free[unknown.free].effect.name, unknown.key, unknown.session
