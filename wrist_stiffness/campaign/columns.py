@@ -17,6 +17,9 @@ from wrist_stiffness.model.evaluation import evaluate
 
 Effects = tuple[Effect, ...]
 
+WITHIN_A_UNIT = ("transmission_error",)
+"""Laws that a unit in motion may see more than a wave of: no mean angle stands for it."""
+
 AT_A_TIME = 40
 """Trials evaluated together: they share the work of the base, and their results are in memory."""
 
@@ -67,11 +70,25 @@ class SessionModel:
             first = self.session.block.take(slice(0, 1))
             usual = Effect(effect.law, effect.component)
             memory = evaluate(self.model.with_effects(usual), first, None).memory
-            self._memories[effect.name] = memory.states[0] is not None
+            alike = effect.law.id not in WITHIN_A_UNIT
+            self._memories[effect.name] = not alike or memory.states[0] is not None
         return self._memories[effect.name]
 
+    def along(self, trials: Sequence[Effects]) -> list[Array]:
+        """Return what the sensor would say of each unit, from all moments of its path, (u, 6).
+
+        In motion the mean of a pose is not the pose at the mean angles: a target a millimetre off
+        bends that by micrometres.
+        """
+        bare = self.model.with_effects()
+        return [
+            self.session.mean(found.measured)
+            for start in range(0, len(trials), AT_A_TIME)
+            for found in bare.batch_with(self.session.block, trials[start : start + AT_A_TIME])
+        ]
+
     def predicted(self, trials: Sequence[Effects]) -> list[Array]:
-        """Return what the sensor would say of each unit under each set of effects, (u, 6)."""
+        """Return the same, good enough for differences: the path only where an effect needs it."""
         bare = self.model.with_effects()
         path = [self.remembers(trial) for trial in trials]
         out: list[Array] = [np.empty(0)] * len(trials)

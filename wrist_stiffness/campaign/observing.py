@@ -88,6 +88,19 @@ class UnitSession:
         sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
         return np.asarray(np.stack(sums, axis=1).reshape(units, *values.shape[1:]), dtype=float)
 
+    def counts(self, step: float) -> Array:
+        """Return how many encoder counts of their own the means of the angles know, (u, 2).
+
+        A motor at rest hides the same part of a count all the time.
+        """
+        used = self.cut.unit >= 0
+        unit, theta = self.cut.unit[used], self.block.theta[used]
+        low, high = np.full((2, len(self.cut.dwell), 2), np.nan)
+        np.fmin.at(low, unit, theta)
+        np.fmax.at(high, unit, theta)
+        moments = np.bincount(unit, minlength=len(low))[:, None]
+        return np.clip((high - low) / step, 1.0, np.where(self.cut.dwell[:, None], 1.0, moments))
+
     def residual(self, twist: Array) -> Array:
         """Return log(T_measured T_predicted^-1) at O in F, (u, 6) [m, rad].
 
@@ -313,7 +326,8 @@ def _covariance(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Arr
     mechanism, step = model.table.mechanism, model.table.geometry.limits.encoder_step
     jacobian = np.zeros((len(theta), 6, 2))
     jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
-    counts = jacobian @ np.swapaxes(jacobian, -1, -2) * step**2 / 12.0
+    hidden = np.concatenate([step**2 / 12.0 / each.counts(step) for each in sessions])
+    counts = (jacobian * hidden[:, None, :]) @ np.swapaxes(jacobian, -1, -2)
     white = np.stack([each.white for each in sessions])
     seen = np.concatenate([np.concatenate([e.shift, e.turn], axis=1) for e in sessions])
     if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():

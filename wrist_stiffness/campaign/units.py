@@ -1,8 +1,9 @@
 """Cut one session into units: what counts as one measurement, and the moments that tell its path.
 
-A unit is a dwell (angles and load at rest) or a single moment in motion.  The path between them
-matters to effects with a memory, so moments are kept that tell it: both ends of every rest,
-log-spaced moments within, regular ones in motion, and the turning points.
+A unit is a dwell (angles and load at rest) or a few moments of a motion.  In motion each moment
+hides an encoder count of its own, so the mean of a few knows the angles better than any rest does.
+The path between units matters to effects with a memory, so moments are kept that tell it: both
+ends of every rest, log-spaced moments within, regular ones in motion, and the turning points.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ WINDOW_S = 0.15
 PATH_S = 0.1
 """Time between the moments that are kept in motion."""
 
-UNIT_EVERY = 5
-"""One kept moment in so many counts as a unit in motion."""
+UNIT_S = 0.5
+"""Regular moments within this time of a motion are one unit."""
 
 MOST_MOVING, MOST_ON_PATH = 300, 2500
 """So many units in motion, and moments that tell the path, are enough of however long a session."""
@@ -118,7 +119,7 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     held_s: Array = np.where(resting, block.time - block.time[start[stretch]], 0.0)
     kept, in_motion = _moments(block.time, stretch, start, resting, speed, measured)
     smooth = _smoothed(block, before, after, stretch, resting, speed)
-    label, dwell = _units(stretch, resting, kept, in_motion)
+    label, dwell = _units(block.time, stretch, resting, in_motion)
     unit = label[kept]
     return Cut(
         label,
@@ -126,7 +127,7 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
         kept,
         smooth.take(kept),
         unit,
-        _weights(block.time[kept], unit, len(dwell)),
+        _weights(block.time[kept], unit, dwell),
         held_s,
         np.where(resting[kept, None], 0.0, speed[kept]),
         last_load > last_turn,
@@ -228,14 +229,19 @@ def _moments(
     return np.flatnonzero(keep | regular), regular
 
 
-def _units(stretch: Labels, resting: Mask, kept: Labels, regular: Mask) -> tuple[Labels, Mask]:
+def _units(time: Array, stretch: Labels, resting: Mask, regular: Mask) -> tuple[Labels, Mask]:
     """Return the unit of each sample and which units are dwells."""
-    chosen = np.zeros(len(stretch), dtype=bool)
     moments = np.flatnonzero(regular)
-    chosen[moments[:: max(UNIT_EVERY, -(-len(moments) // MOST_MOVING))]] = True
-    starts = chosen | (resting & (np.diff(stretch, prepend=-1) != 0))
-    label = np.where(chosen | resting, np.cumsum(starts) - 1, -1)
-    return label, resting[starts]
+    since = time[moments] - time[np.searchsorted(stretch, stretch[moments])]
+    part = np.floor(since / UNIT_S + 1e-6)
+    new = (np.diff(stretch[moments], prepend=-1) != 0) | (np.diff(part, prepend=-1.0) != 0.0)
+    number = np.cumsum(new) - 1
+    every = -(-int(new.sum()) // MOST_MOVING) or 1
+    starts = resting & (np.diff(stretch, prepend=-1) != 0)
+    starts[moments[new & (number % every == 0)]] = True
+    inside = resting.copy()
+    inside[moments[number % every == 0]] = True
+    return np.where(inside, np.cumsum(starts) - 1, -1), resting[starts]
 
 
 def _smoothed(
@@ -261,14 +267,17 @@ def _smoothed(
     )
 
 
-def _weights(time: Array, unit: Labels, n_units: int) -> Array:
-    """Return the shares of kept moments in the means of their units: the trapezoid rule."""
+def _weights(time: Array, unit: Labels, dwell: Mask) -> Array:
+    """Return the shares of kept moments in the means of their units.
+
+    The trapezoid rule over a rest; in motion the moments kept are those that were measured.
+    """
     same = unit[1:] == unit[:-1]
     half = 0.5 * np.where(same, np.diff(time), 0.0)
     weight = np.append(half, 0.0) + np.append(0.0, half)
     used = unit >= 0
-    total = np.bincount(unit[used], weight[used], minlength=n_units)
-    alone = total == 0.0
-    count = np.bincount(unit[used], minlength=n_units)
-    share = np.where(alone[unit], 1.0 / count[unit], weight / np.where(alone, 1.0, total)[unit])
+    total = np.bincount(unit[used], weight[used], minlength=len(dwell))
+    alike = ~dwell | (total == 0.0)
+    count = np.bincount(unit[used], minlength=len(dwell))
+    share = np.where(alike[unit], 1.0 / count[unit], weight / np.where(alike, 1.0, total)[unit])
     return np.where(used, share, 0.0)

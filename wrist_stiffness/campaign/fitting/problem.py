@@ -227,7 +227,7 @@ class FitProblem:
     def _residuals(self, number: int, additions: Sequence[Sequence[Effect]]) -> list[Array]:
         session = self.sessions[number]
         trials = [(*self.model.effects, *added) for added in additions]
-        return [session.residual(each) for each in self._models[number].predicted(trials)]
+        return [session.residual(each) for each in self._models[number].along(trials)]
 
     @cached_property
     def _models(self) -> tuple[SessionModel, ...]:

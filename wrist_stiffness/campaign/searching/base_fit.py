@@ -132,7 +132,7 @@ class BaseFit:
     def without_extras(self) -> Observed:
         """Return the table of what the base alone leaves where it was fitted with the extras."""
         models = [self.model(n, with_extras=False) for n in range(len(self.problem.sessions))]
-        predicted = np.concatenate([each.predicted([each.effects])[0] for each in models])
+        predicted = np.concatenate([each.along([each.effects])[0] for each in models])
         return tabulate(self.problem.model, self.problem.sessions, predicted)
 
 

@@ -264,12 +264,14 @@ WAVE = "transmission_error"
 
 def _wave(point: Point, place: str) -> Callable[[Shape], Array]:
     turn = point.changes([(catalogue()["encoder_offset"], place, {"offset_mdeg": 1.0})])[0]
-    angle = point.mean(lambda model: model.still.theta[:, MOTORS.index(place)])
+    motor = MOTORS.index(place)
 
     def columns(shape: Shape) -> Array:
-        phase = shape[0] * angle
-        wave = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
-        return turn[:, :, None] * wave[:, None, :]
+        def wave(model: SessionModel) -> Array:
+            phase = shape[0] * model.session.block.theta[:, motor]
+            return model.session.mean(np.stack([np.cos(phase), np.sin(phase)], axis=-1))
+
+        return turn[:, :, None] * point.mean(wave)[:, None, :]
 
     return columns
 
