@@ -22,6 +22,7 @@ from std_srvs.srv import SetBool, Trigger
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
@@ -42,6 +43,9 @@ START_NS = 1_700_000_000_000_000_000
 WIDTH = 1e-3
 HIDDEN = (HiddenEffect("backlash", "motor_1", "single", WIDTH, 5),)
 RATE_HZ = 10.0
+WINDOW = 5
+"""Samples after a motor has turned round in which its correction may turn round once at most."""
+
 SETTLED = 4
 """Samples at one angle and one load after which a rest counts."""
 
@@ -63,15 +67,16 @@ class Wrist:
     def work(self, cell, start_s, seconds, after=lambda step: None):
         """Return samples, commands and loads of a cell's program."""
         time_s = start_s + np.arange(round(seconds * RATE_HZ)) / RATE_HZ
-        wanted, samples, wrench = cell.desired(time_s), [], np.zeros(6)
-        for step, theta in enumerate(wanted):
+        wanted, samples = cell.desired(time_s), []
+        weights = cell.program.load(cell.program.phase(time_s))
+        for step, (theta, load) in enumerate(zip(wanted, weights, strict=True)):
             self.stamp_ns += round(1e9 / RATE_HZ)
-            self.graph.load(self.stamp_ns, wrench)
+            # Not what the sensor of the sample before said: that would be late by a sample.
+            self.graph.load(self.stamp_ns, load)
             samples.append(cell.step(time_s[step], self._answer(theta)))
-            wrench = samples[-1].wrench
             self._tell(samples[-1])
             after(step)
-        return samples, np.hstack([wanted, cell.program.load(cell.program.phase(time_s))])
+        return samples, np.hstack([wanted, weights])
 
     def _answer(self, theta):
         self.graph.publish("/motor_commands", joint_message(self.stamp_ns, "", NAMES, theta))
@@ -116,6 +121,22 @@ def pointing_at_rest(table, samples, conditions):
         counts.append(step / np.sqrt(12.0) * np.linalg.norm(turned))
     assert len(errors) > 50
     return np.sqrt(np.mean(np.square([errors, counts]), axis=1))
+
+
+def most_turns_at_a_reversal(wanted, correction, least):
+    """Return how often a correction changes its direction where its motor does, at worst."""
+    worst = []
+    for angle, added in zip(wanted.T, correction.T, strict=True):
+        sense = 0.0
+        for i, step in enumerate(np.sign(np.diff(angle)), start=1):
+            if step and step == -sense:
+                window = added[i - 1 : i + WINDOW + 1]
+                # Only steps that are larger than what the corrector may leave.
+                moves = np.sign(np.diff(window))[np.abs(np.diff(window)) > least]
+                worst.append(int(np.count_nonzero(moves[1:] != moves[:-1])))
+            sense = step or sense
+    assert len(worst) > 8
+    return max(worst)
 
 
 def recorded(graph, wrist, table, path):
@@ -163,8 +184,13 @@ def test_record_diagnose_extend_reload_and_the_true_error_falls(graph, model, tm
     wrist.work(cell, 20.0, 5.0, after=reload_on_the_way)
     graph.until(answers[0].done, "reloaded model")
     assert answers[0].result().success
-    after, _ = pointing_at_rest(model.table, *wrist.work(cell, 25.0, 20.0))
+    samples, conditions = wrist.work(cell, 25.0, 20.0)
+    after, _ = pointing_at_rest(model.table, samples, conditions)
     assert before > 3.0 * count
     assert np.hypot(after, count) < 1.2 * count
+    sent = np.array([answer.position for answer in graph.heard[CORRECTED][-len(samples) :]])
+    wanted = conditions[:, :2]
+    deadband = SafetySettings().deadband_steps * model.table.geometry.limits.encoder_step
+    assert most_turns_at_a_reversal(wanted, sent - wanted, deadband) <= 1
     # Each command has had one answer, those during the reload too.
     assert len(graph.heard[CORRECTED]) == wrist.sent
