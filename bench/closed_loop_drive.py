@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from closed_loop_restless import Restless, restless
+from closed_loop_truth import PerfectStream, TrueRunningModel
 from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.rigid_motion import log_motion
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.vectors import skew
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell, true_laws
-from wrist_stiffness.simulation.wrist import TrueWrist
+from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
 
 Array = NDArray[np.float64]
 
@@ -30,11 +33,10 @@ BEGIN_S = 2.0
 SETTLED_S = 0.3
 """A rest counts as one from so long after the command has stopped."""
 
-REFINEMENTS = 8
-"""Rounds in which the commands of one who knows the true laws are found."""
+DEADBAND = SafetySettings().deadband_steps
+"""A correction that comes back by less has not turned: it may leave as much [encoder steps]."""
 
-TURN_STEPS = 0.5
-"""A correction that comes back by this many encoder steps has turned."""
+SETTINGS = StreamSettings(contact=ContactSettings("gain", gain=1.0))
 
 
 @dataclass(frozen=True)
@@ -47,17 +49,11 @@ class Left:
         Pointing over all samples, and over those at rest [rad].
     shift : float
         |s| less the residual that the corrector hands on [m].
-    turns : int
-        How often the corrections of both motors change their direction.
-    faults : int
-        Commands for which there was no correction.
     """
 
     moving: float
     resting: float
     shift: float
-    turns: int
-    faults: int
 
 
 @dataclass(frozen=True)
@@ -79,6 +75,24 @@ class Corrected:
     faults: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Made:
+    """What an effect does to a corrected wrist.
+
+    Parameters
+    ----------
+    pointing, shift : float
+        RMS of the error that is there with it and not without it [rad], [m].
+    share : float
+        Part of the square of the motion of the plate's centre that two motors can cancel; NaN where
+        the effect does not move the platform.
+    """
+
+    pointing: float
+    shift: float
+    share: float
+
+
 class Motion:
     """New motions of a wrist: the same commands and the same chance for every corrector.
 
@@ -92,82 +106,59 @@ class Motion:
         Of the true wrist.
     settings : CellSettings
         Program, sensors and what is hidden.
-    seconds : float
-        Duration [s].
     seed : int
         Of all chance.
     """
 
-    def __init__(self, table: Table, settings: CellSettings, seconds: float, seed: int) -> None:
+    def __init__(self, table: Table, settings: CellSettings, seed: int) -> None:
         self.table, self.settings, self._seed = with_fine_counts(table), settings, seed
-        self.time_s = np.arange(round(seconds * settings.rate_hz)) / settings.rate_hz
+        count = round(settings.program_seconds * settings.rate_hz)
+        self.time_s = np.arange(count) / settings.rate_hz
         cell = self._cell()
         self._program = cell.program
+        self._phase = cell.program.phase(self.time_s)
         self.wanted = cell.desired(self.time_s)
         self.heard = cell.run(self.time_s, self.wanted)
         platform = table.geometry.platform
         mechanism = table.mechanism
         self._desired = mechanism.forward(self.wanted)
         objective = Objective("pointing", platform.normal, platform.tool_point)
-        poses = [mechanism.forward(theta) for theta in self.wanted]
-        self._task = np.array([objective.matrix(pose) for pose in poses])
-        self._cancelling = np.array(
-            [objective.cancelling(pose, mechanism.jacobian(pose)) for pose in poses]
-        )
+        self._task = np.array([objective.matrix(mechanism.forward(t)) for t in self.wanted])
         moved = np.any(np.diff(self.wanted, axis=0, prepend=self.wanted[:1]) != 0.0, axis=1)
         since = np.maximum.accumulate(np.where(moved, self.time_s, 0.0))
         self._counts = self.time_s >= BEGIN_S
         self._rests = self._counts & (self.time_s - since >= SETTLED_S)
-        jacobian = mechanism.jacobian(self._desired)
+        self._jacobian = mechanism.jacobian(self._desired)
         self._step = table.geometry.limits.encoder_step
-        count = self._step / np.sqrt(12.0)
-        self._count = count * np.linalg.norm(self._task[:, :, 3:] @ jacobian, axis=(1, 2))
+        count_rad = self._step / np.sqrt(12.0)
+        self._count = count_rad * np.linalg.norm(self._task[:, :, 3:] @ self._jacobian, axis=(1, 2))
 
-    def _cell(self) -> VirtualCell:
-        return VirtualCell(self.table, self.settings, np.random.default_rng(self._seed))
+    def _cell(self, **changes: object) -> VirtualCell:
+        settings = replace(self.settings, **changes)  # type: ignore[arg-type]
+        return VirtualCell(self.table, settings, np.random.default_rng(self._seed))
 
-    def floor(self) -> Left:
-        """Return what the hidden encoder counts alone leave."""
-        nothing = np.zeros((len(self.time_s), 6))
-        return self._left(nothing, nothing[:, :3])
-
-    def uncorrected(self) -> Left:
-        """Return what is there without any correction."""
-        return self._left(self._error(self.heard), np.zeros((len(self.time_s), 3)))
-
-    def driven(self, corrected: Corrected) -> Left:
-        """Return what commands of a corrector leave."""
-        error = self._error(self._cell().run(self.time_s, corrected.angles))
-        left = self._left(error, corrected.residual)
-        turns = sum(
-            turning_points(column, TURN_STEPS * self._step)
-            for column in (corrected.angles - self.wanted).T
-        )
-        return replace(left, turns=turns, faults=len(corrected.faults))
-
-    def ideal(self, start: Corrected) -> Left:
-        """Return the least that one who knows the true laws and the future leaves.
-
-        The commands begin at those of a corrector and are mended by what truly remains.
-        """
-        phase = self._program.phase(self.time_s)
-        load, room = self._program.load(phase), self._program.ambient(phase)[:, 0]
-        angles, best = start.angles, None
-        for _ in range(REFINEMENTS):
-            wrist = TrueWrist(self.table, true_laws(self.table, self.settings))
-            true = wrist.run(self.time_s, angles, load, room)
-            error = self._twist(true.rotation, true.shift)
-            size = np.linalg.norm(self._pointing(error))
-            if best is None or size < best[0]:
-                best = size, replace(start, angles=angles, residual=true.shift)
-            angles = angles - np.einsum("nij,nj->ni", self._cancelling, error)
-        assert best is not None
-        return self.driven(best[1])
+    # Correctors
 
     def corrected(self, model: ErrorModel) -> Corrected:
         """Return what the corrector with a model sends for these motions."""
-        contact = ContactSettings("gain", gain=1.0)
-        stream = CorrectionStream(model, StreamSettings(contact=contact), enabled=True)
+        return self._sent(CorrectionStream(model, SETTINGS, enabled=True), self.heard.wrench)
+
+    def perfect(self, model: ErrorModel) -> Corrected:
+        """Return what a corrector that knows the true laws sends, by the same rules.
+
+        It hears the true load, with the sensor's noise.
+        """
+        well = self._cell(hidden=(), base="exact").run(self.time_s, self.wanted)
+        room = self._program.ambient(self._phase)[:, 0]
+        truth = TrueRunningModel(
+            model,
+            self.settings,
+            lambda stamp_ns: 1e-9 * (stamp_ns - START_NS),
+            lambda time_s: float(np.interp(time_s, self.time_s, room)),
+        )
+        return self._sent(PerfectStream(model, SETTINGS, truth), well.wrench)
+
+    def _sent(self, stream: CorrectionStream, wrench: Array) -> Corrected:
         stamps = START_NS + np.round(1e9 * self.time_s).astype(np.int64)
         warm = THERMOMETER_STEP_K * np.round(self.heard.temperature / THERMOMETER_STEP_K)
         angles, residual = np.empty_like(self.wanted), np.zeros((len(stamps), 3))
@@ -177,8 +168,8 @@ class Motion:
             if i % once_a_second == 0:
                 for name, celsius in zip(SENSED, warm[i].tolist(), strict=True):
                     stream.temperatures.add(name, stamp, celsius)
-            wrench = self.heard.wrench[i].tolist()
-            stream.loads.add(stamp, BASE_FRAME, wrench[:3], wrench[3:])
+            said = wrench[i].tolist()
+            stream.loads.add(stamp, BASE_FRAME, said[:3], said[3:])
             command = stream.on_command(stamp, "", NAMES, self.wanted[i].tolist())
             angles[i] = command.theta
             if command.fault is not None:
@@ -187,24 +178,69 @@ class Motion:
                 residual[i] = command.correction.after[:3]
         return Corrected(angles, residual, tuple(faults))
 
-    def _error(self, sample: CellSample) -> Array:
-        return self._twist(sample.pose_rotation, sample.pose_shift)
+    # Truth
 
-    def _twist(self, rotation: Array, shift: Array) -> Array:
-        return log_motion(rotation @ np.swapaxes(self._desired.platform, -1, -2), shift)
+    def error(self, angles: Array) -> Array:
+        """Return the true pose error that angles (n, 2) leave, (n, 6) at O in F [m, rad]."""
+        sample = self._cell().run(self.time_s, angles)
+        return self._twist(sample.pose_rotation, sample.pose_shift, self._desired.platform, 0.0)
 
-    def _pointing(self, error: Array) -> Array:
-        return np.einsum("nij,nj->ni", self._task, error)
+    def error_as_registered(self, angles: Array, model: ErrorModel) -> Array:
+        """Return the same as the instrument without its noise says it, registered as in a model.
 
-    def _left(self, error: Array, handed_on: Array) -> Left:
+        On a wrist whose base nobody knows exactly, F is where the registration says.
+        """
+        sample = self._cell(instrument="ideal").run(self.time_s, angles)
+        left, right = model.constants.sensor(self._desired)
+        wanted, place = self._desired.platform, np.zeros((len(angles), 3))
+        if right is not None:
+            turn, place = exp_twist(right)
+            wanted = turn @ wanted
+        if left is not None:
+            turn, move = exp_twist(np.broadcast_to(left, (len(angles), 6)))
+            wanted, place = turn @ wanted, move + (turn @ place[..., None])[..., 0]
+        return self._twist(sample.measured_rotation, sample.measured_shift, wanted, place)
+
+    @staticmethod
+    def _twist(rotation: Array, shift: Array, wanted: Array, place: Array | float) -> Array:
+        return log_motion(rotation @ np.swapaxes(wanted, -1, -2), shift - place)
+
+    # Judgement
+
+    def left(self, error: Array, handed_on: Array) -> Left:
+        """Return the RMS of an error (n, 6) of which a shift (n, 3) is handed on."""
         square = np.sum(self._pointing(error) ** 2, axis=1) + self._count**2
         return Left(
             float(np.sqrt(square[self._counts].mean())),
             float(np.sqrt(square[self._rests].mean())),
             rms((error[:, :3] - handed_on)[self._counts]),
-            0,
-            0,
         )
+
+    def floor(self) -> Left:
+        """Return what the hidden encoder counts alone leave."""
+        nothing = np.zeros((len(self.time_s), 6))
+        return self.left(nothing, nothing[:, :3])
+
+    def restless(self, corrected: Corrected) -> Restless:
+        """Return what a correction does at reversals."""
+        added = (corrected.angles - self.wanted)[self._counts]
+        time_s, wanted = self.time_s[self._counts], self.wanted[self._counts]
+        return restless(time_s, wanted, added, DEADBAND * self._step)
+
+    def made(self, error: Array) -> Made:
+        """Return the size of an error (n, 6) that an effect makes."""
+        error = error[self._counts]
+        pointing = rms(np.einsum("nij,nj->ni", self._task[self._counts], error))
+        arm = self._desired.platform[self._counts] @ self.table.geometry.platform.centre
+        motion = error[:, :3] + np.cross(error[:, 3:], arm)
+        reach = -np.array([skew(each) for each in arm]) @ self._jacobian[self._counts]
+        kept = motion - np.einsum("nij,nj->ni", reach @ np.linalg.pinv(reach), motion)
+        size = rms(motion)
+        share = 1.0 - (rms(kept) / size) ** 2 if size > 0.0 else float("nan")
+        return Made(pointing, rms(error[:, :3]), share)
+
+    def _pointing(self, error: Array) -> Array:
+        return np.einsum("nij,nj->ni", self._task, error)
 
 
 def with_fine_counts(table: Table) -> Table:
@@ -217,15 +253,3 @@ def with_fine_counts(table: Table) -> Table:
 def rms(vectors: Array) -> float:
     """Return the root mean square of the norms of (n, d)."""
     return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
-
-
-def turning_points(values: Array, least: float) -> int:
-    """Return how often (n,) values turn round by at least so much."""
-    count, sense, extreme = 0, 0, values[0]
-    for value in values.tolist():
-        if sense * (value - extreme) >= 0.0 and sense:
-            extreme = value
-        elif abs(value - extreme) >= least:
-            count += sense != 0
-            sense, extreme = (1 if value > extreme else -1), value
-    return count

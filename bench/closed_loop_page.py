@@ -7,67 +7,139 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from closed_loop_picture import draw
 
-PAGE = Path(__file__).parents[1] / "docs" / "closed-loop.md"
-BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
+from wrist_stiffness.atomic_file import replacing
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE, PICTURE = DOCS / "closed-loop.md", DOCS / "pictures" / "closed-loop.png"
 
 ENOUGH = 1.2
-"""Times the floor."""
+"""Times what a corrector leaves that knows the true laws."""
 
 SEEN = 1.2
 """An effect makes a pointing error when the old model leaves more than that many floors."""
 
-HEADER = (
-    "| hidden effect | size | diagnosed as | pointing before → after [mdeg] | floor [mdeg] "
-    "| moving, after [mdeg] | turns | shift before → after [µm] | compensable |\n"
+HARM = 1.1
+"""The extended model does harm when it leaves so many times what the old one left."""
+
+Row = Mapping[str, Any]
+Rows = Mapping[tuple[str, ...], Row]
+
+RESULTS = (
+    "| hidden effect | fault | before | told | diagnosed as | after | perfect | floor | answer |\n"
     "|---|---|---|---|---|---|---|---|---|\n"
+)
+CALM = (
+    "| hidden effect | makes: pointing [mdeg] | shift [µm] | motors can cancel "
+    "| shift left, before → after [µm] | moving, after (perfect) [mdeg] "
+    "| turns at a reversal: mean, most (perfect) | fastest change |\n"
+    "|---|---|---|---|---|---|---|---|\n"
+)
+WRONG = (
+    "| hidden effect | before | told | diagnosed as | after | floor |\n|---|---|---|---|---|---|\n"
 )
 
 
-def write_page(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Put the table between its marks in the page."""
+def write_page(exact: Sequence[str], wrong: Sequence[str], rows: Rows) -> None:
+    """Put the tables between their marks in the page, and draw the picture."""
     text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    lines = "".join(line(row) + "\n" for row in rows)
-    PAGE.write_text(before + BEGIN + HEADER + lines + END + after, encoding="utf-8")
+    told = [name for name in exact if (name, "exact", "told") in rows]
+    other = [name for name in wrong if (name, "wrong", "told") in rows]
+    for mark, header, lines in (
+        ("results", RESULTS, [result(name, rows) for name in told]),
+        ("calm", CALM, [calm(name, rows) for name in told]),
+        ("wrong base", WRONG, [on_wrong_base(name, rows) for name in other]),
+    ):
+        begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
+        before, _, rest = text.partition(begin)
+        _, found, after = rest.partition(end)
+        if not found:
+            raise SystemExit(f"{PAGE}: no marks {begin.strip()} and {end}")
+        text = before + begin + header + "".join(f"| {line} |\n" for line in lines) + end + after
+    with replacing(PAGE) as written:
+        written.write_text(text, encoding="utf-8")
+    draw(told, other, rows, PICTURE)
 
 
-def line(row: Mapping[str, Any]) -> str:
-    """Return one row of the table."""
-    old, new, floor = row["old"], row["extended"], row["floor"]
+def result(name: str, rows: Rows) -> str:
+    """Return the row of the pointing errors at rest."""
+    told, found = rows[name, "exact", "told"], rows.get((name, "exact", "diagnosed"))
+    magnitude = f"{told['magnitude']:.2g} {told['unit']}".removesuffix(" -")
     cells = (
-        row["name"].removesuffix(":plain"),
-        f"{row['magnitude']:.2g} {row['unit']}".removesuffix(" -"),
-        diagnosed(row),
-        f"{mdeg(old['resting'])} → {mdeg(new['resting'])}",
-        mdeg(floor["resting"]),
-        mdeg(new["moving"]),
-        f"{new['turns']} / {row['ideal']['turns']}",
-        f"{um(old['shift'])} → {um(new['shift'])}",
-        answer(row),
+        short(name),
+        f"{magnitude}, {told['size']:.2g} ×",
+        mdeg(told["old"]["resting"]),
+        mdeg(told["extended"]["resting"]),
+        diagnosed(found),
+        "-" if found is None else mdeg(found["extended"]["resting"]),
+        mdeg(told["perfect"]["resting"]),
+        mdeg(told["floor"]["resting"]),
+        answer(told, found),
     )
-    return f"| {' | '.join(cells)} |"
+    return " | ".join(cells)
 
 
-def diagnosed(row: Mapping[str, Any]) -> str:
+def calm(name: str, rows: Rows) -> str:
+    """Return the row of what motors can cancel, and of how calm they stay."""
+    told = rows[name, "exact", "told"]
+    made, after, perfect = told["made"], told["extended"], told["perfect"]
+    share = "-" if np.isnan(made["share"]) else f"{100.0 * made['share']:.0f} %"
+    cells = (
+        short(name),
+        mdeg(made["pointing"]),
+        um(made["shift"]),
+        share,
+        f"{um(told['old']['shift'])} → {um(after['shift'])}",
+        f"{mdeg(after['moving'])} ({mdeg(perfect['moving'])})",
+        f"{after['turns']:.2f}, {after['most']} ({perfect['turns']:.2f}, {perfect['most']})",
+        f"{100.0 * after['rate_share']:.1f} %",
+    )
+    return " | ".join(cells)
+
+
+def on_wrong_base(name: str, rows: Rows) -> str:
+    """Return the row of a wrist of which the table is wrong."""
+    told, found = rows[name, "wrong", "told"], rows.get((name, "wrong", "diagnosed"))
+    cells = (
+        short(name),
+        mdeg(told["old"]["resting"]),
+        mdeg(told["extended"]["resting"]),
+        diagnosed(found),
+        "-" if found is None else mdeg(found["extended"]["resting"]),
+        mdeg(told["floor"]["resting"]),
+    )
+    return " | ".join(cells)
+
+
+def short(name: str) -> str:
+    """Return a name without a form that says nothing."""
+    return name.replace(":plain", "").replace("*", " × ")
+
+
+def diagnosed(row: Row | None) -> str:
     """Return what the diagnosis named, best first."""
-    if row["told"]:
-        return "(told)"
-    return "; ".join(" or ".join(names) for names in row["findings"]) or "nothing"
+    if row is None:
+        return "-"
+    named = "; ".join(" or ".join(names[:3]) for names in row["findings"]) or "nothing"
+    return named + (" (unknown)" if row["verdict"] == "unknown" else "")
 
 
-def answer(row: Mapping[str, Any]) -> str:
+def answer(told: Row, found: Row | None) -> str:
     """Return whether the corrector cancels it, as measured."""
-    floor = row["floor"]["resting"]
-    if row["compensable"] == "no":
-        harm = row["extended"]["resting"] > SEEN * floor
-        return "no: in the instrument" + (", **and the fit does harm**" if harm else "")
-    said = "yes" if row["compensable"] == "yes" else "with its signal"
-    if row["old"]["resting"] <= SEEN * floor:
-        return f"{said}: makes no pointing error above the floor"
-    ratio = row["extended"]["resting"] / floor
-    return f"{said}: {ratio:.2f} × floor" + ("" if ratio <= ENOUGH else ", **not reached**")
+    after = (found or told)["extended"]["resting"]
+    old, floor, perfect = (told[key]["resting"] for key in ("old", "floor", "perfect"))
+    harm = ", **but the fit does harm**" if after > HARM * max(old, SEEN * floor) else ""
+    if told["made"]["pointing"] == 0.0 and told["made"]["shift"] == 0.0:
+        return "no: the wrist stands where it stood" + harm
+    said = "with its signal" if told["compensable"] == "needs_signal" else "yes"
+    if old <= SEEN * floor:
+        return "no need: its pointing error is below the floor" + harm
+    if after <= ENOUGH * perfect:
+        return f"{said}: {after / perfect:.2f} × perfect, {after / floor:.2f} × floor"
+    if found is not None and told["extended"]["resting"] <= ENOUGH * perfect:
+        return f"not as diagnosed: {after / perfect:.2f} × perfect" + harm
+    return f"**not reached**: {after / perfect:.2f} × perfect, {after / floor:.2f} × floor" + harm
 
 
 def mdeg(angle: float) -> str:
