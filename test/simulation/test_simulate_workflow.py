@@ -14,6 +14,7 @@ from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording, read_samples, topics
 from wrist_stiffness.simulation.catalogue import CATALOGUE
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.workflows import simulate as workflow
 from wrist_stiffness.workflows.simulate import hide, simulate_recording
 
 SETTINGS = CellSettings(rate_hz=50.0)
@@ -164,6 +165,30 @@ def test_blind_recording_is_opened_by_its_seed_alone(wrist, tmp_path, capsys):
     key = json.loads((tmp_path / "key.json").read_text())
     assert key["effect"] in CATALOGUE
     assert told.startswith(f"{key['effect']}@{key['component']} ({key['form']})")
+
+
+def test_another_day_is_of_the_same_wrist_and_effect(wrist, tmp_path, monkeypatch):
+    save_table(wrist(), tmp_path / "table.npz")
+    common = ["simulate", "--table", str(tmp_path / "table.npz"), "--seconds", "6", "--rate", "10"]
+    hidden, told = [], workflow.VirtualCell
+
+    def seen(table, settings, rng):
+        hidden.append((settings.hidden, settings.base_seed, settings.session))
+        return told(table, settings, rng)
+
+    monkeypatch.setattr(workflow, "VirtualCell", seen)
+    secret = ["--effect", "backlash@motor_2", "--base", "wrong"]
+    days = [tmp_path / f"day_{day}.mcap" for day in (1, 2)]
+    for day, path in enumerate(days, start=1):
+        argv = [*common, "-o", str(path), *secret, "--day", str(day)]
+        assert main(argv, [command]) == 0
+    (first, base, _), (second, same, _) = hidden
+    assert (first, base) == (second, same)
+    assert [session for _, _, session in hidden] == [0, 1]
+    samples = [read_samples(open_recording(path)).joints for path in days]
+    assert samples[1].time_ns[0] - samples[0].time_ns[0] == 86_400 * 10**9
+    assert not np.allclose(samples[0].position, samples[1].position)
+    assert main([*common, "-o", str(tmp_path / "x"), "--day", "0"], [command]) == 2
 
 
 def test_chosen_effect_is_hidden_and_a_wrong_name_refused(wrist):

@@ -20,6 +20,7 @@ examples:
   wrist-stiffness simulate -o clean --seconds 120
   wrist-stiffness simulate -o play --effect joint_clearance@joint_3 --size 3
   wrist-stiffness simulate -o riddle --blind 7 --seconds 120   # what is it?
+  wrist-stiffness simulate -o judge --blind 7 --seconds 120 --day 2   # the same wrist tomorrow
   wrist-stiffness simulate --reveal 7 --seconds 120            # the same options open it"""
 
 
@@ -37,6 +38,13 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument("--seconds", type=float, default=60.0, help="duration (default: 60)")
     parser.add_argument("--rate", type=float, default=100.0, help="samples per second (100)")
     parser.add_argument("--seed", type=int, default=0, help="of program and noise (default: 0)")
+    parser.add_argument(
+        "--day",
+        type=int,
+        default=1,
+        help="another day of the same wrist and effect: instrument set up anew, other poses, loads "
+        "and noise (default: 1)",
+    )
     parser.add_argument(
         "--experiment",
         default="rich",
@@ -84,9 +92,11 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.simulation.cell import CellSettings
     from wrist_stiffness.workflows.json_file import write_json
     from wrist_stiffness.workflows.simulate import (
+        DAY_SEEDS,
         check_bounds,
         hide,
         hide_blind,
+        on_day,
         simulate_recording,
     )
 
@@ -116,9 +126,9 @@ def _run(arguments: argparse.Namespace) -> int:
     written = simulate_recording(
         arguments.output,
         table,
-        settings,
+        on_day(arguments.day, settings),
         arguments.seconds,
-        arguments.seed,
+        arguments.seed + DAY_SEEDS * (arguments.day - 1),
         Progress("samples"),
         arguments.overwrite,
     )

@@ -38,6 +38,11 @@ BASE_FRAME = "wrist_base"
 START_NS = 1_700_000_000_000_000_000
 """Stamp of a recording's first sample: a fixed date, so that a seed gives the same bytes."""
 
+DAY_NS = 86_400 * 10**9
+
+DAY_SEEDS = 1_000_003
+"""From the seed of one day's noise and program to that of the next."""
+
 THERMOMETER_STEP_K = 0.1
 
 BLOCK = 500
@@ -87,7 +92,7 @@ def simulate_recording(
     table : Table
         Of the true wrist.
     settings : CellSettings
-        Program, rate, sensors.
+        Program, rate, sensors; sessions are days.
     seconds : float
         Duration [s].
     seed : int
@@ -115,16 +120,17 @@ def simulate_recording(
     cell = VirtualCell(table, settings, np.random.default_rng(seed))
     total = max(1, round(seconds * settings.rate_hz))
     thermometer = max(1, round(settings.rate_hz))
+    start_ns = START_NS + settings.session * DAY_NS
     with RecordingWriter(path, overwrite=overwrite) as writer:
         notes = String(json.dumps(recording_notes(table, settings), sort_keys=True))
-        writer.write(topics.RECORDING_NOTES, notes, START_NS)
+        writer.write(topics.RECORDING_NOTES, notes, start_ns)
         for first in range(0, total, BLOCK):
             number = np.arange(first, min(first + BLOCK, total))
             time_s = number / settings.rate_hz
             sent = cell.desired(time_s)
             block = cell.run(time_s, sent)
             for i, t in enumerate(time_s):
-                stamp_ns = START_NS + round(t * 1e9)
+                stamp_ns = start_ns + round(t * 1e9)
                 _write_sample(writer, stamp_ns, sent[i], block[i], settings)
                 if (first + i) % thermometer == 0:
                     _write_temperatures(writer, stamp_ns, block[i])
@@ -204,6 +210,22 @@ def hide(
 def hide_blind(seed: int, table: Table, settings: CellSettings, seconds: float) -> CellSettings:
     """Return the settings with the effect that a seed draws (see `blind.draw`)."""
     return replace(settings, hidden=(draw(seed, table, settings, seconds).hidden,))
+
+
+def on_day(day: int, settings: CellSettings) -> CellSettings:
+    """Return the settings of another day, from 1, of the same wrist with the same hidden effects.
+
+    The instrument was set up anew, and the wrist moves to other poses under other loads.
+
+    Raises
+    ------
+    InputError
+        If there is no such day.
+    """
+    if day < 1:
+        raise InputError(f"simulate: day {day} is not 1 or more")
+    later = DAY_SEEDS * (day - 1)
+    return replace(settings, session=day - 1, program_seed=settings.program_seed + later)
 
 
 def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
