@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, sizes
+from wrist_stiffness.campaign.comparing.conditions import conditions
 from wrist_stiffness.campaign.comparing.headroom import held_out_process, left_by_others
 from wrist_stiffness.campaign.comparing.sentences import Told, tell
 from wrist_stiffness.campaign.comparing.worst_poses import worst_poses
@@ -304,3 +305,11 @@ def test_worst_poses_are_apart_and_in_order():
     same = {name: np.zeros(N) for name in ("theta_1", "theta_2", "fx", "fy", "fz")}
     once = replace(bad, covariates={**bad.covariates, **same})
     assert len(worst_poses(once, floor, ("day",), most=3)) == 1
+
+
+@pytest.mark.parametrize(("n", "lags"), [(90, []), (150, ["5 min"]), (400, ["5 min", "15 min"])])
+def test_a_session_is_asked_for_no_longer_lag_than_itself(n, lags):
+    """Three seconds from one dwell to the next: 4.5, 7.5 and 20 minutes."""
+    asked, _ = conditions(table(np.random.default_rng(8), n=n))
+    names = [each.name for each in asked if each.topic == "temperature lag"]
+    assert names == [f"link 1, {lag} late" for lag in lags]
