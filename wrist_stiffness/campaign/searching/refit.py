@@ -22,7 +22,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 
 Sessions = tuple[UnitSession, ...]
 
-ROUGH = 2.0
+ROUGH = 1.5
 """Variance of what is left, in units of the noise, from which a law is not taken as exact."""
 
 
@@ -72,7 +72,7 @@ def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit
 def _variance(fitted: BaseFit) -> float:
     """Return the variance of what is left, in units of the noise."""
     left = fitted.whiten(fitted.residual)
-    return float(left @ left / max(np.count_nonzero(left), 1))
+    return float(left @ left) / max(int(np.count_nonzero(left)), 1)
 
 
 def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
