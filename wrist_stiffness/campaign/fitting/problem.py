@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
-from wrist_stiffness.campaign.fitting.shims import Shims
+from wrist_stiffness.campaign.fitting.shims import GAP, Shims
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.diagnosis.observations import Observations
 from wrist_stiffness.mechanism.components import Array
@@ -22,7 +22,11 @@ NO_PRIOR = 1e-3
 """Weight where a law knows no prior: a thousand times its first value, so that what the data do not
 excite stays where it is."""
 
+MOST_KNOWN = 4096
+"""Effects with values that are kept: a fit asks for one a parameter at a time."""
+
 Progress = Callable[[int, int], None]
+Values = tuple[tuple[str, float], ...]
 
 STEP = 1e-2
 """Step of the difference quotients, in standard deviations of the prior."""
@@ -137,8 +141,20 @@ class FitProblem:
             if unknown.session in (None, session):
                 value = unknown.mean + float(steps) * unknown.step
                 values[unknown.free][unknown.key] = min(max(value, unknown.lower), unknown.upper)
-        found = [free.effect.with_values(own) for free, own in zip(self.free, values, strict=True)]
-        return self._shims.fitted(self._starts, found)
+        found = [self._effect(place, tuple(own.items())) for place, own in enumerate(values)]
+        for place, gap in self._shims.gaps(self._starts, found).items():
+            found[place] = self._effect(place, (*values[place].items(), (GAP, gap)))
+        return tuple(found)
+
+    @cached_property
+    def _effect(self) -> Callable[[int, Values], Effect]:
+        """Free effects with values: trials that differ in one effect share all others."""
+
+        @lru_cache(maxsize=MOST_KNOWN)
+        def effect(place: int, values: Values) -> Effect:
+            return self.free[place].effect.with_values(dict(values))
+
+        return effect
 
     @cached_property
     def _starts(self) -> tuple[Effect, ...]:

@@ -6,7 +6,7 @@ it a fit of the axes would open and close flanges all over the workspace.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,12 +28,12 @@ class Shims:
 
     Parameters
     ----------
-    opening : dict of (str, str, str) to float
-        Opening of a joint's flanges for a parameter of an axis, by axis effect, parameter and joint
-        [m, m/rad].
+    opening : dict of str to tuple of (str, str, float)
+        By axis effect: its parameter, a joint, and how far that one's flanges open for a unit
+        of the parameter [m, m/rad].
     """
 
-    opening: dict[tuple[str, str, str], float]
+    opening: Mapping[str, tuple[tuple[str, str, float], ...]]
 
     @classmethod
     def of(cls, model: ErrorModel, effects: Sequence[Effect]) -> Shims:
@@ -42,29 +42,38 @@ class Shims:
         at = situation_of(model.with_effects(), home, None)
         component = at.parts.sectors.component
         opening = {}
-        for effect in effects:
-            for key in effect.si if effect.law.id == AXES else ():
+        for effect in (effect for effect in effects if effect.law.id == AXES):
+            slopes = []
+            for key in effect.si:
                 unit = {other: float(other == key) for other in effect.si}
                 added, _ = effect.law.advance(at, effect.component, unit, None)
                 gap: Array = at.carried(added)[1][0]
                 for k in np.unique(component):
-                    opening[effect.name, key, ELASTIC[k]] = float(gap[component == k].mean())
+                    slopes.append((key, ELASTIC[k], float(gap[component == k].mean())))
+            opening[effect.name] = tuple(slopes)
         return cls(opening)
 
-    def fitted(self, start: Sequence[Effect], found: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Return the found effects with gaps that follow the axes from where they started."""
+    def gaps(self, start: Sequence[Effect], found: Sequence[Effect]) -> dict[int, float]:
+        """Return the gaps of found effects when they follow the axes from where these started.
+
+        Returns
+        -------
+        dict of int to float
+            `gap_um` by the place of the effect that has it.
+        """
         opened: dict[str, float] = {}
         for before, after in zip(start, found, strict=True):
-            for (name, key, joint), slope in self.opening.items():
-                if name == after.name:
-                    change = slope * (after.si[key] - before.si[key])
-                    opened[joint] = opened.get(joint, 0.0) + change
-        return tuple(_closed(effect, opened) for effect in found)
+            for key, joint, slope in self.opening.get(after.name, ()):
+                change = slope * (after.si[key] - before.si[key])
+                opened[joint] = opened.get(joint, 0.0) + change
+        return {
+            place: _closed(effect, opened[effect.component])
+            for place, effect in enumerate(found)
+            if effect.law.id == GAPS and effect.component in opened
+        }
 
 
-def _closed(effect: Effect, opened: dict[str, float]) -> Effect:
-    if effect.law.id != GAPS or effect.component not in opened:
-        return effect
+def _closed(effect: Effect, opened: float) -> float:
     (parameter,) = effect.parameters
-    gap = effect.estimates[GAP].value - UM * opened[effect.component]
-    return effect.with_values({GAP: min(max(gap, parameter.lower), parameter.upper)})
+    gap = effect.estimates[GAP].value - UM * opened
+    return min(max(gap, parameter.lower), parameter.upper)
