@@ -15,6 +15,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
@@ -245,3 +246,65 @@ def test_two_sessions_have_registrations_of_their_own_and_one_wrist(model):
         assert abs(each.value - planted) < 3.0 * each.sigma
     newest = {e.name: e for e in found.model().effects}["measurement_frame@pose_sensor"]
     assert newest.estimates["shift_x_um"].value == pytest.approx(tuesday.value)
+
+
+def test_parameters_that_are_told_together_only_name_each_other(model):
+    """At one pose the instrument's place and the target's look the same; the zero does not."""
+    rng = np.random.default_rng(21)
+    block = replace(poses(rng), theta=np.radians(rng.uniform(-0.01, 0.01, (40, 2))))
+    session = measured(model, block, rng)
+    free = (
+        FreeEffect(effect("measurement_frame@pose_sensor"), {"shift_x_um": 1e3}, True),
+        FreeEffect(effect("target_mounting@pose_sensor"), {"shift_x_um": 1e3}, True),
+        free_all(effect("encoder_offset@motor_1"), per_session=True),
+    )
+    frame, target, zero = fit(problem_of(model, [session], free)).parameters
+    assert frame.together == ("target_mounting@pose_sensor shift_x_um",)
+    assert target.together == ("measurement_frame@pose_sensor shift_x_um",)
+    assert zero.together == ()
+    # Neither is known, and their sum is: only poses apart would tell them apart.
+    assert not frame.excited
+    assert zero.excited
+
+
+@pytest.mark.parametrize("correlation", [-0.5, 0.5])
+def test_half_a_correlation_is_not_told_together(model, correlation):
+    rng = np.random.default_rng(22)
+    free = (
+        free_all(effect("encoder_offset@motor_1"), per_session=True),
+        free_all(effect("encoder_offset@motor_2"), per_session=True),
+    )
+    found = fit(problem_of(model, [measured(model, poses(rng), rng)], free))
+    alike = np.array([[1.0, correlation], [correlation, 1.0]])
+    assert [p.together for p in replace(found, covariance=alike).parameters] == [(), ()]
+    alike = np.array([[1.0, 1.6 * correlation], [1.6 * correlation, 1.0]])
+    assert all(p.together for p in replace(found, covariance=alike).parameters)
+
+
+@pytest.mark.parametrize(
+    ("planted", "at_bound"), [({"flexibility_percent": -60.0}, False), ({}, True)]
+)
+def test_an_estimate_on_the_border_of_what_can_be_is_said(model, planted, at_bound):
+    """A bushing cannot be stiffer than rigid, nor a play less than nothing."""
+    rng = np.random.default_rng(23)
+    name = "bushing_stiffness@joint_1" if planted else "joint_clearance@joint_1"
+    true = effect("bushing_stiffness@joint_1", **(planted or {"flexibility_percent": -60.0}))
+    session = measured(model.with_effects(true), poses(rng), rng)
+    (found,) = fit(problem_of(model, [session], (free_all(effect(name)),))).parameters
+    assert found.at_bound == at_bound
+    if at_bound:
+        assert found.value == 0.0
+
+
+def test_what_a_user_typed_without_uncertainty_is_believed(model):
+    """Of an effect of the model, only what a fit has estimated is fitted again."""
+    backlash = effect("backlash@motor_1", width_mdeg=30.0)
+    typed = model.with_effects(backlash)
+    free, held = commissioning(typed)
+    assert held == (backlash,)
+    assert all(each.effect.name != backlash.name for each in free)
+    estimated = replace(backlash, estimates={"width_mdeg": Estimate(30.0, 2.0)})
+    free, held = commissioning(model.with_effects(estimated))
+    assert held == ()
+    assert free[-1].effect == estimated
+    assert dict(free[-1].scale) == {"width_mdeg": 20.0}
