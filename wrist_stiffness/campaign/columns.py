@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
@@ -42,37 +40,19 @@ class SessionModel:
     session: UnitSession
     effects: Effects
 
-    @cached_property
-    def still(self) -> Block:
-        """Mean signals of the units, for effects without a memory."""
-        mean, block = self.session.mean, self.session.block
-        speed = np.zeros_like(block.theta) if block.theta_dot is None else block.theta_dot
-        return Block(
-            mean(block.time),
-            mean(block.theta),
-            mean(block.load),
-            mean(speed),
-            block.load_on_platform,
-            {name: mean(value) for name, value in block.temperatures.items()},
-            {name: mean(value) for name, value in block.covariates.items()},
-        )
-
     def remembers(self, effects: Effects) -> bool:
         """Tell whether any of the effects needs the path and not the moment alone."""
         return any(self._has_memory(effect) for effect in effects)
 
-    @cached_property
-    def _memories(self) -> dict[str, bool]:
-        return {}
-
     def _has_memory(self, effect: Effect) -> bool:
-        if effect.name not in self._memories:
+        known, asked = self.session.remembering, (effect.law, effect.component)
+        if asked not in known:
             first = self.session.block.take(slice(0, 1))
-            usual = Effect(effect.law, effect.component)
+            usual = Effect(*asked)
             memory = evaluate(self.model.with_effects(usual), first, None).memory
             alike = effect.law.id not in WITHIN_A_UNIT
-            self._memories[effect.name] = not alike or memory.states[0] is not None
-        return self._memories[effect.name]
+            known[asked] = not alike or memory.states[0] is not None
+        return known[asked]
 
     def along(self, trials: Sequence[Effects]) -> list[Array]:
         """Return what the sensor would say of each unit, from all moments of its path, (u, 6).
@@ -96,7 +76,7 @@ class SessionModel:
             chosen = [i for i, own in enumerate(path) if own is needs_path]
             for start in range(0, len(chosen), AT_A_TIME):
                 part = chosen[start : start + AT_A_TIME]
-                block = self.session.block if needs_path else self.still
+                block = self.session.block if needs_path else self.session.still
                 found = bare.batch_with(block, [trials[i] for i in part])
                 for i, each in zip(part, found, strict=True):
                     out[i] = self.session.mean(each.measured) if needs_path else each.measured

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,6 +19,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.law import Law
 
 QUANTITIES = (
     Quantity("s", "um", (0, 1, 2), 1e6),
@@ -79,6 +81,26 @@ class UnitSession:
     def block(self) -> Block:
         """Signals at the moments that are kept."""
         return self.cut.block
+
+    @cached_property
+    def still(self) -> Block:
+        """Mean signals of the units, for effects without a memory."""
+        mean, block = self.mean, self.block
+        speed = np.zeros_like(block.theta) if block.theta_dot is None else block.theta_dot
+        return Block(
+            mean(block.time),
+            mean(block.theta),
+            mean(block.load),
+            mean(speed),
+            block.load_on_platform,
+            {name: mean(value) for name, value in block.temperatures.items()},
+            {name: mean(value) for name, value in block.covariates.items()},
+        )
+
+    @cached_property
+    def remembering(self) -> dict[tuple[Law, str], bool]:
+        """Whether laws at places need the path and not the moment alone, as far as was asked."""
+        return {}
 
     def mean(self, values: Array) -> Array:
         """Return the means over units (u, ...) of values at the kept moments (k, ...)."""
