@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
+from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.workflows.calibrate import Run
@@ -32,6 +33,9 @@ Progress = Callable[[int, int], None]
 
 SEED = 0
 """Of what chance gives: the same recordings give the same answer."""
+
+USUAL = 1.0
+"""Standard deviations of its prior within which a tolerance needs no line of its own."""
 
 COMPENSABLE = {
     "yes": "the nodes can correct it",
@@ -82,7 +86,7 @@ class Diagnosed:
             out += ["", "these recordings cannot show:"]
             out += [f"  {names}: {needs}" for needs, names in _needs(result).items()]
         out += ["", "taken up first, by the refit of the set-up and the wrist's tolerances:"]
-        out += [f"  {line}" for line in result.absorbed]
+        out += taken_up_lines(self.answer.absorbed)
         out.append(f"held-out errors are valid for {result.scope}")
         if result.lost_units:
             out.append(f"note: {result.lost_units} units left out as lost beams")
@@ -182,6 +186,16 @@ def _finding_lines(place: int, finding: Finding) -> list[str]:
         f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
         f"BIC falls by {finding.delta_bic:.3g}"
     )
+    return out
+
+
+def taken_up_lines(absorbed: Sequence[TakenUp]) -> list[str]:
+    """Return set-up and what left its usual range a line each, all the rest in one."""
+    within = [each for each in absorbed if each.parameter and each.deviations <= USUAL]
+    out = [f"  {each.sentence}" for each in absorbed if each not in within]
+    if within:
+        names = ", ".join(each.name for each in within)
+        out.append(f"  within {USUAL:g} standard deviation of their tolerances: {names}")
     return out
 
 

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import QUANTITIES, Observed, UnitSession, as_units
+from wrist_stiffness.campaign.observing import Observed, UnitSession, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.searching.refit import refit, withdrawn
 from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Screen
+from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
@@ -56,12 +57,15 @@ class WristDiagnosis:
         Best member of each finding, fitted with its own law.
     base : BaseFit
         Fitted along with these.
+    absorbed : tuple of TakenUp
+        What that base took up, furthest from its prior first.
     """
 
     diagnosis: Diagnosis
     observed: Observed
     effects: tuple[Effect, ...]
     base: BaseFit
+    absorbed: tuple[TakenUp, ...]
 
 
 def silent(done: int, total: int) -> None:
@@ -103,7 +107,6 @@ def diagnose_sessions(
         rng,
         settings,
     )
-    result = replace(result, absorbed=_absorbed(base, [session.name for session in sessions]))
     known = {each.name: each for each in candidates}
     found = _fitted_extras(base)
     named = [
@@ -115,7 +118,9 @@ def diagnose_sessions(
     effects = _fitted_extras(final)
     result = withdrawn(result, len(effects))
     kept = tuple(effects[each.name] for each in result.findings)
-    return WristDiagnosis(result, observed, kept, final)
+    absorbed = taken_up(final, [session.name for session in sessions])
+    result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
+    return WristDiagnosis(result, observed, kept, final, absorbed)
 
 
 def seek_point(
@@ -176,38 +181,6 @@ def _point(base: BaseFit) -> Point:
 def _absent(base: BaseFit) -> set[str]:
     """Return effects that the model holds fast: a second one of the name cannot be added."""
     return {effect.name for effect in base.problem.model.effects}
-
-
-def _absorbed(base: BaseFit, sessions: list[str]) -> tuple[str, ...]:
-    """Tell how far each part of the base moved the prediction, and itself against its prior."""
-    groups: dict[str, list[int]] = {}
-    for place, unknown in enumerate(base.problem.unknowns):
-        if base.of_base[place]:
-            name = base.problem.free[unknown.free].effect.name
-            where = "" if unknown.session is None else f" in {sessions[unknown.session]}"
-            groups.setdefault(name + where, []).append(place)
-    sentences = []
-    for name, places in groups.items():
-        moved = base.columns[:, :, places] @ base.z[places]
-        sizes = [
-            f"{q.per_si * np.sqrt(np.mean(np.sum(moved[:, list(q.components)] ** 2, axis=1))):.2f}"
-            f" {q.unit} of {q.name}"
-            for q in QUANTITIES
-        ]
-        sentences.append(f"{name}: {', '.join(sizes)}{_against_prior(base, places)}")
-    return tuple(sentences)
-
-
-def _against_prior(base: BaseFit, places: list[int]) -> str:
-    """Tell of the parameter of a tolerance that moved furthest; nothing where all are free."""
-    known = [place for place in places if np.isfinite(base.prior_std[place])]
-    if not known:
-        return ""
-    far = max(known, key=lambda place: abs(base.z[place] / base.prior_std[place]))
-    unknown = base.problem.unknowns[far]
-    value = unknown.mean + base.z[far] * unknown.step
-    share = abs(base.z[far] / base.prior_std[far])
-    return f" ({unknown.key} = {value:.3g}, {share:.1f} standard deviations of its prior)"
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
