@@ -138,7 +138,7 @@ def far_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
 
 
 def untold_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
-    """Tell what the data do not say, and what to record to see it."""
+    """Tell what the data do not say, by what to record to see it."""
     needs = {each.effect.name: each.effect.law.excited_by for each in found.problem.free}
     # Several sessions may say the same of one parameter.
     untold: dict[str, dict[str, None]] = {}
@@ -146,9 +146,18 @@ def untold_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
         if not each.excited:
             twin = f" (only together with {each.together[0]})" if each.together else ""
             untold.setdefault(each.effect, {})[f"{each.key}{twin}"] = None
-    return [
-        f"  {effect}: {', '.join(keys)}; needs {needs[effect]}" for effect, keys in untold.items()
-    ]
+    alike: dict[str, dict[tuple[str, str], list[str]]] = {}
+    for effect, keys in untold.items():
+        law, _, place = effect.partition("@")
+        same = alike.setdefault(needs[effect], {})
+        same.setdefault((law, ", ".join(keys)), []).append(place)
+    lines = []
+    for need, effects in alike.items():
+        lines.append(f"  for these record {need}:")
+        lines += [
+            f"    {law}@{', '.join(places)}: {keys}" for (law, keys), places in effects.items()
+        ]
+    return lines
 
 
 def parameter_values(parameters: Iterable[Fitted]) -> list[dict[str, Any]]:

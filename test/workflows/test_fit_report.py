@@ -1,0 +1,43 @@
+"""What a fit tells a technician."""
+
+import numpy as np
+
+from wrist_stiffness.campaign.fitting.fit import fit
+from wrist_stiffness.campaign.fitting.free_effects import free_all
+from wrist_stiffness.campaign.fitting.problem import FitProblem
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.fit_report import told_lines, untold_lines
+
+
+def test_what_is_not_told_stands_under_what_to_record():
+    """A coarse instrument without load sees no stiffness, but a zero of an encoder."""
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    rng = np.random.default_rng(1)
+    block = Block(2.0 * np.arange(30), rng.uniform(-0.5, 0.5, (30, 2)), np.zeros((30, 6)))
+    bent, shift = exp_twist(model.batch(block).measured)
+    rotation = bent @ model.table.mechanism.forward(block.theta).platform
+    noise = np.repeat([1e-4, 1e-3], 3)
+    session = MeasuredSession("s", block, shift, rotation, np.diag(noise**2))
+    places = (
+        *(("link_stiffness", f"link_{i}") for i in (1, 2, 3)),
+        ("load_scale", "load_sensor"),
+        ("encoder_offset", "motor_1"),
+    )
+    free = tuple(free_all(Effect(find_law(law), place)) for law, place in places)
+    found = fit(FitProblem(model, (as_units(model, session),), free))
+    lines = untold_lines(found, found.parameters)
+    assert lines == [
+        f"  for these record {find_law('link_stiffness').excited_by}:",
+        "    link_stiffness@link_1, link_2, link_3: flexibility_percent",
+        f"  for these record {find_law('load_scale').excited_by}:",
+        "    load_scale@load_sensor: scale_percent",
+    ]
+    (line,) = told_lines(found.parameters)
+    assert line.split()[:2] == ["encoder_offset@motor_1", "offset_mdeg"]
