@@ -19,6 +19,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.vectors import skew
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
+from wrist_stiffness.simulation.program import Track
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,9 @@ BEGIN_S = 2.0
 
 SETTLED_S = 0.3
 """A rest counts as one from so long after the command has stopped."""
+
+WARM_UP_TIMES, WARM_UP = np.array([0.0, 0.05, 0.4, 0.6, 1.0]), np.array([0.0, 0.0, 1.0, 1.0, 0.2])
+"""How a room warms up and cools down, over the duration and over the whole rise."""
 
 DEADBAND = SafetySettings().deadband_steps
 """A correction that comes back by less has not turned: it may leave as much [encoder steps]."""
@@ -108,10 +112,15 @@ class Motion:
         Program, sensors and what is hidden.
     seed : int
         Of all chance.
+    warm_up_K : float
+        By how much the room warms; 0 for the experiment's own drift.
     """
 
-    def __init__(self, table: Table, settings: CellSettings, seed: int) -> None:
+    def __init__(
+        self, table: Table, settings: CellSettings, seed: int, warm_up_K: float = 0.0
+    ) -> None:
         self.table, self.settings, self._seed = with_fine_counts(table), settings, seed
+        self._warm_up_K = warm_up_K
         count = round(settings.program_seconds * settings.rate_hz)
         self.time_s = np.arange(count) / settings.rate_hz
         cell = self._cell()
@@ -135,7 +144,7 @@ class Motion:
 
     def _cell(self, **changes: object) -> VirtualCell:
         settings = replace(self.settings, **changes)  # type: ignore[arg-type]
-        return VirtualCell(self.table, settings, np.random.default_rng(self._seed))
+        return cell_of(self.table, settings, self._seed, self._warm_up_K)
 
     # Correctors
 
@@ -241,6 +250,16 @@ class Motion:
 
     def _pointing(self, error: Array) -> Array:
         return np.einsum("nij,nj->ni", self._task, error)
+
+
+def cell_of(table: Table, settings: CellSettings, seed: int, warm_up_K: float) -> VirtualCell:
+    """Return the cell, in a room that warms, stays warm and cools down again."""
+    cell = VirtualCell(table, settings, np.random.default_rng(seed))
+    if warm_up_K:
+        time_s = settings.program_seconds * WARM_UP_TIMES
+        room = Track(time_s, warm_up_K * WARM_UP[:, None])
+        cell.program = replace(cell.program, ambient=room)
+    return cell
 
 
 def with_fine_counts(table: Table) -> Table:

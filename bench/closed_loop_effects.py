@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from closed_loop_drive import Corrected, Motion
+from closed_loop_drive import Corrected, Motion, cell_of
 from closed_loop_page import write_page
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate, said_calibrated
@@ -41,7 +41,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect
-from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
+from wrist_stiffness.simulation.cell import SENSED, CellSettings
 from wrist_stiffness.simulation.instrument import instrument
 from wrist_stiffness.simulation.size import Scale
 
@@ -88,7 +88,9 @@ and rooms."""
 
 SLOW = ("thermal_expansion", "thermal_softening")
 SLOW_RATE_HZ, SLOW_TIMES = 4.0, 5.0
-"""Parts warm within ten minutes: their experiments take so many times longer."""
+RECORDED_K, NEW_K = 10.0, 7.0
+"""Parts warm within minutes: their experiments take so many times longer, and the room warms by so
+much."""
 
 BASE_SEED = 1001
 SETTINGS = Settings(permutations=299)
@@ -101,9 +103,11 @@ anew, and the hidden effect where it is one of these."""
 Row = dict[str, Any]
 
 
-def recorded(table: Table, settings: CellSettings, calibrated: tuple[str, ...]) -> MeasuredSession:
+def recorded(
+    table: Table, settings: CellSettings, calibrated: tuple[str, ...], warm_up_K: float = 0.0
+) -> MeasuredSession:
     """Return what a recording holds; `calibrated` says which registrations are known."""
-    cell = VirtualCell(table, settings, np.random.default_rng(SEED))
+    cell = cell_of(table, settings, SEED, warm_up_K)
     time_s = np.arange(round(settings.program_seconds * settings.rate_hz)) / settings.rate_hz
     sample = cell.run(time_s, cell.desired(time_s))
     warm = dict(zip(SENSED, sample.temperature.T, strict=True))
@@ -170,17 +174,19 @@ class Loop:
         self.settings = replace(
             paced(RECORDED, self.effect), hidden=(self.hidden,), session=1, **known
         )
+        warm, warm_new = (RECORDED_K, NEW_K) if self.effect in SLOW else (0.0, 0.0)
         if base == "exact":
             calibrated = tuple(each for each in COMMISSIONED if each != self.effect)
-            self.session = recorded(self.table, self.settings, calibrated)
+            self.session = recorded(self.table, self.settings, calibrated, warm)
             self.known, self.old = model, model
         else:
             self.session = recorded(self.table, self.settings, ())
             self.known = commissioned()
             self.old = calibrate(self.known, [self.session]).model
         new = replace(paced(NEW, self.effect), session=1, **known)
-        self.motion = Motion(self.table, replace(new, hidden=(self.hidden,)), SEED + 1)
-        self.sound = Motion(self.table, new, SEED + 1)
+        hidden = replace(new, hidden=(self.hidden,))
+        self.motion = Motion(self.table, hidden, SEED + 1, warm_new)
+        self.sound = Motion(self.table, new, SEED + 1, warm_new)
 
     def drive(self, corrected: Corrected, model: ErrorModel) -> Row:
         """Return what a corrector leaves and how restless it is."""
@@ -210,9 +216,7 @@ class Loop:
         return {
             "unit": CATALOGUE[self.effect].unit,
             "magnitude": self.hidden.magnitude,
-            "size": Scale(
-                self.table, replace(self.settings, hidden=()), self.settings.program_seconds
-            ).size(self.hidden),
+            "size": self.size(),
             "compensable": compensable(find_law(self.effect), self.component),
             "warm_C": [float(recorded_warm.max()), float(warm.max())],
             "made": asdict(self.motion.made(made)),
@@ -224,6 +228,13 @@ class Loop:
             "added": added,
             "extended": self.drive(self.motion.corrected(better), better),
         }
+
+    def size(self) -> float | None:
+        """Return the size in the recording, in units of one sample's noise; None with a warm-up."""
+        if self.effect in SLOW:
+            return None
+        settings = replace(self.settings, hidden=())
+        return Scale(self.table, settings, settings.program_seconds).size(self.hidden)
 
     def diagnosed(self, told: Row) -> Row:
         """Return what a diagnosis makes of it."""

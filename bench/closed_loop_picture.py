@@ -14,6 +14,7 @@ from wrist_stiffness.workflows.pictures.palette import FLOOR, colour
 Rows = Mapping[tuple[str, ...], Mapping[str, Any]]
 
 BEFORE = "#999999"
+TICKS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 
 def draw(exact: Sequence[str], wrong: Sequence[str], rows: Rows, path: Path) -> None:
@@ -39,6 +40,8 @@ def draw(exact: Sequence[str], wrong: Sequence[str], rows: Rows, path: Path) -> 
 
 
 def _panel(axes: Any, base: str, names: Sequence[str], rows: Rows) -> None:
+    from matplotlib.ticker import FixedLocator, NullLocator
+
     ranked = sorted(names, key=lambda name: rows[name, base, "told"]["old"]["resting"])
     series: dict[str, list[tuple[float, int]]] = {}
     for place, name in enumerate(ranked):
@@ -62,6 +65,9 @@ def _panel(axes: Any, base: str, names: Sequence[str], rows: Rows) -> None:
     floor = float(np.mean([_mdeg(rows[name, base, "told"]["floor"]) for name in names]))
     axes.axvline(floor, color=FLOOR, linewidth=0.8, linestyle=":", label="hidden counts alone")
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(FixedLocator(TICKS))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.set_yticks(range(len(ranked)), [_short(name) for name in ranked], fontsize=8)
     axes.set_ylim(-0.7, len(ranked) - 0.3)
 
