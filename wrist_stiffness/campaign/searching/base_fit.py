@@ -15,20 +15,28 @@ from scipy.linalg import lstsq
 from scipy.stats import chi2
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.campaign.fitting.free_effects import BUILT, FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.registry import find_law
 
 SHIM_UM = 1.5
 """Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
 
-MOST_STEPS = 12
+EVENLY_SPREAD = 1.0 / np.sqrt(3.0)
+"""Standard deviation over the limit of a tolerance: a part lies anywhere within (GUM 4.3.7)."""
+
+MOST_STEPS = 20
+
+COOLING = 0.05
+"""Least ratio of the variances of two steps: believed too early, the data close a wrong flange."""
+
 ENOUGH = 3e-3
 """Relative fall of the sum of squares below which the fit has converged."""
+
+TOLERATED = {law for law, _ in BUILT}
 
 WIDE = 1e3
 """Factor of the prior of what belongs to the base and is under suspicion."""
@@ -139,17 +147,16 @@ class BaseFit:
 def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
     """Return what of the base is free, and the effects that stay as they are."""
     free, held = commissioning(model)
-    own = {effect.name: effect for effect in held}
-    scale = Effect(find_law("load_scale"), "load_sensor")
-    shimmed = [
-        replace(each, scale=dict.fromkeys(each.scale, SHIM_UM))
-        if each.effect.law.id == "flange_contact"
-        else each
-        for each in free
-    ]
-    if scale.name not in own and all(each.effect.name != scale.name for each in free):
-        shimmed.append(free_all(scale))
-    return tuple(shimmed), held
+    return tuple(_within_tolerance(each) for each in free), held
+
+
+def _within_tolerance(free: FreeEffect) -> FreeEffect:
+    """Return a part of the wrist with the prior of what is built within its tolerance."""
+    if free.effect.law.id not in TOLERATED:
+        return free
+    if free.effect.law.id == "flange_contact":
+        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM))
+    return replace(free, scale={key: EVENLY_SPREAD * limit for key, limit in free.scale.items()})
 
 
 def fit_base(
@@ -191,10 +198,13 @@ def fit_base(
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
+    scale = 0.0
     for _ in range(MOST_STEPS):
         columns = _columns(problem, bare, z)
         left = problem.whiten(residual)
-        scale = 1.0 if extras else _robust_variance(left)
+        found = 1.0 if extras else _robust_variance(left)
+        scale = max(found, COOLING * scale)
+        cooled = scale == found
         step = _step(problem.whiten(columns), left, z * weights, weights, scale)
         before = _cost(left, z, weights, scale)
         size = 1.0
@@ -205,10 +215,9 @@ def fit_base(
             if after < before or size <= SMALLEST_STEP:
                 break
             size /= 2.0
-        if after >= before:
-            break
-        z, residual = trial, tried
-        if before - after < ENOUGH * before:
+        if after < before:
+            z, residual = trial, tried
+        if cooled and before - after < ENOUGH * before:
             break
     cost = _cost(problem.whiten(residual), z, weights, 1.0)
     return BaseFit(problem, z, residual, _columns(problem, bare, z), tuple(added), cost)
@@ -253,7 +262,11 @@ def _start(problem: BaseProblem, start: BaseFit | None) -> Array:
 
 
 def _robust_variance(white: Array) -> float:
-    """Variance of what is left, at least that of the noise: priors then hold against an effect."""
+    """Variance of what is left, at least that of the noise.
+
+    Priors then hold against an effect that is not there yet, or not at its value: a base that gave
+    way to it once does not come back.
+    """
     seen = white[white != 0.0]
     return max(1.0, float(np.median(seen**2)) / MEDIAN_CHI2)
 
