@@ -268,6 +268,7 @@ def test_headroom_is_the_share_of_what_could_fall():
 def test_no_headroom_is_claimed_where_nothing_could_fall():
     found = compared((1.0, 0.99), 0.995)
     assert found.headroom(found.models[1], "s_um") is None
+    assert "a curve over the conditions alone reaches 1." in found.verdict[-2]
 
 
 def test_verdict_says_whether_it_is_noise():

@@ -182,7 +182,8 @@ class Comparison:
         )
         share = self.headroom(last, quantity.key)
         if share is None:
-            return f"{text}; the conditions hold no more than that."
+            left = f"{self.process[quantity.key]:.3g} {quantity.unit}"
+            return f"{text} (a curve over the conditions alone reaches {left})."
         if share >= 1.0:
             # A process over the conditions of a moment knows nothing of where the wrist came from.
             return f"{text}: all that the conditions could explain."

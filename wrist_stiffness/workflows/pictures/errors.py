@@ -76,7 +76,8 @@ def draw_bars(every: Sequence[Bars]) -> Any:
             told.append(f"{name} ({LINES[style]}) {level:.3g}")
         plot.set_yticks(places, [_shortened(name) for name in bars.names])
         plot.invert_yaxis()
-        plot.set_xlim(0.0, 1.18 * max([*bars.values, *bars.marks.values()]))
+        ends = [value + error for value, error in zip(bars.values, bars.uncertainties, strict=True)]
+        plot.set_xlim(0.0, 1.18 * max([*filter(np.isfinite, ends), *bars.marks.values()]))
         plot.set_xlabel(f"{bars.label}, RMS")
         plot.set_title(", ".join(told), fontsize=9, loc="left")
     return figure
