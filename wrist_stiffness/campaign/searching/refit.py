@@ -63,10 +63,16 @@ def refit(
 
 
 def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
-    if {each.name for each in named} == set(base.extras):
-        return base
-    # A base that had effects along which are not named stands where those left it.
-    return fit_base(model, base.problem.sessions, named, base if named else None)
+    sessions = base.problem.sessions
+    if not named:
+        # A base that had effects along which are not named stands where those left it.
+        return fit_base(model, sessions) if base.extras else base
+    same = {each.name for each in named} == set(base.extras)
+    fitted = base if same else fit_base(model, sessions, named, base)
+    if _variance(fitted) < ROUGH:
+        return fitted
+    # Flanges and play let a base that took up a large effect not find back: so from the drawing.
+    return min(fitted, fit_base(model, sessions, named), key=lambda each: each.cost)
 
 
 def _variance(fitted: BaseFit) -> float:
