@@ -1,5 +1,7 @@
 """The influence law against a full elastic model of springs and free pairs, ignorant of G."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.statics import (
+    changed_operators,
     compliance,
     component_rotations,
     component_shares,
@@ -329,3 +332,29 @@ def test_stiff_closed_flanges_turn_cylinders_into_revolutes(case):
     twist = operators.compliance @ load + operators.force_twist @ force
     wanted = full.solve()
     assert np.allclose(twist, wanted, rtol=1e-5, atol=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("name", ["link_2", "joint_3"])
+def test_operators_after_a_change_of_one_part_are_those_made_anew(case, name):
+    rng, mechanism, theta, components = case
+    gravity = rng.normal(size=3) * 5.0
+    configuration = mechanism.forward(theta)
+    flexibility, contact = components.flexibility.copy(), dict(components.contact)
+    flexibility[ELASTIC.index(name)] *= 3.0
+    if name in contact:
+        own = contact[name]
+        contact[name] = replace(
+            own,
+            screw=3.0 * own.screw,
+            approach=3.0 * own.approach,
+            weight_approach=3.0 * own.weight_approach,
+            gap=own.gap + 1e-5,
+        )
+    after = replace(components, flexibility=flexibility, contact=contact)
+    before = contact_operators(configuration, components, gravity)
+    weight = weight_response(configuration, components, gravity).wrench
+    found = changed_operators(before, configuration, components, after, gravity, weight)
+    wanted = contact_operators(configuration, after, gravity)
+    for field in ("compliance", "force_twist", "approach", "gap", "weight_twist", "screw_gap"):
+        assert close(getattr(found, field), getattr(wanted, field))
+    assert not close(found.approach, before.approach)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from wrist_stiffness.errors import TableError
-from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import ContactOperators
@@ -116,14 +116,12 @@ def unpack(
     factor = np.zeros((*columns.shape[:-1], size, size))
     factor[..., rows, places] = columns[..., : len(rows)]
     whole = factor @ np.swapaxes(factor, -1, -2)
-    slides = influence(configuration).slides()
-    screw_gap = np.zeros((*slides.shape[:-3], m, len(ELASTIC), 6))
-    screw_gap[..., :3] = np.einsum("mj,...kji->...mki", slide, slides)
     return ContactOperators(
         compliance=whole[..., :6, :6],
         force_twist=whole[..., :6, 6:],
         approach=whole[..., 6:, 6:],
         gap=columns[..., len(rows) : len(rows) + m],
         weight_twist=columns[..., len(rows) + m :],
-        screw_gap=screw_gap,
+        slide=slide,
+        slides=influence(configuration).slides(),
     )

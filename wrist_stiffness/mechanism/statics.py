@@ -8,9 +8,11 @@ matrix products instead of a finite-element solve.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import (
     CARRIER,
@@ -181,8 +183,10 @@ class ContactOperators:
         Gaps under own weight alone [m].
     weight_twist : (..., 6) float
         Platform twist under own weight with free slides [m, rad].
-    screw_gap : (..., m, 8, 6) float
-        N_k: opening of each gap for a screw at each elastic component.
+    slide : (m, 3) float
+        Opening of each gap for a unit slide of joint_2, joint_3 and joint_4.
+    slides : (..., 8, 3, 3) float
+        Slides (rows) by a translation of each elastic component.
     """
 
     compliance: Array
@@ -190,7 +194,16 @@ class ContactOperators:
     approach: Array
     gap: Array
     weight_twist: Array
-    screw_gap: Array
+    slide: Array
+    slides: Array
+
+    @cached_property
+    def screw_gap(self) -> Array:
+        """N_k: opening of each gap for a screw at each elastic component, (..., m, 8, 6)."""
+        out = np.zeros((*self.gap.shape, N_ELASTIC, 6))
+        # (m, slide) times (component, slide, xyz), component by component.
+        out[..., :3] = np.swapaxes(self.slide @ self.slides, -3, -2)
+        return out
 
 
 def contact_operators(
@@ -213,44 +226,126 @@ def contact_operators(
         Of the same leading shape; m = 0 sectors if no joint has a flange.
     """
     projectors = influence(configuration)
-    g = projectors.of_components()
-    r = component_rotations(configuration)
     flexibility = turned_flexibilities(configuration, components)
     weight = _weight_response(configuration, components, gravity, projectors, flexibility)
+    sums = _summed(configuration, projectors, components, flexibility, gravity, weight.wrench)
+    return ContactOperators(
+        **vars(sums), slide=components.sectors.slide, slides=projectors.slides()
+    )
+
+
+def changed_operators(
+    operators: ContactOperators,
+    configuration: Configuration,
+    before: ElasticComponents,
+    after: ElasticComponents,
+    gravity: Array,
+    wrench: Array,
+) -> ContactOperators:
+    """Return the operators after a change of some parts' flexibility, flanges included.
+
+    They are sums over the parts, so only what changes is computed.
+
+    Parameters
+    ----------
+    operators : ContactOperators
+        Of the parts before.
+    configuration : Configuration
+        Of shape (...).
+    before, after : ElasticComponents
+        Parts with the same weights and the same flange sectors.
+    gravity : (3,) float
+        Acceleration of gravity in F [m/s^2].
+    wrench : (..., 8, 6) float
+        Of own weight through the components [N, N m].
+    """
+    contact = {
+        joint: replace(
+            flange,
+            screw=flange.screw - before.contact[joint].screw,
+            approach=flange.approach - before.contact[joint].approach,
+            weight_approach=flange.weight_approach - before.contact[joint].weight_approach,
+            gap=flange.gap - before.contact[joint].gap,
+        )
+        for joint, flange in after.contact.items()
+    }
+    flexibility = after.flexibility - before.flexibility
+    change = replace(after, flexibility=flexibility, contact=contact)
+    sectors = change.sectors
+    moved = np.asarray(flexibility.any(axis=(1, 2)))
+    moved[sectors.component[sectors.screw.any(1) | sectors.weight_approach.any(1)]] = True
+    which = np.flatnonzero(moved)
+    turn = block_diagonal(component_rotations(configuration).take(which, axis=-3))
+    turned = turn @ flexibility[which] @ np.swapaxes(turn, -1, -2)
+    projectors = influence(configuration)
+    sums = _summed(configuration, projectors, change, turned, gravity, wrench, which)
+    added = {name: getattr(operators, name) + value for name, value in vars(sums).items()}
+    return replace(operators, **added)
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """What of `ContactOperators` is a sum over the elastic components."""
+
+    compliance: Array
+    force_twist: Array
+    approach: Array
+    gap: Array
+    weight_twist: Array
+
+
+def _summed(
+    configuration: Configuration,
+    projectors: Influence,
+    components: ElasticComponents,
+    flexibility: Array,
+    gravity: Array,
+    wrench: Array,
+    which: NDArray[np.intp] | None = None,
+) -> _Sums:
+    """Sum over the components, or over some by their numbers: then all others count as rigid.
+
+    The flexibility (..., c, 6, 6) is of these, turned to the pose.
+    """
     sectors = components.sectors
-    own, lead, m = sectors.component, configuration.b.shape[:-1], len(sectors.gap)
+    part: slice | NDArray[np.intp] = slice(None)
+    mine: slice | NDArray[np.intp] = slice(None)
+    own = sectors.component
+    if which is not None:
+        part, mine = which, np.flatnonzero(np.isin(own, which))
+        own = np.searchsorted(which, own[mine])
+    g, rows = projectors.of_components()[..., part, :, :], projectors.slides()[..., part, :, :]
+    r = component_rotations(configuration)[..., part, :, :]
+    carry = block_diagonal(g)
+    through = wrench[..., part, :]
+    sagged = (flexibility @ through[..., None])[..., 0]
 
     # A unit slide force of each passive joint: by virtual work it pulls at the components with the
     # rows that map their translations to the slides.
-    rows = projectors.slides()
     bent = flexibility[..., :3] @ np.swapaxes(rows, -1, -2)
     slide_flexibility = (rows @ bent[..., :3, :]).sum(axis=-3)
-    slide_twist = (block_diagonal(g) @ bent).sum(axis=-3)
+    slide_twist = (carry @ bent).sum(axis=-3)
 
     # What a unit force of each sector does through its own bushing.
-    screw = _turned(r.take(own, axis=-3), sectors.screw)
+    screw = _turned(r.take(own, axis=-3), sectors.screw[mine])
     screw_slide = rows.take(own, axis=-3) @ screw[..., :3, None]
     coupling = sectors.slide @ np.swapaxes(screw_slide[..., 0], -1, -2)
-    screw_twist = _turned(g.take(own, axis=-3), screw)
+    # In place: the largest arrays here, and new memory costs more than the sums.
+    approach = sectors.slide @ slide_flexibility @ sectors.slide.T
+    approach += sectors.approach
+    approach[..., mine] += coupling
+    approach[..., mine, :] += np.swapaxes(coupling, -1, -2)
+    force_twist = slide_twist @ sectors.slide.T
+    force_twist[..., mine] += np.swapaxes(_turned(g.take(own, axis=-3), screw), -1, -2)
 
-    screw_gap = np.zeros((*lead, m, N_ELASTIC, 6))
-    # (m, slide) times (component, slide, xyz), component by component.
-    screw_gap[..., :3] = np.swapaxes(sectors.slide @ rows, -3, -2)
+    gap = sectors.gap + np.einsum("...kij,...kj->...i", rows, sagged[..., :3]) @ sectors.slide.T
     field = _to_body(r, gravity).take(own, axis=-3)
-    gap = (
-        sectors.gap
-        + (sectors.weight_approach[:, None, :] @ field)[..., 0, 0]
-        + slides(projectors, weight.screw) @ sectors.slide.T
-        + (screw * weight.wrench.take(own, axis=-2)).sum(axis=-1)
-    )
-    return ContactOperators(
-        compliance=component_shares(configuration, components).sum(axis=-3),
-        force_twist=slide_twist @ sectors.slide.T + np.swapaxes(screw_twist, -1, -2),
-        approach=sectors.approach
-        + sectors.slide @ slide_flexibility @ sectors.slide.T
-        + coupling
-        + np.swapaxes(coupling, -1, -2),
+    gap[..., mine] += (sectors.weight_approach[mine, None, :] @ field)[..., 0, 0]
+    gap[..., mine] += (screw * through.take(own, axis=-2)).sum(axis=-1)
+    return _Sums(
+        compliance=(carry @ flexibility @ np.swapaxes(carry, -1, -2)).sum(axis=-3),
+        force_twist=force_twist,
+        approach=approach,
         gap=gap,
-        weight_twist=weight.twist,
-        screw_gap=screw_gap,
+        weight_twist=_turned(g, sagged).sum(axis=-2),
     )

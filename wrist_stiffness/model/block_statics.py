@@ -13,6 +13,7 @@ from wrist_stiffness.mechanism.influence import Influence, influence
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import (
     ContactOperators,
+    changed_operators,
     contact_operators,
     turned_flexibilities,
     weight_response,
@@ -52,10 +53,25 @@ class BlockStatics:
     def with_parts(self, parts: ElasticComponents) -> BlockStatics:
         """Return the statics of the same samples with other parts."""
         other = replace(self, parts=parts)
-        # The free slides make the wrist isostatic: its own weight finds its way without springs.
-        for name in ("influence", "jacobian", "own_weight"):
+        for name in ("influence", "jacobian"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
+        same = ("weight_motor_side", "weight_platform_side", "platform_weight")
+        if all(getattr(parts, name) is getattr(self.parts, name) for name in same):
+            # The free slides make the wrist isostatic: own weight finds its way without springs.
+            other.__dict__["own_weight"] = self.own_weight
+            if (
+                self.evaluation == "closed_form"
+                and parts.contact.keys() == self.parts.contact.keys()
+            ):
+                other.__dict__["operators"] = changed_operators(
+                    self.operators,
+                    self.configuration,
+                    self.parts,
+                    parts,
+                    self.table.geometry.gravity,
+                    self.own_weight,
+                )
         return other
 
     @cached_property
