@@ -11,10 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.observing import Observed, UnitSession
 from wrist_stiffness.diagnosis.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
@@ -41,6 +43,9 @@ REACH = 4.0
 INDEPENDENT = 50
 """So many units of a session count against the priors: a model that is wrong is wrong alike at
 neighbours, and a tare must not stand in for it."""
+
+Motion = tuple[Array, Array]
+"""Rotation (3, 3) and shift (3,) [m]."""
 
 LOAD_STEP = np.repeat([1e-2, 1e-3], 3)
 """Change of the load that shows what a tare does [N, N m]."""
@@ -140,7 +145,9 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
 
     def left() -> tuple[Array, Array, Array]:
         turn, shift = said()
-        twist = log_motion(turn @ np.swapaxes(home.platform, -1, -2), shift)
+        bow = _bow(mechanism, session, instrument, target, zero)
+        error = exp_twist(np.hstack([np.zeros_like(shift), bow[:, 3:]]))[0] @ turn
+        twist = log_motion(error @ np.swapaxes(home.platform, -1, -2), shift + bow[:, :3])
         return session.residual(twist), turn, shift
 
     for _ in range(ROUNDS):
@@ -167,7 +174,25 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.n
     return SetUp(session.name, values, left()[0])
 
 
-def _composed(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
+def _bow(
+    mechanism: Mechanism, session: UnitSession, instrument: Motion, target: Motion, zero: Array
+) -> Array:
+    """Return by how much the mean of registered poses is off the pose at the mean angles, (u, 6).
+
+    In motion a target that is a millimetre off goes along a bow, and a unit is half a second of it.
+    """
+
+    def registered(theta: Array) -> Array:
+        moved = mechanism.forward(theta + zero).platform
+        nominal = np.swapaxes(mechanism.forward(theta).platform, -1, -2)
+        turn = Rotation.from_matrix(instrument[0] @ moved @ target[0] @ nominal).as_rotvec()
+        return np.hstack([(moved @ target[1]) @ instrument[0].T + instrument[1], turn])
+
+    theta = session.block.theta
+    return session.mean(registered(theta)) - registered(session.mean(theta))
+
+
+def _composed(first: Motion, second: Motion) -> Motion:
     """Return the motion `second`, followed by `first`."""
     return first[0] @ second[0], first[0] @ second[1] + first[1]
 
