@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.columns import SessionModel
+from wrist_stiffness.campaign.hidden_counts import counts_known
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units, observe
+from wrist_stiffness.diagnosis.shared import own_covariance
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -94,10 +96,12 @@ def test_means_of_angles_in_motion_know_more_than_those_of_a_rest(model, session
     unit = found.sessions[0]
     turned = np.trace(found.observations.covariance[:, 3:, 3:], axis1=1, axis2=2)
     dwell, moments = unit.cut.dwell, unit.samples
-    assert unit.counts(step)[dwell] == pytest.approx(1.0)
+    known = counts_known(unit.cut, step)
+    assert known[dwell] == pytest.approx(1.0)
     # Both motors sweep a hundred counts between two moments.
-    both = ~dwell & (moments == moments[~dwell].max()) & (np.abs(unit.counts(step)).min(axis=1) > 1)
-    assert unit.counts(step)[both] == pytest.approx(np.tile(moments[both, None], 2))
+    both = ~dwell & (moments == moments[~dwell].max()) & (known.min(axis=1) > 1.0)
+    assert both.any()
+    assert known[both] == pytest.approx(np.tile(moments[both, None], 2))
     assert turned[both].max() < 1.3 * turned[dwell].min() / moments[both].min()
 
 
@@ -115,3 +119,27 @@ def test_a_target_off_the_platform_leaves_nothing_in_motion(model, session):
     (predicted,) = SessionModel(model, unit, ()).along([(*model.effects, target)])
     left = unit.residual(predicted)
     assert np.abs(left[:, :3] - left[0, :3]).max() < 2e-8
+
+
+def test_rests_between_which_only_the_load_changes_hide_the_same_counts(model):
+    """0  rest  2  load  3  rest  5  move  6  rest  8: the first two rests are one stand."""
+    time = np.arange(0.0, 8.0, 0.1)
+    theta = np.stack([np.interp(time, (5.0, 6.0), (0.1, 0.4)), np.full(len(time), 0.2)], axis=1)
+    load = np.zeros((len(time), 6))
+    load[:, 2] = -np.interp(time, (2.0, 3.0), (0.5, 1.0))
+    block = Block(time, theta, load)
+    rotation, shift = exp_twist(model.batch(block).measured)
+    nominal = model.table.mechanism.forward(theta).platform
+    white = np.diag(np.repeat([1e-12, 1e-10], 3))
+    unit = observe(model, [MeasuredSession("a day", block, shift, rotation @ nominal, white)])
+    stand, dwell = unit.observations.stand, unit.sessions[0].cut.dwell
+    first, second, third = stand[dwell]
+    assert first == second >= 0
+    assert third != first
+    time = unit.observations.times
+    changing = ~dwell & (time < 4.0)
+    assert changing.any()
+    assert (stand[changing] == first).all()
+    assert (stand[(time > 5.2) & (time < 5.7)] == -1).all()
+    own = own_covariance(unit.observations, unit.observations.covariance)
+    assert own[0] == pytest.approx(white, rel=1e-6)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.hidden_counts import hidden_counts, stands_of
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.table_range import beyond_range
@@ -109,19 +110,6 @@ class UnitSession:
         weighted = flat[used] * self.cut.weight[used, None]
         sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
         return np.asarray(np.stack(sums, axis=1).reshape(units, *values.shape[1:]), dtype=float)
-
-    def counts(self, step: float) -> Array:
-        """Return how many encoder counts of their own the means of the angles know, (u, 2).
-
-        A motor at rest hides the same part of a count all the time.
-        """
-        used = self.cut.unit >= 0
-        unit, theta = self.cut.unit[used], self.block.theta[used]
-        low, high = np.full((2, len(self.cut.dwell), 2), np.nan)
-        np.fmin.at(low, unit, theta)
-        np.fmax.at(high, unit, theta)
-        moments = np.bincount(unit, minlength=len(low))[:, None]
-        return np.clip((high - low) / step, 1.0, np.where(self.cut.dwell[:, None], 1.0, moments))
 
     def residual(self, twist: Array) -> Array:
         """Return log(T_measured T_predicted^-1) at O in F, (u, 6) [m, rad].
@@ -299,15 +287,20 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     if not used.any():
         raise InputError("no unit of the sessions was measured: every pose is blank")
     theta = np.concatenate([each.mean(each.block.theta) for each in sessions])
+    cuts = [each.cut for each in sessions]
+    counts = hidden_counts(model.table, cuts, theta)
+    covariance = _covariance(sessions, counts)
     observations = Observations(
         values,
         _covariates(sessions),
-        _covariance(model, sessions, theta),
+        covariance,
         np.concatenate([each.mean(each.block.time) for each in sessions]),
         np.repeat(np.arange(len(sessions)), [len(each.cut.dwell) for each in sessions]),
         _replicates(model, sessions, theta),
         np.concatenate([each.samples for each in sessions]),
         QUANTITIES,
+        stand=stands_of(model.table, cuts),
+        shared=None if covariance is None else counts,
     )
     row = np.where(used, np.cumsum(used) - 1, -1)
     starts = ends - [len(each.cut.dwell) for each in sessions]
@@ -343,13 +336,8 @@ def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
     return {name: np.concatenate([own[name] for own in columns]) for name in common}
 
 
-def _covariance(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Array | None:
+def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | None:
     """Return the covariance of each unit on its own: white noise and the hidden encoder count."""
-    mechanism, step = model.table.mechanism, model.table.geometry.limits.encoder_step
-    jacobian = np.zeros((len(theta), 6, 2))
-    jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
-    hidden = np.concatenate([step**2 / 12.0 / each.counts(step) for each in sessions])
-    counts = (jacobian * hidden[:, None, :]) @ np.swapaxes(jacobian, -1, -2)
     white = np.stack([each.white for each in sessions])
     seen = np.concatenate([np.concatenate([e.shift, e.turn], axis=1) for e in sessions])
     if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():
@@ -361,7 +349,7 @@ def _covariance(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Arr
             for own, each in zip(variance, sessions, strict=True)
         ]
     )
-    return np.asarray(counts + own[:, :, None] * np.eye(6))
+    return np.asarray(counts @ np.swapaxes(counts, -1, -2) + own[:, :, None] * np.eye(6))
 
 
 def _replicates(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Labels:

@@ -70,6 +70,10 @@ class Observations:
         Standard deviation of the error of an uncertain condition (a load), per unit.
     row : (n,) array of int, optional
         Number of each unit in the table that it was taken from; by default this one.
+    stand : (n,) array of int, optional
+        Units with the same label >= 0 share a part of their scatter.
+    shared : (n, m, s) array, optional
+        That part: what each of s standard normal numbers does to a unit; `covariance` holds it.
     """
 
     values: Array
@@ -82,6 +86,8 @@ class Observations:
     quantities: tuple[Quantity, ...] = field(default=())
     covariate_std: Mapping[str, float] = field(default_factory=dict)
     row: Labels | None = None
+    stand: Labels | None = None
+    shared: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse tables whose columns do not belong together."""
@@ -96,6 +102,7 @@ class Observations:
             "replicate": self.replicate,
             "samples": self.samples,
             "row": self.row,
+            "stand": self.stand,
             **{f"covariate {name!r}": column for name, column in self.covariates.items()},
         }
         for name, column in per_unit.items():
@@ -190,6 +197,8 @@ class Observations:
             self.quantities,
             self.covariate_std,
             self.rows[rows],
+            some(self.stand),
+            some(self.shared),
         )
 
     def with_values(self, values: Array) -> "Observations":

@@ -18,6 +18,7 @@ from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import BUILT, FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.diagnosis.shared import apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -66,13 +67,15 @@ class BaseProblem(FitProblem):
         stated = self.table.covariance
         if stated is None:
             stated = np.diag(4.0 * WANDER**2)
-        return np.linalg.inv(np.linalg.cholesky(stated + np.diag(WANDER**2)))
+        own = own_covariance(self.table, stated) + np.diag(WANDER**2)
+        return np.linalg.inv(np.linalg.cholesky(own))
 
     def whiten(self, values: Array) -> Array:
         """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
         columns = values if values.ndim == 3 else values[:, :, None]
         measured = self.table.measured[:, :, None]
-        white = self._factor @ np.where(measured, np.nan_to_num(columns), 0.0)
+        filled = np.where(measured, np.nan_to_num(columns), 0.0)
+        white = apart(self.table, self._factor, filled)
         flat: Array = white.reshape(-1, columns.shape[2])
         return flat if values.ndim == 3 else flat[:, 0]
 
@@ -202,7 +205,7 @@ def fit_base(
     for _ in range(MOST_STEPS):
         columns = _columns(problem, bare, z)
         left = problem.whiten(residual)
-        found = 1.0 if extras else _robust_variance(left)
+        found = _robust_variance(left)
         scale = max(found, COOLING * scale)
         cooled = scale == found
         step = _step(problem.whiten(columns), left, z * weights, weights, scale)
