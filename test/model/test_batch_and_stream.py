@@ -13,7 +13,7 @@ from wrist_stiffness.model import batch
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.contacts import solve_contacts
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import catalogue
 
@@ -256,3 +256,45 @@ def test_candidates_in_one_pass_are_their_own_batches(model, make):
         scale = np.abs(alone.measured).max(axis=0)
         assert np.all(np.abs(found.measured - alone.measured) <= 1e-12 * scale)
     assert not np.array_equal(together[0].measured, together[4].measured)
+
+
+def test_candidates_share_no_more_than_they_have_in_common(model, make, monkeypatch):
+    """A memory, a load, a sensor: what a candidate changes, the base's later effects see."""
+    monkeypatch.setattr(batch, "CHUNK", 20)
+    base = model.with_effects(
+        *(plausible(*name.split("@")) for name in ("load_scale@load_sensor", "backlash@motor_1")),
+        plausible("joint_friction", "joint_2"),
+        plausible("drive_compliance", "motor_2"),
+    )
+    own = base.effects
+    moved = own[1].with_values({"width_mdeg": 7.0})
+    candidates = [
+        own,
+        (*own, plausible("cable_wrench", "platform")),
+        (*own, plausible("creep", "joint_3")),
+        (*own, plausible("drift", "pose_sensor")),
+        (own[0], moved, *own[2:]),
+        (*own[:2], *own[3:]),
+        (*own, plausible("encoder_offset", "motor_1")),
+    ]
+    block = make.block(70)
+    together = model.with_effects().batch_with(block, candidates)
+    for effects, found in zip(candidates, together, strict=True):
+        alone = model.with_effects(*effects).batch(block)
+        scale = np.abs(alone.measured).max(axis=0)
+        assert np.all(np.abs(found.measured - alone.measured) <= 1e-12 * scale)
+        assert np.all(np.abs(found.twist - alone.twist) <= 1e-12 * scale)
+    for found in together[1:]:
+        assert not np.allclose(found.measured, together[0].measured, rtol=1e-9, atol=0.0)
+
+
+def test_beside_itself_with_another_past(model, make):
+    """The same model at the same block, but what was before differs."""
+    loaded = model.with_effects(plausible("backlash", "motor_1"))
+    block = make.block(10)
+    first = evaluate(loaded, block, None)
+    past = replace(first.memory, states=(block.theta[0, 0] + 1e-3,))
+    (found,) = evaluate_beside([loaded], [past], first)
+    wanted = evaluate(loaded, block, past)
+    assert np.allclose(found.twist, wanted.twist, rtol=1e-12)
+    assert not np.allclose(found.twist, first.twist, rtol=1e-6)

@@ -6,7 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from wrist_stiffness.model.contacts import FEW, STRIDE, WIDTH, Held, forces_of, solve_contacts
+from wrist_stiffness.model.contacts import (
+    FEW,
+    STRIDE,
+    WIDTH,
+    Held,
+    forces_of,
+    solve_alike,
+    solve_contacts,
+)
 
 ROUNDING = 1e-9
 """Relative; times the condition number of the flexibilities, 100."""
@@ -49,6 +57,20 @@ def test_every_guess_leads_to_the_least_energy(case):
         tolerance = 100.0 * ROUNDING * np.maximum(scale(approach, gap), wanted)
         assert np.all(np.abs(force - wanted) <= tolerance)
         assert np.array_equal(active, force > 0.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(stacks, st.sampled_from([1, 4]))
+def test_problems_with_the_same_flexibility_are_solved_beside_each_other(case, problems_each):
+    approach, gap, state = problems(*case)
+    gaps = np.stack([gap * size for size in np.linspace(1.0, -1.0, problems_each)], axis=-1)
+    force, active = solve_alike(approach, gaps, Held.of(approach, state))
+    for number in range(problems_each):
+        each = gaps[..., number]
+        wanted = np.array([by_least_squares(a, g) for a, g in zip(approach, each, strict=True)])
+        tolerance = 100.0 * ROUNDING * np.maximum(scale(approach, gap), wanted)
+        assert np.all(np.abs(force[..., number] - wanted) <= tolerance)
+        assert np.array_equal(active[..., number], force[..., number] > 0.0)
 
 
 @settings(max_examples=60, deadline=None)
