@@ -241,6 +241,11 @@ def test_late_load_stamps_run_along_the_ramp(model, make):
         ("encoder_eccentricity", {"cos_1_mdeg": 8.0}, lambda a: np.cos(a)),
         ("encoder_eccentricity", {"sin_2_mdeg": 8.0}, lambda a: np.sin(2 * a)),
         ("transmission_error", {"sin_mdeg": 8.0, "order": 100.0}, lambda a: np.sin(100 * a)),
+        (
+            "transmission_error",
+            {"cos_3_mdeg": 8.0, "order": 20.0, "run_out_sin_percent": 30.0},
+            lambda a: (1 + 0.3 * np.sin(a)) * np.cos(60 * a),
+        ),
     ],
 )
 def test_waves_of_the_drive_are_other_angles(model, make, motor, law, values, wave):

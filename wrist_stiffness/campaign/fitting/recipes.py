@@ -30,7 +30,6 @@ GRIDS: dict[str, tuple[float, ...]] = {
     "lag_s": (0.0, 200.0, 1200.0),
     "motor_share_percent": (0.0, 100.0),
     "hysteresis_deg": (0.0, 5.0),
-    "order": tuple(3.0 + 1.2 * i for i in range(40)),
 }
 """Values to try of parameters in which a law is not linear, in the units of their names."""
 
@@ -244,11 +243,34 @@ def _clipped(parameter: Parameter, value: float) -> float:
     return min(max(value, parameter.lower), parameter.upper)
 
 
+ORDERS = tuple(3.0 + 1.2 * i for i in range(40))
+
+
+def gear(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
+    """Return columns of the waves of a gear on a grid of orders; its run-out is found by a fit."""
+    own = {p.key: p for p in law.parameters(place)}
+    waves = [key for key in own if key.endswith("_mdeg")]
+    still = dict.fromkeys(own, 0.0)
+    order = ShapeParameter("order", _inserted(ORDERS, near.get("order")))
+
+    def columns(at: Shape) -> tuple[Column, ...]:
+        return tuple(
+            Column(factor(own[key]), still | {"order": at[0], key: 1.0}, 1.0) for key in waves
+        )
+
+    def start(found: Mapping[str, float], at: Shape) -> Values:
+        run_out = {key: near.get(key, 0.0) for key in own if key.startswith("run_out")}
+        return still | run_out | {"order": at[0]} | {key: found[key] for key in waves}
+
+    return Recipe((order,), columns, start)
+
+
 GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
 
 SPECIAL: dict[str, Maker] = {
     "gravity": weight,
     "inertia": moving_mass,
+    "transmission_error": gear,
     "backlash": at_width("width_mdeg", 20.0),
     "joint_clearance": at_width("clearance_um", 5.0),
     "flange_contact": shares("gap_um", {"gap_um": GAPS_UM}, {}),

@@ -16,6 +16,7 @@ from wrist_stiffness.diagnosis import Candidate, Observations
 from wrist_stiffness.diagnosis import Parameter as Factor
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.effects.transmission_error import HARMONICS, RUN_OUT
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.registry import catalogue
 
@@ -242,7 +243,7 @@ def wrist_candidates(
     found = []
     for law, place, own in plans:
         if law.id == WAVE:
-            wave = _wave(point, place)
+            wave = _wave(point, place, dict(near.get(f"{law.id}@{place}", {})))
             found.append(WristCandidate(law, place, own, {}, wave, f"{law.id}@{place}" in near))
             continue
         known = {}
@@ -262,14 +263,18 @@ WAVE = "transmission_error"
 """Its columns are those of a turned motor times a wave: exact at every order."""
 
 
-def _wave(point: Point, place: str) -> Callable[[Shape], Array]:
+def _wave(point: Point, place: str, near: Values) -> Callable[[Shape], Array]:
     turn = point.changes([(catalogue()["encoder_offset"], place, {"offset_mdeg": 1.0})])[0]
     motor = MOTORS.index(place)
+    run_out = [0.01 * near.get(key, 0.0) for key in RUN_OUT]
 
     def columns(shape: Shape) -> Array:
         def wave(model: SessionModel) -> Array:
-            phase = shape[0] * model.session.block.theta[:, motor]
-            return model.session.mean(np.stack([np.cos(phase), np.sin(phase)], axis=-1))
+            angle = model.session.block.theta[:, motor]
+            phases = [harmonic * shape[0] * angle for harmonic in HARMONICS]
+            waves = np.stack([w(phase) for phase in phases for w in (np.cos, np.sin)], axis=-1)
+            height = 1.0 + run_out[0] * np.cos(angle) + run_out[1] * np.sin(angle)
+            return model.session.mean(height[:, None] * waves)
 
         return turn[:, :, None] * point.mean(wave)[:, None, :]
 

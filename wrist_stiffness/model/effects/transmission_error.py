@@ -12,9 +12,23 @@ from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.situation import Situation
 
+HARMONICS = (1, 2, 3)
+
+RUN_OUT = ("run_out_cos_percent", "run_out_sin_percent")
+
+
+def amplitudes(harmonic: int) -> tuple[str, str]:
+    """Return the names of the cosine and sine amplitudes of a harmonic."""
+    which = "" if harmonic == 1 else f"_{harmonic}"
+    return f"cos{which}_mdeg", f"sin{which}_mdeg"
+
 
 class TransmissionError(Law):
-    """Output minus motor: one wave of an order found from the data."""
+    """Output minus motor: a wave of an order found from the data, with two harmonics.
+
+    A mesh that is not sinusoidal has harmonics; a wheel that runs out of true meshes deeper on one
+    side, which raises and lowers all of them once per turn (sidebands).
+    """
 
     id = "transmission_error"
     stage = "geometry"
@@ -24,17 +38,23 @@ class TransmissionError(Law):
     excited_by = "slow sweeps of the motor, several samples within a wave"
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return amplitudes and the order."""
+        """Return the amplitudes, the order, and how far they vary once per turn."""
+        waves = (symmetric(key, 5000.0, 10.0) for n in HARMONICS for key in amplitudes(n))
         return (
-            symmetric("cos_mdeg", 1000.0, 10.0),
-            symmetric("sin_mdeg", 1000.0, 10.0),
+            *waves,
             Parameter("order", 3.0, 500.0, 50.0, mean=10.0, linear=False),
+            *(Parameter(key, -100.0, 100.0, 10.0, linear=False) for key in RUN_OUT),
         )
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the turn."""
-        phase = values["order"] * at.block.theta[:, MOTORS.index(place)]
-        turn = values["cos_mdeg"] * np.cos(phase) + values["sin_mdeg"] * np.sin(phase)
-        return at.motor_turn(place, turn), None
+        angle = at.block.theta[:, MOTORS.index(place)]
+        turn = np.zeros_like(angle)
+        for harmonic in HARMONICS:
+            cosine, sine = amplitudes(harmonic)
+            phase = harmonic * values["order"] * angle
+            turn += values[cosine] * np.cos(phase) + values[sine] * np.sin(phase)
+        run_out = values[RUN_OUT[0]] * np.cos(angle) + values[RUN_OUT[1]] * np.sin(angle)
+        return at.motor_turn(place, (1.0 + run_out) * turn), None
