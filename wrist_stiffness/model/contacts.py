@@ -20,6 +20,9 @@ STRIDE = 8
 WIDTH = 8
 """Samples whose numbers of held sectors round up to the same multiple are solved together."""
 
+MANY = 64
+"""Fewer samples than that are one stack: a call costs more than the larger matrices."""
+
 MAX_EXCHANGES = 12
 """Block exchanges of the whole stack; samples that are not done then are solved one by one."""
 
@@ -203,10 +206,11 @@ def _held(
     """
     n, m = closed.shape
     count = np.count_nonzero(closed, axis=1)
-    stack = -(-count // WIDTH)
+    width = WIDTH if n > MANY else max(1, int(count.max(initial=0)))
+    stack = -(-count // width)
     for number in np.flatnonzero(np.bincount(stack)[1:]) + 1:
         rows = np.flatnonzero(stack == number)
-        k = min(int(number) * WIDTH, m)
+        k = min(int(number) * width, m)
         places = np.argsort(~closed[rows], axis=1, kind="stable")[:, :k]
         held = np.arange(k) < count[rows, None]
         square = (rows * m)[:, None, None] * m + m * places[:, :, None] + places[:, None, :]
