@@ -31,10 +31,13 @@ FAR = 3.0
 MOVED = 2.0
 """Uncertainties, of before, by which a parameter of the base must move to be named."""
 
-WORTH_WIDENING = 1.5
+WORTH_WIDENING = 1.15
 """A prior is made wider if its parameters are so many times its width."""
 
-MOST_WIDENINGS, MOST_WIDENED = 3, 100.0
+HASTE = 2.0
+"""Power by which a round widens more than the parameters ask for, which the old prior held back."""
+
+MOST_WIDENINGS, MOST_WIDENED = 4, 100.0
 """Rounds, and how much wider a prior may become."""
 
 SIGNIFICANT = 2.0
@@ -109,14 +112,21 @@ class Extension:
         """What speaks against the effect, a sentence each."""
         out = []
         law, place = self.effect.law, self.effect.component
-        for each in self.own:
-            if each.at_bound:
-                out.append(f"{each.key} lies on its bound: the data ask for what cannot be")
-            elif not each.excited:
-                out.append(f"{each.key} is not told by these recordings; needs {law.excited_by}")
-            elif abs(each.moved) > FAR:
-                check = law.check.replace("{place}", place)
-                out.append(f"{each.key} is {abs(each.moved):.1f} x its usual size: {check}")
+        # On a bound of zero a parameter is nothing, which every effect may be in part.
+        bounded = [each for each in self.own if each.at_bound and each.value != 0.0]
+        untold = [each for each in self.own if not (each.at_bound or each.excited)]
+        far = [each for each in self.own if each.excited and abs(each.moved) > FAR]
+        far = [each for each in far if not each.at_bound]
+        if bounded:
+            keys = ", ".join(each.key for each in bounded)
+            out.append(f"on its bound: {keys}; the data ask for what cannot be")
+        if untold:
+            keys = ", ".join(each.key for each in untold)
+            out.append(f"not told by these recordings: {keys}; needs {law.excited_by}")
+        if far:
+            sizes = ", ".join(f"{each.key} is {abs(each.moved):.1f} x" for each in far)
+            check = law.check.replace("{place}", place)
+            out.append(f"{sizes} its usual size: {check}")
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
@@ -185,7 +195,7 @@ def _judged_at_size(
     for _ in range(MOST_WIDENINGS):
         beyond = _beyond_prior(after.fit)
         own = wide.free[-1]
-        widening = min(own.widening * beyond, MOST_WIDENED)
+        widening = min(own.widening * beyond**HASTE, MOST_WIDENED)
         if beyond < WORTH_WIDENING or widening <= own.widening:
             break
         wide = replace(wide, free=(*wide.free[:-1], replace(own, widening=widening)))
