@@ -16,7 +16,7 @@ import wrist_stiffness
 from wrist_stiffness import shipped
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.node_list import CELL_NODES, NodeEntry
+from wrist_stiffness.workflows.node_list import SIMULATOR_NODE, WRIST_NODES, NodeEntry
 
 ROOT = Path(__file__).parents[1]
 PROBE = "config/probe.yaml"
@@ -87,7 +87,7 @@ def test_every_console_script_names_a_function_that_exists(source):
     scripts.read(source / "wrist_stiffness.egg-info/entry_points.txt")
     assert set(scripts["console_scripts"]) == {
         "wrist-stiffness",
-        *(entry.executable for entry in CELL_NODES),
+        *(entry.executable for entry in (*WRIST_NODES, SIMULATOR_NODE)),
     }
     for target in scripts["console_scripts"].values():
         module, function = target.split(":")
@@ -135,7 +135,7 @@ def test_pip_installs_commands_and_shipped_files(source, tmp_path):
     run(*pip, *options, "--prefix", tmp_path, source, cwd="/")
     assert {path.name for path in (tmp_path / "bin").iterdir()} == {
         "wrist-stiffness",
-        *(entry.executable for entry in CELL_NODES),
+        *(entry.executable for entry in (*WRIST_NODES, SIMULATOR_NODE)),
     }
     (site,) = tmp_path.glob("lib/python*/site-packages")
     assert modules(site / "wrist_stiffness") == modules(source / "wrist_stiffness")
@@ -161,7 +161,7 @@ def test_colcon_installs_executables_and_shipped_files(source, tmp_path, options
     prefix = tmp_path / "install/wrist_stiffness"
     assert {path.name for path in (prefix / "lib/wrist_stiffness").iterdir()} == {
         "wrist-stiffness",
-        *(entry.executable for entry in CELL_NODES),
+        *(entry.executable for entry in (*WRIST_NODES, SIMULATOR_NODE)),
     }
     share = prefix / "share"
     assert (share / "ament_index/resource_index/packages/wrist_stiffness").is_file()

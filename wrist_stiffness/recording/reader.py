@@ -96,11 +96,6 @@ class Recording:
         )
         return "; ".join([*self._flaws, *undecodable])
 
-    @property
-    def skipped_topics(self) -> tuple[TopicInfo, ...]:
-        """Topics whose messages `messages` leaves out because their type is not known."""
-        return tuple(topic for topic in self.topics if not topic.is_readable)
-
     def raw_messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Iterate over the stored messages, in log-time order, without decoding.
 

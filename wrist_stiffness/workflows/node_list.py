@@ -58,8 +58,5 @@ WRIST_NODES = tuple(
 SIMULATOR_NODE = NodeEntry(executable="cell_simulator", name="cell_simulator")
 """The virtual wrist, with its motors, load and pose sensor."""
 
-CELL_NODES = (*WRIST_NODES, SIMULATOR_NODE)
-"""The whole virtual cell."""
-
 RECORDER_NODE = NodeEntry(executable="recorder", name="recorder")
 """Writes the wrist's topics into a recording; `ros2 bag` does where ROS is installed."""

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import BUILT
+from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP
 from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
@@ -29,8 +29,8 @@ FAR = 10.0
 TOLERANCES = {*(law for law, _ in BUILT), "load_scale"}
 """Laws of the base: what they do within their priors is no finding, however well it shows."""
 
-SET_UP = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias")
-"""Refitted in every session before any search; there is nothing to find."""
+SET_UP_ANEW = {law for law, _ in SET_UP}
+"""Laws refitted in every session before any search; there is nothing to find."""
 
 Progress = Callable[[int, int], None]
 Trial = tuple[Law, str, Values]
@@ -219,7 +219,7 @@ def wrist_candidates(
     plans = [
         (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
         for law in catalogue().values()
-        if law.id not in SET_UP
+        if law.id not in SET_UP_ANEW
         for place in law.places
         if f"{law.id}@{place}" not in absent
     ]
