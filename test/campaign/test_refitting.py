@@ -8,7 +8,7 @@ import pytest
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base
-from wrist_stiffness.campaign.searching.refit import blanked, refit, unseen, withdrawn
+from wrist_stiffness.campaign.searching.refit import blanked, refit, sized, unseen, withdrawn
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
@@ -112,24 +112,26 @@ def finding(name, fall):
     )
 
 
+def answer(*findings):
+    nothing = Unexplained((), 0.02, "")
+    floor, before, after = {"s_um": 1.0}, {"s_um": 10.0}, {"s_um": 3.0}
+    scope = "this session only"
+    return Diagnosis("effect", "dwell", floor, before, after, (), findings, nothing, (), 0, scope)
+
+
 def test_an_answer_says_what_was_withdrawn():
     two = (finding("backlash@motor_1", 5.0), finding("creep@joint_1", 2.0))
-    whole = Diagnosis(
-        "effect",
-        "dwell",
-        {"s_um": 1.0},
-        {"s_um": 10.0},
-        {"s_um": 3.0},
-        (),
-        two,
-        Unexplained((), 0.02, ""),
-        (),
-        0,
-        "this session only",
-    )
+    whole = answer(*two)
     told = withdrawn(whole, 1)
     assert told.findings == two[:1]
     assert told.verdict == "unknown"
     assert told.after == {"s_um": 5.0}
     assert told.unexplained.evidence == "creep@joint_1 with its own law makes the sealed part worse"
     assert withdrawn(whole, 2) is whole
+
+
+def test_an_effect_far_beyond_the_usual_is_told_as_such():
+    (usual,) = sized(answer(finding("backlash@motor_1", 5.0)), [backlash(60.0)]).findings
+    (huge,) = sized(answer(finding("backlash@motor_1", 5.0)), [backlash(2400.0)]).findings
+    assert usual.evidence == ""
+    assert huge.evidence == "; far beyond its usual size: width_mdeg = 2.4e+03"

@@ -16,7 +16,7 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, UnitSession, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
-from wrist_stiffness.campaign.searching.refit import refit, withdrawn
+from wrist_stiffness.campaign.searching.refit import refit, sized, withdrawn
 from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Screen
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
@@ -120,7 +120,7 @@ def diagnose_sessions(
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
-    return WristDiagnosis(result, observed, kept, final, absorbed)
+    return WristDiagnosis(sized(result, kept), observed, kept, final, absorbed)
 
 
 def seek_point(

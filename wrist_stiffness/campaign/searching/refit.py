@@ -19,11 +19,15 @@ from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import sealed_units
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
 
 ROUGH = 1.5
 """Variance of what is left, in units of the noise, from which a law is not taken as exact."""
+
+BEYOND = 30.0
+"""Usual sizes of a parameter that are far beyond the usual: is it this effect, in this unit?"""
 
 
 def refit(
@@ -102,6 +106,32 @@ def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
     sentences += [f"{each.name} with its own law makes the sealed part worse" for each in gone]
     unexplained = replace(result.unexplained, evidence="; ".join(sentences))
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
+
+
+def sized(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
+    """Return an answer that says of each finding if it is far beyond the usual.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        With its findings.
+    effects : sequence of Effect
+        What was fitted for each of them.
+    """
+    told = []
+    for finding, effect in zip(result.findings, effects, strict=True):
+        by_size = {p.key: _usual_sizes(effect, p) for p in effect.parameters}
+        key = max(by_size, key=lambda each: by_size[each])
+        sentence = finding.evidence
+        if by_size[key] > BEYOND:
+            value = effect.estimates[key].value
+            sentence += f"; far beyond its usual size: {key} = {value:.3g}"
+        told.append(replace(finding, evidence=sentence))
+    return replace(result, findings=tuple(told))
+
+
+def _usual_sizes(effect: Effect, parameter: Parameter) -> float:
+    return abs(effect.estimates[parameter.key].value - parameter.mean) / parameter.scale
 
 
 def blanked(sessions: Sessions, aside: Mask) -> Sessions:
