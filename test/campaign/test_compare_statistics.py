@@ -98,8 +98,8 @@ def change_of(name, component, size):
 @pytest.mark.parametrize(
     ("change", "name", "size"),
     [
-        (change_of("fy", 1, 2e-6), "fy", 2.0),
-        (change_of("force", 0, 3e-6), "force", 3.0),
+        (change_of("fy", 1, 2e-6), "force along y", 2.0),
+        (change_of("force", 0, 3e-6), "size of the force", 3.0),
         (change_of("humidity", 2, 0.1e-6), "humidity", 0.1),
         (lambda c: along(0, 2e-6 * np.log10(c["held_s"])), "hold time", 2.0),
         (lambda c: along(1, 4e-6 * (c["force"] == 0)), "zero load", 4.0),
@@ -108,7 +108,7 @@ def change_of(name, component, size):
             "loaded at rest",
             2.0,
         ),
-        (lambda c: along(0, 1e-6 * c["T_link_1"]), "link 1", 1.0),
+        (lambda c: along(0, 1e-6 * c["T_link_1"]), "temperature of link 1", 1.0),
         (lambda c: along(2, 5e-6 * np.cos(4 * c["theta_1"])), "angle of motor 1, four times", 5.0),
     ],
     ids=["direction", "size", "covariate", "hold", "zero", "at rest", "temperature", "harmonic"],
@@ -313,4 +313,4 @@ def test_a_session_is_asked_for_no_longer_lag_than_itself(n, lags):
     """Three seconds from one dwell to the next: 4.5, 7.5 and 20 minutes."""
     asked, _ = conditions(table(np.random.default_rng(8), n=n))
     names = [each.name for each in asked if each.topic == "temperature lag"]
-    assert names == [f"link 1, {lag} late" for lag in lags]
+    assert names == [f"temperature of link 1, {lag} late" for lag in lags]

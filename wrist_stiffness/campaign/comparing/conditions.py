@@ -153,7 +153,7 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
     for name in FORCES:
         yield Condition(
             "load direction",
-            name,
+            f"force along {name[1]}",
             f"For every newton of load along +{name[1]}",
             covariates[name][:, None],
             axis=f"{name} [N]",
@@ -161,7 +161,7 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
     for name in MOMENTS:
         yield Condition(
             "load direction",
-            name,
+            f"moment about {name[1]}",
             f"For every 0.01 N m of load about +{name[1]}",
             100.0 * covariates[name][:, None],
             axis=f"{name} [0.01 N m]",
@@ -177,14 +177,14 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
         )
     yield Condition(
         "load size",
-        "force",
+        "size of the force",
         "For every newton of load, whatever its direction",
         force[:, None],
         axis="size of the force [N]",
     )
     yield Condition(
         "load size",
-        "moment",
+        "size of the moment",
         "For every 0.01 N m of load, whatever its direction",
         100.0 * moment[:, None],
         axis="size of the moment [0.01 N m]",
@@ -238,7 +238,7 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator
         axis = f"temperature of {place} [degC]"
         yield Condition(
             "temperature",
-            place,
+            f"temperature of {place}",
             f"For every kelvin that {place} is warmer",
             column[:, None],
             axis=axis,
@@ -248,7 +248,7 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator
             turned = np.stack([np.cos(theta), np.sin(theta)], axis=1)
             yield Condition(
                 "temperature",
-                f"{place} with the angle of motor {motor}",
+                f"temperature of {place} with the angle of motor {motor}",
                 f"With the temperature of {place} and the angle of motor {motor} together",
                 (column - column.mean())[:, None] * (turned - turned.mean(axis=0)),
                 swings=True,
@@ -261,7 +261,7 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator
             minutes = f"{lag / 60.0:g} min"
             yield Condition(
                 "temperature lag",
-                f"{place}, {minutes} late",
+                f"temperature of {place}, {minutes} late",
                 f"For every kelvin that {place} was warmer, felt about {minutes} late",
                 # What the temperature itself tells is not asked twice.
                 (late - column)[:, None],
