@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -96,9 +97,13 @@ class SessionModel:
             Predicted with the trial minus predicted at the point, at O in F [m, rad].
         """
         path = [self.remembers(trial) for trial in trials]
+        # First of all: the trials take over what they have in common with it.
         own, *found = self.predicted([self.effects, *trials])
         base = {self.remembers(self.effects): own}
         if True in path and True not in base:
-            bare = self.model.with_effects().batch_with(self.session.block, [self.effects])
-            base[True] = self.session.mean(bare[0].measured)
+            base[True] = self._own_along
         return [each - base[on_path] for each, on_path in zip(found, path, strict=True)]
+
+    @cached_property
+    def _own_along(self) -> Array:
+        return self.along([self.effects])[0]
