@@ -29,7 +29,11 @@ BUILT = (
 )
 """What differs from wrist to wrist within its tolerances.  The gaps of the flanges are among them
 because whoever fits a wrist shims them to its axes; the load sensor's scale, because softer parts
-look nearly like it."""
+look nearly like it.
+
+A gap is free here by the prior of its law, tens of micrometres: a calibration describes whatever
+wrist stands there.  A diagnosis holds it to what shims leave (`searching.base_fit`), because a
+flange that stands otherwise is a fault to be named."""
 
 
 @dataclass(frozen=True)
