@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from wrist_stiffness.diagnosis.estimates import possible
 from wrist_stiffness.diagnosis.hypotheses import Hypothesis
@@ -11,7 +10,7 @@ from wrist_stiffness.diagnosis.observations import Array, Labels
 from wrist_stiffness.diagnosis.permutation import rearranged
 from wrist_stiffness.diagnosis.projection import ABSORBED, Base
 from wrist_stiffness.diagnosis.structure import background, lack_of_fit
-from wrist_stiffness.diagnosis.worth import worth
+from wrist_stiffness.diagnosis.worth import directions_of, worth, worth_along
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,15 +98,24 @@ def evidence_of(base: Base, hypothesis: Hypothesis, gain: float, scale: float = 
     scale : float
         Variance of the background.
     """
-    candidate, price = hypothesis.candidate, float(np.log(base.freedom))
-    scales = [p.scale for p in candidate.parameters if p.scale is not None]
-    if len(scales) < len(candidate.parameters):
-        return gain / scale - candidate.freedom * price
+    price = float(np.log(base.freedom))
+    found = _with_scales(base, hypothesis)
+    if found is None:
+        return gain / scale - hypothesis.candidate.freedom * price
+    columns, scales = found
+    own = worth(columns, base.residual, scales, scale)
+    return own - len(hypothesis.candidate.shape) * price
+
+
+def _with_scales(base: Base, hypothesis: Hypothesis) -> tuple[Array, Array] | None:
+    """Return the columns that the base leaves and their usual sizes; None where one has none."""
+    scales = [p.scale for p in hypothesis.candidate.parameters if p.scale is not None]
+    if len(scales) < len(hypothesis.candidate.parameters):
+        return None
     columns = base.beyond(hypothesis.columns)
     norm = np.linalg.norm(hypothesis.columns, axis=0)
     seen = np.linalg.norm(columns, axis=0) > ABSORBED * norm
-    found = worth(columns[:, seen], base.residual, np.array(scales)[seen], scale)
-    return found - len(candidate.shape) * price
+    return columns[:, seen], np.array(scales)[seen]
 
 
 def rank(
@@ -140,21 +148,29 @@ def chance_of_best(
     order, sign : arrays
         From `rearrangements`.
     """
-    directions = np.hstack([each.directions for each in ranked])
-    sizes = np.array([each.directions.shape[1] for each in ranked])
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     moved = rearranged(base.residual, n_components, order, sign)
     moved -= base.basis @ (base.basis.T @ moved)
-    gains = np.add.reduceat((directions.T @ moved) ** 2, starts, axis=0)
-    energy = np.sum(moved**2, axis=0)
-    by_chance = _surprise(gains, energy, base.freedom, sizes[:, None]).max(axis=0)
-    own = _surprise(
-        np.array([[ranked[0].gain]]), np.array([base.energy]), base.freedom, sizes[:1, None]
-    )[0, 0]
+    everything = np.column_stack([base.residual, moved])
+    energy = np.sum(everything**2, axis=0)
+    own = _scores(base, ranked[0], everything[:, :1], energy[:1])[0]
+    by_chance = np.full(moved.shape[1], -np.inf)
+    for each in ranked:
+        by_chance = np.maximum(by_chance, _scores(base, each, moved, energy[1:]))
     return float((1 + np.sum(by_chance >= own)) / (1 + len(by_chance)))
 
 
-def _surprise(gain: Array, energy: Array, freedom: int, size: Array) -> Array:
-    """Minus log tail probability of a gain against the residual variance that it leaves."""
-    variance = np.maximum(energy - gain, 1e-12 * energy) / np.maximum(freedom - size, 1)
-    return -chi2.logsf(gain / variance, size)
+def _scores(base: Base, each: Ranked, residuals: Array, energy: Array) -> Array:
+    """Score one hypothesis as the ranking does, on many residuals (N, q), (q,).
+
+    The variance is what it leaves of each: with a large effect in it, chance is large as well.
+    """
+    gain = np.sum((each.directions.T @ residuals) ** 2, axis=0)
+    left = base.freedom - each.directions.shape[1]
+    variance = np.maximum(energy - gain, 1e-12 * energy) / max(left, 1)
+    price = float(np.log(base.freedom))
+    found = _with_scales(base, each.hypothesis)
+    if found is None:
+        return np.asarray(gain / variance - each.hypothesis.candidate.freedom * price)
+    directions, size = directions_of(*found)
+    shapes = len(each.hypothesis.candidate.shape)
+    return worth_along(directions.T @ residuals, size, variance) - shapes * price

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.diagnosis.fitted import FittedModel
+from wrist_stiffness.diagnosis.nuisance import nuisance_columns
 from wrist_stiffness.diagnosis.observations import Array, Mask, Observations, Quantity
+from wrist_stiffness.diagnosis.projection import make_base
 from wrist_stiffness.diagnosis.resampling import time_blocks
 
 JUDGES = 8
@@ -34,8 +36,9 @@ class HeldOut:
     ----------
     residual : (n, m) array
         In the units of the table; NaN = not measured.
-    white : (n m,) array
-        Whitened.
+    white : (N,) array
+        Whitened, without what the set-up of the session could still take up: where a wander or a
+        registration goes after the end of the data is no evidence against an effect.
     """
 
     residual: Array
@@ -68,7 +71,12 @@ def held_out(model: FittedModel, sealed: Observations) -> HeldOut:
         Units put aside.
     """
     residual = model.residual(sealed)
-    return HeldOut(residual, model.noise.whiten(sealed, residual[:, :, None])[:, 0])
+    own = tuple(each for each in model.nuisances if each.per_session)
+    again = nuisance_columns(sealed, own)
+    columns = np.concatenate([again.columns, residual[:, :, None]], axis=2)
+    white = model.noise.whiten(sealed, columns)
+    base = make_base(white[:, :-1], again.prior_std, white[:, -1], int(sealed.measured.sum()))
+    return HeldOut(residual, base.residual)
 
 
 def refuted(before: HeldOut, after: HeldOut) -> bool:

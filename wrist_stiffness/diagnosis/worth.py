@@ -29,11 +29,32 @@ def worth(columns: Array, residual: Array, scales: Array, variance: float = 1.0)
     variance : float
         Of a number of the residual.
     """
+    directions, size = directions_of(columns, scales)
+    return float(worth_along(directions.T @ residual, size, variance))
+
+
+def directions_of(columns: Array, scales: Array) -> tuple[Array, Array]:
+    """Return independent directions of columns at usual sizes (N, k), and their squares (k,)."""
     scaled = columns * scales
-    size, vectors = np.linalg.eigh(scaled.T @ scaled / variance)
-    size = np.maximum(size, 0.0)
-    moment = vectors.T @ (scaled.T @ residual) / variance
-    return max(
-        float(np.sum(width**2 * moment**2 / (1 + width**2 * size) - np.log1p(width**2 * size)))
-        for width in WIDTHS
-    )
+    size, vectors = np.linalg.eigh(scaled.T @ scaled)
+    return scaled @ vectors, np.maximum(size, 0.0)
+
+
+def worth_along(moment: Array, size: Array, variance: Array | float) -> Array:
+    """Return what directions are worth to one residual or many, (...).
+
+    Parameters
+    ----------
+    moment : (k, ...) array
+        Product of each direction with each residual.
+    size : (k,) array
+        Squared length of each direction.
+    variance : (...) array or float
+        Of a number of each residual.
+    """
+    own = size.reshape(-1, *(1,) * (moment.ndim - 1)) / variance
+    square = (moment / variance) ** 2
+    trials = [
+        np.sum(w**2 * square / (1 + w**2 * own) - np.log1p(w**2 * own), axis=0) for w in WIDTHS
+    ]
+    return np.asarray(np.max(trials, axis=0))
