@@ -123,10 +123,29 @@ def test_positions_far_from_o_are_refused(tmp_path, campaign, table, offset_m, r
         read_session(recording, table)
 
 
-def test_swapped_motors_are_refused(tmp_path, campaign, table):
+def test_swapped_motors_are_refused_and_named(tmp_path, campaign, table):
     """They look nearly like an instrument that is turned by a quarter."""
     campaign.with_joints(("motor_2_joint", "motor_1_joint")).with_loads().with_poses()
-    with pytest.raises(InputError, match="not about the axes of wrist_base.*limit 5 deg.*order"):
+    both = "limit 5 deg.*with the motors swapped they agree; so they do with the instrument turned"
+    with pytest.raises(InputError, match=both):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+@pytest.mark.parametrize(
+    ("factor", "change"),
+    [
+        ([-1.0, 1.0], "the sign of motor 1 turned"),
+        ([1.0, -1.0], "the sign of motor 2 turned"),
+        (np.degrees([1.0, 1.0]), "angles taken as degrees"),
+    ],
+    ids=["sign of 1", "sign of 2", "degrees"],
+)
+def test_angles_of_a_wrong_sign_or_unit_are_named(tmp_path, campaign, table, factor, change):
+    campaign.with_loads().with_poses()
+    true = campaign.theta
+    campaign.theta = lambda time_ns: true(time_ns) * factor
+    campaign.with_joints()
+    with pytest.raises(InputError, match=f"with {change} they agree"):
         read_session(campaign.written(tmp_path / "bag"), table)
 
 

@@ -38,8 +38,10 @@ def beyond_range(table: Table, block: Block) -> list[str]:
     outside = ~table.workspace.domain(block.theta)
     if outside.any():
         first = ", ".join(f"{angle:.1f}" for angle in np.degrees(block.theta[outside][0]))
+        turns = np.abs(block.theta).max() > 2.0 * np.pi
         out.append(
             f"{outside.sum()} of {of} measured poses are not used: they lie outside the table's "
             f"domain, the first at {first} deg"
+            + (" (are the angles in degrees? a recording has radians)" if turns else "")
         )
     return out

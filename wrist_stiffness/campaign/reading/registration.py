@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 
 POSES_USED = 1000
@@ -60,3 +62,31 @@ def agreement(measured: Array, rigid: Array) -> Agreement:
         float(np.median((seen * turned.inv()).magnitude())),
         float(turn.magnitude()),
     )
+
+
+def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
+    """Return what to change in the motor angles so that rotations agree, empty for nothing known.
+
+    Parameters
+    ----------
+    measured : (n, 3, 3) float
+        U -> F, finite.
+    theta : (n, 2) float
+        Motor angles as they were recorded [rad].
+    table : Table
+        Of the wrist.
+    limit : float
+        Largest misfit of rotations that agree [rad].
+    """
+    for change, angles in (
+        ("the motors swapped", theta[:, ::-1]),
+        ("the sign of motor 1 turned", theta * [-1.0, 1.0]),
+        ("the sign of motor 2 turned", theta * [1.0, -1.0]),
+        ("both signs turned", -theta),
+        ("angles taken as degrees", np.radians(theta)),
+    ):
+        if not table.mechanism.reachable(angles).all():
+            continue
+        if agreement(measured, rigid_rotation(table, angles)).misfit <= limit:
+            return change
+    return ""

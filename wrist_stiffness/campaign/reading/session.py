@@ -24,7 +24,7 @@ from wrist_stiffness.campaign.reading.clocks import ClockOffset, clock_offset
 from wrist_stiffness.campaign.reading.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.campaign.reading.path import GAP_S, turning_stamps
 from wrist_stiffness.campaign.reading.pose_track import PoseTrack, pose_track
-from wrist_stiffness.campaign.reading.registration import agreement
+from wrist_stiffness.campaign.reading.registration import agreement, put_right
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps
 from wrist_stiffness.campaign.reading.spikes import spikes
 from wrist_stiffness.campaign.reading.static_frames import frames_of
@@ -173,7 +173,7 @@ def _session(
         raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
     block = machine.at(time_ns)
     rigid = rigid_rotation(table, block.theta)
-    _require_same_wrist(rotation, rigid)
+    _require_same_wrist(rotation, block.theta, table)
     _require_near(shift)
     remarks += beyond_range(table, block)
     lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
@@ -265,14 +265,22 @@ def _require_overlap(angles_ns: Stamps, poses_ns: Stamps) -> None:
         )
 
 
-def _require_same_wrist(rotation: Array, rigid: Array) -> None:
+def _require_same_wrist(rotation: Array, theta: Array, table: Table) -> None:
     known = np.isfinite(rotation).all(axis=(1, 2))
     if known.sum() < LEAST_POSES:
         return
-    found = agreement(rotation[known], rigid[known])
+    rotation, theta = rotation[known], theta[known]
+    found = agreement(rotation, rigid_rotation(table, theta))
     if found.misfit <= OTHER_GEOMETRY:
         return
     limit = f"limit {np.degrees(OTHER_GEOMETRY):g} deg"
+    if change := put_right(rotation, theta, table, OTHER_GEOMETRY):
+        turned = f"; so they do with the instrument turned by {np.degrees(found.turn):.0f} deg"
+        raise InputError(
+            "the measured rotations are not those that the motor angles say: half of them are more "
+            f"than {np.degrees(found.misfit):.1f} deg ({limit}) off; with {change} they agree"
+            + (turned if found.misfit_turned <= OTHER_GEOMETRY else "")
+        )
     if found.misfit_turned > OTHER_GEOMETRY:
         raise InputError(
             "the measured rotations are not those of this wrist: half of them are more than "
