@@ -12,13 +12,18 @@ Say which physical effect a model misses, from recordings with a measured pose o
 Registrations, encoder zeros, load tare and the wrist's tolerances are fitted first; then every
 effect of the catalogue is tried at every place.  Effects that the recordings cannot tell apart are
 named together.  The answer may be 'nothing' or 'none of these'.
+A finding is proven one by one.  Where a little of everything is wrong, suspects that explain more
+than chance but are not proven stand below, by how much each adds to the error.
 Several recordings are sessions of one wrist: the last one judges what the others show, so record
 on two days.  Of a single recording the end is put aside."""
 
 EPILOG = """\
 examples:
   wrist-stiffness diagnose monday tuesday --model my_wrist.yaml --report why.html
-  wrist-stiffness diagnose monday --json why.json"""
+  wrist-stiffness diagnose monday --json why.json
+
+next: 'extend MODEL --effect NAME@COMPONENT' adds what was found; 'plan --diagnosis why.json' says
+what to record where rivals remain."""
 
 
 def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:

@@ -41,6 +41,13 @@ from wrist_stiffness.diagnosis.structure import (
 )
 from wrist_stiffness.errors import InputError
 
+NOISE_KNOWN = {
+    "replicates": "known from repeated measurements",
+    "given": "as stated for the instrument",
+    "residual": "estimated from what is left itself",
+}
+"""Where the size of the noise is known from, in words."""
+
 FEWEST_UNITS = 12
 """Fewer units cannot be split into a part to learn from and a part to be judged by."""
 
@@ -223,10 +230,14 @@ def _unexplained(
     sentences = []
     if excess.energy > 0:
         sentences.append(
-            f"residual above the noise floor ({evidence.noise.source}, p = {excess.p_value:.1g})"
+            f"more is left than the noise, {NOISE_KNOWN[evidence.noise.source]}, would leave "
+            f"(chance {excess.p_value:.1g})"
         )
     if flexible.energy > 0:
-        sentences.append(f"the conditions predict it on unseen blocks (p = {flexible.p_value:.1g})")
+        sentences.append(
+            f"the conditions foretell a part of it where they were not fitted (chance "
+            f"{flexible.p_value:.1g})"
+        )
     sentences += [f"{name} fitted here makes the sealed part worse" for name in broken]
     return Unexplained(flexible.depends_on, float(share), "; ".join(sentences))
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.free_effects import unfitted
+from wrist_stiffness.campaign.searching.contributions import Contribution
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
@@ -76,6 +77,7 @@ class Diagnosed:
         out = [*verdict_lines(result), "", *_table(result)]
         for place, finding in enumerate(result.findings, 1):
             out += ["", *_finding_lines(place, finding)]
+        out += suspect_lines(self.answer.contributions)
         if result.unexplained.evidence:
             share = 100.0 * result.unexplained.energy_share
             out += ["", f"not explained: {share:.0f} % of the structure above the noise"]
@@ -96,6 +98,11 @@ class Diagnosed:
         """Return what programs read, with units in the names."""
         return {
             **self.result.as_json(),
+            "contributions": [
+                {"effect": c.effect, "component": c.component, "kind": c.kind}
+                | {key: list(size) for key, size in c.sizes.items()}
+                for c in self.answer.contributions
+            ],
             "notes": list(self.remarks),
             "provenance": self.provenance.as_values(),
         }
@@ -186,6 +193,28 @@ def _finding_lines(place: int, finding: Finding) -> list[str]:
         f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
         f"BIC falls by {finding.delta_bic:.3g}"
     )
+    return out
+
+
+def suspect_lines(contributions: Sequence[Contribution]) -> list[str]:
+    """Return what findings and suspects add to the error, largest first; nothing without suspects.
+
+    Parameters
+    ----------
+    contributions : sequence of Contribution
+        Largest first, tolerances among them.
+    """
+    if all(each.kind != "suspect" for each in contributions):
+        return []
+    out = ["", "what adds most to the error, RMS beyond what a new set-up would take up:"]
+    for each in contributions:
+        if each.kind != "tolerance":
+            sizes = ", ".join(
+                f"{key.rpartition('_')[0]} {size:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
+                for key, (size, error) in each.sizes.items()
+            )
+            proven = "found" if each.kind == "finding" else "suspect, not proven"
+            out.append(f"  {each.name}: {sizes} ({proven})")
     return out
 
 

@@ -6,7 +6,7 @@ fit repeats Gauss-Newton steps on the model itself, and only what is left is tak
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -177,8 +177,9 @@ def fit_base(
     sessions : tuple of UnitSession
         In the order of time.
     extras : sequence of Effect, optional
-        Effects fitted along, without priors, from the values that they have.  One that belongs to
-        the base loses its prior.
+        Effects fitted along, from the values that they have, with priors about zero as wide as
+        they are large, at least of the usual size: what the data do not show stays small.  One that
+        belongs to the base loses its prior.
     start : BaseFit, optional
         Where the base begins.
     """
@@ -189,15 +190,11 @@ def fit_base(
         replace(f, scale={k: WIDE * v for k, v in f.scale.items()}) if f.effect.name in added else f
         for f in free
     ]
-    more = [
-        FreeEffect(effect, dict.fromkeys(_moving(effect), np.inf))
-        for name, effect in added.items()
-        if name not in usual
-    ]
+    more = [_about_zero(effect) for name, effect in added.items() if name not in usual]
     whole = model.with_effects(*held)
     bare = BaseProblem(whole, sessions, tuple(widened), model)
     problem = BaseProblem(whole, sessions, (*widened, *more), model)
-    z = _start(problem, start)
+    z = _start(problem, start, added)
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
@@ -242,26 +239,32 @@ def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
     return columns
 
 
-def _moving(effect: Effect) -> list[str]:
-    """Return the parameters of an effect that a fit may move: all but those that do nothing."""
-    return [p.key for p in effect.parameters]
+def _about_zero(effect: Effect) -> FreeEffect:
+    """Return an effect with priors about its absence; shapes, which have a mean, are free."""
+    sizes = [p for p in effect.parameters if p.mean == 0.0 and np.isfinite(p.scale)]
+    found = {p.key: abs(effect.estimates[p.key].value) / p.scale for p in sizes}
+    linear = [found[p.key] for p in sizes if p.linear]
+    together = float(np.sqrt(np.mean(np.square(linear)))) if linear else 0.0
+    scale = dict.fromkeys((p.key for p in effect.parameters), np.inf)
+    for p in sizes:
+        scale[p.key] = p.scale * max(1.0, together if p.linear else found[p.key])
+    return FreeEffect(effect.with_values({p.key: 0.0 for p in sizes}), scale)
 
 
-def _start(problem: BaseProblem, start: BaseFit | None) -> Array:
-    """Return where the unknowns begin: where another fit left them."""
-    if start is None:
-        return np.zeros(len(problem.unknowns))
-    old = {
-        (start.problem.free[u.free].effect.name, u.key, u.session): u.mean + z * u.step
-        for u, z in zip(start.problem.unknowns, start.z, strict=True)
-    }
-    names = [problem.free[u.free].effect.name for u in problem.unknowns]
-    return np.array(
-        [
-            (old.get((name, u.key, u.session), u.mean) - u.mean) / u.step
-            for name, u in zip(names, problem.unknowns, strict=True)
-        ]
-    )
+def _start(problem: BaseProblem, start: BaseFit | None, added: Mapping[str, Effect]) -> Array:
+    """Return where the unknowns begin: where another fit left them, and effects at their values."""
+    known: dict[tuple[str, str, int | None], float] = {}
+    if start is not None:
+        known = {
+            (start.problem.free[u.free].effect.name, u.key, u.session): u.mean + z * u.step
+            for u, z in zip(start.problem.unknowns, start.z, strict=True)
+        }
+    found = []
+    for u in problem.unknowns:
+        name = problem.free[u.free].effect.name
+        at = added[name].estimates[u.key].value if name in added else u.mean
+        found.append((known.get((name, u.key, u.session), at) - u.mean) / u.step)
+    return np.array(found)
 
 
 def _robust_variance(white: Array) -> float:

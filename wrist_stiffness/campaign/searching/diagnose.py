@@ -6,18 +6,19 @@ sought first, by fits of the leading candidates with their own laws, the base al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import Observed, UnitSession, as_units
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
-from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
+from wrist_stiffness.campaign.observing import Observed, as_units
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.candidates import WristCandidate
+from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
 from wrist_stiffness.campaign.searching.refit import refit, sized, withdrawn
-from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Screen
+from wrist_stiffness.campaign.searching.seeking import fitted_extras, seek_point
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
@@ -28,19 +29,6 @@ Progress = Callable[[int, int], None]
 
 WANDER_SHARES = (0.7, 0.5, 0.35)
 """Root mean square of slope, curvature and third order of a wander, against its own."""
-
-MOST_EXTRAS = 3
-"""Effects with which the point is sought."""
-
-LEADING = 0.3
-"""Candidates that explain this share of what the best explains are fitted too."""
-
-CLOSE, MOST_REFITTED = 0.6, 2
-"""So many candidates that gain nearly as much as the best are fitted with the whole base: what the
-base took up of one of them shows only then."""
-
-WORTH = 30.0
-"""Fall of the sum of squares, in units of the noise, that is worth moving the point for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +45,10 @@ class WristDiagnosis:
         Best member of each finding, fitted with its own law.
     base : BaseFit
         Fitted along with these.
+    suspected : BaseFit
+        Fitted along with these and with all that explains more than its freedom costs.
+    contributions : tuple of Contribution
+        What each effect of that fit adds to the error, largest first.
     absorbed : tuple of TakenUp
         What that base took up, furthest from its prior first.
     """
@@ -65,6 +57,8 @@ class WristDiagnosis:
     observed: Observed
     effects: tuple[Effect, ...]
     base: BaseFit
+    suspected: BaseFit
+    contributions: tuple[Contribution, ...]
     absorbed: tuple[TakenUp, ...]
 
 
@@ -108,79 +102,29 @@ def diagnose_sessions(
         settings,
     )
     known = {each.name: each for each in candidates}
-    found = _fitted_extras(base)
+    found = fitted_extras(base)
     named = [
         found.get(each.name) or _started(known[each.name], each.parameters)
         for each in result.findings
     ]
     share = (settings or Settings()).sealed_share
     final = refit(model, base, named, share)
-    effects = _fitted_extras(final)
+    effects = fitted_extras(final)
     result = withdrawn(result, len(effects))
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
-    return WristDiagnosis(sized(result, kept), observed, kept, final, absorbed)
+    suspected = _with_all(model, base, named)
+    ranked = contributions(suspected, {each.name for each in kept})
+    return WristDiagnosis(sized(result, kept), observed, kept, final, suspected, ranked, absorbed)
 
 
-def seek_point(
-    model: ErrorModel, units: tuple[UnitSession, ...], progress: Progress
-) -> tuple[BaseFit, tuple[WristCandidate, ...]]:
-    """Return the base, fitted along with effects that make a difference, and the catalogue there.
-
-    The catalogue is evaluated about the base alone, once to lead and once where the base ends up;
-    an effect found has its columns at its values.
-    """
-    base = fit_base(model, units)
-    absent = _absent(base)
-    candidates = wrist_candidates(_point(base), absent, {}, progress)
-    extras: tuple[Effect, ...] = ()
-    while len(extras) < MOST_EXTRAS:
-        screen = Screen(base, _point(base))
-        taken = {each.name for each in extras}
-        leaders = screen.leaders([each for each in candidates if each.name not in taken])
-        chosen = [each for each in leaders if each[0] > max(WORTH, LEADING * leaders[0][0])]
-        fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
-        fits.sort(key=lambda each: -each.gain)
-        # Columns may promise what the law itself, within its bounds, does not keep.
-        if not fits or fits[0].gain <= 0.0:
-            break
-        close = [each for each in fits if each.gain > CLOSE * fits[0].gain][:MOST_REFITTED]
-        trials = [(fit_base(model, units, (*extras, each.effect), base), each) for each in close]
-        trial, best = min(trials, key=lambda each: each[0].cost + each[1].price)
-        if base.cost - trial.cost < WORTH + best.price:
-            break
-        base, extras = trial, tuple(_fitted_extras(trial).values())
-    if extras:
-        candidates = wrist_candidates(_point(base), absent, _near(model, extras), progress)
-    return base, candidates
-
-
-def _near(model: ErrorModel, extras: tuple[Effect, ...]) -> dict[str, Mapping[str, float]]:
-    """Return the values found, of effects that are no part of the base."""
-    usual = {each.effect.name for each in free_base(model)[0]}
-    return {
-        each.name: {key: own.value for key, own in each.estimates.items()}
-        for each in extras
-        if each.name not in usual
-    }
-
-
-def _fitted_extras(base: BaseFit) -> dict[str, Effect]:
-    """Return the effects fitted along with the base, by their names."""
-    return {each.name: each for each in base.effects(0) if each.name in base.extras}
-
-
-def _point(base: BaseFit) -> Point:
-    """Return the fitted base, without the effects fitted along."""
-    sessions = base.problem.sessions
-    used = tuple(each.measured for each in sessions)
-    return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
-
-
-def _absent(base: BaseFit) -> set[str]:
-    """Return effects that the model holds fast: a second one of the name cannot be added."""
-    return {effect.name for effect in base.problem.model.effects}
+def _with_all(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
+    """Return the base fitted along with what the search found and what was named."""
+    more = [each for each in named if each.name not in base.extras]
+    if not more:
+        return base
+    return fit_base(model, base.problem.sessions, [*fitted_extras(base).values(), *more], base)
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:

@@ -62,14 +62,19 @@ class Screen:
         Fitted.
     point : Point
         The same base, for trials.
+    without : str, optional
+        Name of an effect fitted along that is taken out, to first order.
     """
 
-    def __init__(self, base: BaseFit, point: Point) -> None:
+    def __init__(self, base: BaseFit, point: Point, without: str | None = None) -> None:
         self._base, self._point = base, point
-        rows = np.vstack([base.whiten(base.columns), np.diag(base.problem.weights)])
+        free, weights = base.problem.free, base.problem.weights
+        stays = np.array([free[u.free].effect.name != without for u in base.problem.unknowns])
+        rows = np.vstack([base.whiten(base.columns), np.diag(weights)])
+        target = np.concatenate([base.whiten(base.residual), weights * base.z])
+        target = target - rows[:, ~stays] @ base.z[~stays]
         # NO_PRIOR weights are tiny: QR keeps them apart from rounding.
-        self._basis = np.linalg.qr(rows)[0]
-        target = np.concatenate([base.whiten(base.residual), base.problem.weights * base.z])
+        self._basis = np.linalg.qr(rows[:, stays])[0]
         self.left = self.beyond(target)
 
     @property

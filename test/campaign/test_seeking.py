@@ -1,0 +1,142 @@
+"""The search for the point: effects enter while they pay, and hold their places against others."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.fitting.recipes import effect_at
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.campaign.searching import seeking
+from wrist_stiffness.campaign.searching.base_fit import fit_base
+from wrist_stiffness.campaign.searching.candidates import wrist_candidates
+from wrist_stiffness.campaign.searching.contributions import contributions
+from wrist_stiffness.campaign.searching.seeking import Reached, point_of
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import instrument
+
+SECONDS = 40.0
+WIDTH = 1e-3
+DELAY_S = 0.01
+HIDDEN = (
+    HiddenEffect("backlash", "motor_1", "single", WIDTH, 5),
+    HiddenEffect("time_delay", "motor_2", "plain", DELAY_S, 5),
+)
+WIDTH_MDEG = 1e3 * np.degrees(WIDTH)
+PRICE = 7.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+@pytest.fixture(scope="module")
+def units(model):
+    """Forty seconds of a wrist with play in one motor's gear, and late stamps of the other."""
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=SECONDS, program_seed=41, hidden=HIDDEN, base="exact"
+    )
+    cell = VirtualCell(model.table, settings, np.random.default_rng(3))
+    time = np.arange(round(10.0 * SECONDS)) / 10.0
+    sample = cell.run(time, cell.desired(time))
+    warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
+    session = MeasuredSession(
+        "a session",
+        Block(time, sample.encoder, sample.wrench, temperatures=warm),
+        sample.measured_shift,
+        sample.measured_rotation,
+        np.diag(instrument("interferometer").sigma ** 2),
+    )
+    return (as_units(model, session),)
+
+
+@pytest.fixture(scope="module")
+def alone(model, units):
+    return fit_base(model, units)
+
+
+@pytest.fixture(scope="module")
+def candidates(alone):
+    return wrist_candidates(point_of(alone), (), {})
+
+
+def effect(name, **values):
+    law, place = name.split("@")
+    found = find_law(law)
+    usual = {p.key: p.mean for p in found.parameters(place)}
+    return effect_at(found, place, usual | values)
+
+
+def reached(model, units, alone, *extras):
+    base = fit_base(model, units, extras, alone)
+    return Reached(base, {each.name: PRICE for each in extras}, alone.cost)
+
+
+@pytest.fixture(scope="module")
+def both(model, alone, candidates):
+    """Where the search arrives from the base alone."""
+    return seeking._extended(model, Reached(alone, {}, alone.cost), candidates)
+
+
+@pytest.mark.slow
+def test_two_effects_at_once_both_enter_first_with_their_values(both):
+    assert set(list(both.prices)[:2]) == {"backlash@motor_1", "time_delay@motor_2"}
+    width = both.effects["backlash@motor_1"].estimates["width_mdeg"].value
+    delay = both.effects["time_delay@motor_2"].estimates["delay_ms"].value
+    assert width == pytest.approx(WIDTH_MDEG, rel=0.1)
+    assert delay == pytest.approx(1e3 * DELAY_S, rel=0.1)
+
+
+@pytest.mark.slow
+def test_what_does_not_pay_beside_the_others_is_taken_out(model, units, alone):
+    idle = effect("time_delay@load_sensor", delay_ms=1.0)
+    width = effect("backlash@motor_1", width_mdeg=40.0)
+    late = effect("time_delay@motor_2", delay_ms=8.0)
+    thinned = seeking._thinned(model, reached(model, units, alone, idle, width, late))
+    assert thinned.prices.keys() == {"backlash@motor_1", "time_delay@motor_2"}
+
+
+@pytest.mark.slow
+def test_the_place_of_a_wrong_effect_goes_to_the_right_one(model, units, alone, candidates):
+    wrong = effect("time_delay@pose_sensor", delay_ms=1.0)
+    width = effect("backlash@motor_1", width_mdeg=40.0)
+    start = reached(model, units, alone, wrong, width)
+    swapped = seeking._contested(model, start, wrong.name, candidates)
+    assert swapped.prices.keys() == {"backlash@motor_1", "time_delay@motor_2"}
+    assert swapped.base.cost < start.base.cost
+    # The right one keeps its place.
+    assert seeking._contested(model, swapped, width.name, candidates) is swapped
+
+
+@pytest.mark.slow
+def test_contributions_tell_how_much_each_effect_adds_and_what_is_proven(both):
+    ranked = contributions(both.base, {"backlash@motor_1"})
+    kinds = {each.name: each.kind for each in ranked}
+    assert kinds["backlash@motor_1"] == "finding"
+    assert kinds["time_delay@motor_2"] == "suspect"
+    assert kinds["link_stiffness@link_1"] == "tolerance"
+    assert not any("encoder_offset" in name or "load_bias" in name for name in kinds)
+    assert {each.name for each in ranked[:2]} == {"backlash@motor_1", "time_delay@motor_2"}
+    assert [each.signal for each in ranked] == sorted((e.signal for e in ranked), reverse=True)
+    play = next(each for each in ranked if each.name == "backlash@motor_1")
+    size, error = play.sizes["phi_mdeg"]
+    # Half the width to either side; motor 1 turns the platform by as much, the zero takes the mean.
+    assert size == pytest.approx(WIDTH_MDEG / 2.0, rel=0.15)
+    assert 0.0 < error < 0.1 * size
+
+
+@pytest.mark.slow
+def test_what_the_data_do_not_show_of_an_effect_stays_at_its_usual_size(model, units, alone):
+    spring = effect("platform_compliance@platform")
+    true = effect("backlash@motor_1", width_mdeg=57.0), effect("time_delay@motor_2", delay_ms=10.0)
+    found = fit_base(model, units, [*true, spring], alone).effects(0)
+    own = next(each for each in found if each.name == spring.name)
+    scale = {p.key: p.scale for p in spring.parameters}
+    sizes = np.array([abs(e.value) / scale[key] for key, e in own.estimates.items()])
+    assert sizes.max() < 5.0
+    assert np.median(sizes) < 1.0

@@ -1,0 +1,140 @@
+"""How much each part of a fitted wrist adds to its error: findings, suspects and tolerances.
+
+A finding is proven one by one.  A wrist that has a little of everything has many effects of which
+none can be, and still somebody must know where to look first: so everything that the fit has in it
+is ranked by what it adds beyond what a new set-up would take up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wrist_stiffness.campaign.observing import QUANTITIES
+from wrist_stiffness.campaign.searching.base_fit import BaseFit
+from wrist_stiffness.mechanism.components import Array
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one effect adds to the error.
+
+    Parameters
+    ----------
+    effect, component : str
+        Which.
+    kind : str
+        `finding` is proven; `suspect` explains more than its freedom costs but is not proven;
+        `tolerance` lies within what wrists differ by.
+    sizes : dict of str to (float, float)
+        Root mean square over the units of what it adds, beyond what registrations, zeros and tare
+        would take up, and its standard uncertainty, by the key of the quantity.
+    signal : float
+        Its length in standard deviations of the noise; by this they are ordered.
+    """
+
+    effect: str
+    component: str
+    kind: str
+    sizes: dict[str, tuple[float, float]]
+    signal: float
+
+    @property
+    def name(self) -> str:
+        """`effect@component`."""
+        return f"{self.effect}@{self.component}"
+
+
+def contributions(fitted: BaseFit, named: Collection[str]) -> tuple[Contribution, ...]:
+    """Rank what a fitted wrist consists of, largest first.
+
+    Parameters
+    ----------
+    fitted : BaseFit
+        The base along with everything that was found or is suspected.
+    named : collection of str
+        Names of the findings.
+
+    Returns
+    -------
+    tuple of Contribution
+        Of every effect that is the wrist's own, not the set-up's.
+    """
+    ranking = _Ranking(fitted)
+    found = []
+    for name in dict.fromkeys(ranking.names):
+        effect, component = name.split("@")
+        kind = "tolerance"
+        if name in fitted.extras:
+            kind = "finding" if name in named else "suspect"
+        change, places = ranking.beyond(ranking.change(name)), ranking.places(name)
+        if not places:
+            continue
+        scatter = ranking.scatter(places)
+        sizes = {}
+        for quantity in QUANTITIES:
+            own = list(quantity.components)
+            size = np.sqrt(np.mean(np.sum(change[:, own] ** 2, axis=1)))
+            error = np.sqrt(np.mean(np.sum(scatter[:, own], axis=1)))
+            sizes[quantity.key] = float(size) * quantity.per_si, float(error) * quantity.per_si
+        signal = float(np.linalg.norm(fitted.whiten(change)))
+        found.append(Contribution(effect, component, kind, sizes, signal))
+    return tuple(sorted(found, key=lambda each: -each.signal))
+
+
+class _Ranking:
+    """A fitted wrist, taken apart.
+
+    Parameters
+    ----------
+    fitted : BaseFit
+        With all effects.
+    """
+
+    def __init__(self, fitted: BaseFit) -> None:
+        self._fitted = fitted
+        unknowns = fitted.problem.unknowns
+        self.names = [fitted.problem.free[u.free].effect.name for u in unknowns]
+        self._set_up = np.array([unknown.session is not None for unknown in unknowns])
+        columns = fitted.columns[:, :, self._set_up]
+        white = fitted.whiten(columns)
+        size = np.maximum(np.linalg.norm(white, axis=0), 1e-300)
+        self._columns = columns / size
+        self._inverse = np.linalg.pinv(white / size, rcond=1e-9)
+
+    def places(self, name: str) -> list[int]:
+        """Return the unknowns of an effect of the wrist."""
+        return [n for n, own in enumerate(self.names) if own == name and not self._set_up[n]]
+
+    def change(self, name: str) -> Array:
+        """Return what an effect adds to the prediction, (u, 6): left out for one fitted along."""
+        fitted, places = self._fitted, self.places(name)
+        if name not in fitted.extras:
+            return -fitted.columns[:, :, places] @ fitted.z[places]
+        blocks = []
+        for number in range(len(fitted.problem.sessions)):
+            model = fitted.model(number)
+            others = tuple(each for each in model.effects if each.name != name)
+            whole, less = model.along([model.effects, others])
+            blocks.append(whole - less)
+        return np.nan_to_num(fitted.problem.rows(blocks))
+
+    def beyond(self, change: Array) -> Array:
+        """Return a change (u, 6) or (u, 6, k) less what a new set-up would take up of it."""
+        taken = self._inverse @ self._fitted.whiten(change)
+        return change - self._columns @ taken
+
+    def scatter(self, places: list[int]) -> Array:
+        """Return the variance of what unknowns add, (u, 6)."""
+        own = self.beyond(self._fitted.columns[:, :, places])
+        return np.einsum("uik,kl,uil->ui", own, self._covariance[np.ix_(places, places)], own)
+
+    @cached_property
+    def _covariance(self) -> Array:
+        fitted = self._fitted
+        white = fitted.whiten(fitted.columns)
+        known = white.T @ white + np.diag(fitted.problem.weights**2)
+        return np.asarray(np.linalg.pinv(known, hermitian=True))

@@ -1,0 +1,212 @@
+"""The point about which effects become columns: the base, fitted along with what shows beside it.
+
+Effects enter one at a time with their own laws, for as long as the next one pays for its freedom.
+After each the earlier ones must still pay, and at the end each must be the best in its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from wrist_stiffness.campaign.observing import UnitSession
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
+from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
+from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Fitted, Screen
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+
+Progress = Callable[[int, int], None]
+Candidates = Sequence[WristCandidate]
+Sessions = tuple[UnitSession, ...]
+
+WORTH = 30.0
+"""Fall of the sum of squares, in units of the noise and beyond the price of the freedom, that is
+worth moving the point for."""
+
+LEADING = 0.3
+"""Candidates that explain this share of what the best explains are fitted too."""
+
+CLOSE, MOST_REFITTED = 0.6, 2
+"""So many candidates that gain nearly as much as the best are fitted with the whole base: what the
+base took up of one of them shows only then."""
+
+EXACT = 0.02
+"""Share of its size within which a law is taken to be exact here: a gain that what is left of a
+large effect within this share could make draws no further effect in."""
+
+ROUGH = 10.0
+"""Variance of what is left, in units of the noise, from which a fit is also begun from the drawing:
+a base that gave way to a large effect does not find back."""
+
+MOST_EXTRAS = 5
+"""With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """Where the search has arrived.
+
+    Parameters
+    ----------
+    base : BaseFit
+        Fitted along with the effects found.
+    prices : dict of str to float
+        What the freedom of each of them costs, by its name.
+    first : float
+        Sum of squares that the base alone left.
+    """
+
+    base: BaseFit
+    prices: Mapping[str, float]
+    first: float
+
+    @property
+    def least(self) -> float:
+        """What a further effect must explain beyond its price: more than inexact laws leave."""
+        return max(WORTH, EXACT**2 * (self.first - self.base.cost))
+
+    @property
+    def total(self) -> float:
+        """Sum of squares and what all effects must be worth; every step of the search lowers it."""
+        return self.base.cost + sum(WORTH + price for price in self.prices.values())
+
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """Effects found, at their values."""
+        return fitted_extras(self.base)
+
+    def screen(self, without: str | None = None) -> Screen:
+        """Return what it leaves, without one of the effects if asked so."""
+        return Screen(self.base, point_of(self.base), without)
+
+
+def seek_point(
+    model: ErrorModel, sessions: Sessions, progress: Progress
+) -> tuple[BaseFit, tuple[WristCandidate, ...]]:
+    """Return the base, fitted along with effects that make a difference, and the catalogue there.
+
+    The catalogue is evaluated about the base alone, and again where the base ends up; an effect
+    found has its columns at its values.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    sessions : tuple of UnitSession
+        In the order of time.
+    progress : callable
+        Told (done, total) while the catalogue is evaluated.
+    """
+    base = fit_base(model, sessions)
+    reached = Reached(base, {}, base.cost)
+    held = {effect.name for effect in reached.base.problem.model.effects}
+
+    def catalogue() -> tuple[WristCandidate, ...]:
+        near = _near(model, reached.effects)
+        return wrist_candidates(point_of(reached.base), held, near, progress)
+
+    candidates = catalogue()
+    found = _extended(model, reached, candidates)
+    if found is not reached:
+        reached = found
+        candidates = catalogue()
+    return reached.base, candidates
+
+
+def point_of(base: BaseFit) -> Point:
+    """Return the fitted base, without the effects fitted along."""
+    sessions = base.problem.sessions
+    used = tuple(each.measured for each in sessions)
+    return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
+
+
+def fitted_extras(base: BaseFit) -> dict[str, Effect]:
+    """Return the effects fitted along with the base, by their names."""
+    return {each.name: each for each in base.effects(0) if each.name in base.extras}
+
+
+def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[str, float]]:
+    """Return the values found, of effects that are no part of the base."""
+    usual = {each.effect.name for each in free_base(model)[0]}
+    return {
+        name: {key: own.value for key, own in each.estimates.items()}
+        for name, each in extras.items()
+        if name not in usual
+    }
+
+
+def _extended(model: ErrorModel, reached: Reached, candidates: Candidates) -> Reached:
+    """Add effects while they pay, and let each of them hold its place."""
+    while len(reached.prices) < MOST_EXTRAS:
+        more = _one_more(model, reached, candidates)
+        if more is None:
+            break
+        reached = _thinned(model, more)
+    if len(reached.prices) > 1:
+        for name in reached.prices:
+            reached = _contested(model, reached, name, candidates)
+    return reached
+
+
+def _one_more(model: ErrorModel, reached: Reached, candidates: Candidates) -> Reached | None:
+    """Add the effect that gains most with its own law, if it pays."""
+    screen = reached.screen()
+    leaders = screen.leaders([each for each in candidates if each.name not in reached.prices])
+    least = reached.least
+    chosen = [each for each in leaders if each[0] > max(least, LEADING * leaders[0][0])]
+    fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
+    # Columns may promise what the law itself, within its bounds, does not keep.
+    hopeful = sorted((each for each in fits if each.gain > least), key=lambda each: -each.gain)
+    while hopeful:
+        close = [each for each in hopeful if each.gain > CLOSE * hopeful[0].gain][:MOST_REFITTED]
+        trials = [_with(model, reached, each) for each in close]
+        best = min(trials, key=lambda each: each.total)
+        if reached.total - best.total > least - WORTH:
+            return best
+        hopeful = hopeful[len(close) :]
+    return None
+
+
+def _thinned(model: ErrorModel, reached: Reached) -> Reached:
+    """Take out effects that do not pay any more beside the newest."""
+    for name in list(reached.prices)[:-1]:
+        lost = reached.screen(without=name).energy - reached.screen().energy
+        if name in reached.prices and lost < WORTH + reached.prices[name]:
+            less = _without(model, reached, name)
+            reached = less if less.total < reached.total else reached
+    return reached
+
+
+def _contested(model: ErrorModel, reached: Reached, name: str, candidates: Candidates) -> Reached:
+    """Give the place of one effect to another where that explains more beside all the others."""
+    screen = reached.screen(without=name)
+    others = reached.prices.keys() - {name}
+    value, best, shape = screen.leaders([e for e in candidates if e.name not in others])[0]
+    if best.name == name or value < WORTH:
+        return reached
+    rival = screen.fitted(best, shape, value)
+    kept = screen.energy - reached.screen().energy - reached.prices[name]
+    if rival.gain < kept:
+        return reached
+    swapped = _with(model, reached, rival, instead_of=name)
+    return swapped if swapped.total < reached.total else reached
+
+
+def _with(
+    model: ErrorModel, reached: Reached, added: Fitted, instead_of: str | None = None
+) -> Reached:
+    prices = {name: price for name, price in reached.prices.items() if name != instead_of}
+    extras = [reached.effects[name] for name in prices] + [added.effect]
+    sessions, measured = reached.base.problem.sessions, reached.base.problem.table.measured
+    base = fit_base(model, sessions, extras, reached.base)
+    if base.cost > ROUGH * measured.sum():
+        base = min(base, fit_base(model, sessions, extras), key=lambda each: each.cost)
+    return replace(reached, base=base, prices={**prices, added.candidate.name: added.price})
+
+
+def _without(model: ErrorModel, reached: Reached, name: str) -> Reached:
+    prices = {own: price for own, price in reached.prices.items() if own != name}
+    extras = [reached.effects[own] for own in prices]
+    base = fit_base(model, reached.base.problem.sessions, extras, reached.base)
+    return replace(reached, base=base, prices=prices)
