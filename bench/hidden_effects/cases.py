@@ -14,7 +14,8 @@ ABSORBED = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias
 """Refitted in every session before any search: to find them is no diagnosis."""
 
 SIZES = (0.5, 1.0, 3.0, 30.0, 100.0)
-EXACT_SIZES = (0.05, 0.5, 3.0, 30.0)
+TINY = 0.05
+EXACT_SIZES = (TINY, 0.5, 3.0, 30.0)
 
 AT_REST = (
     *("link_stiffness", "bushing_stiffness", "drive_compliance", "mount_compliance", "gravity"),
@@ -25,6 +26,10 @@ AT_REST = (
 """Effects whose laws need no motion: those that the exact path can hide."""
 
 SAMPLED_ONE_IN = 25
+CEILING_ONE_IN = 6
+
+WRISTS, WRISTS_ELSEWHERE = 60, 12
+"""Wrong wrists, each with its noise, that take turns in the main design and in any other."""
 
 Place = tuple[str, str, str]
 
@@ -83,8 +88,25 @@ class Case:
         return "ordinary" if self.ordinary else ("single", "double")[len(self.effects) - 1]
 
     @property
-    def sampled(self) -> bool:
-        """Whether this case belongs to the sample that slow solvers are asked."""
+    def main(self) -> bool:
+        """Whether this is the design for which the goals hold."""
+        return (self.base, self.experiment, self.sees, self.path) == (
+            "wrong",
+            "rich",
+            "pose",
+            "fast",
+        ) and not self.static
+
+    @property
+    def bare(self) -> Case:
+        """The same wrist on the same days without what hides in it."""
+        return replace(self, effects=(), size=0.0)
+
+    def asked(self, solver: str) -> bool:
+        """Whether a slow solver is asked this case."""
+        if solver == "knows_the_laws":
+            fits = self.main and self.kind == "single"
+            return fits and crc32(f"ceiling {self.key}".encode()) % CEILING_ONE_IN == 0
         return crc32(f"sample {self.key}".encode()) % SAMPLED_ONE_IN == 0
 
     @property
@@ -109,17 +131,27 @@ def one_each(entries: dict[str, Entry]) -> list[Place]:
 
 
 def ordinary_wrist(seed: int) -> tuple[Place, ...]:
-    """Return one place and form of every effect of the catalogue, drawn from the seed.
-
-    Play and friction take turns: with both the fast path often finds no equilibrium.
-    """
+    """Return one place and form of every effect of the catalogue, drawn from the seed."""
     rng = np.random.default_rng([seed, 0xA11])
-    absent = ("joint_friction", "joint_clearance")[seed % 2]
     by_effect: dict[str, list[Place]] = {}
     for place in searched(CATALOGUE):
-        if place[0] != absent:
-            by_effect.setdefault(place[0], []).append(place)
+        by_effect.setdefault(place[0], []).append(place)
     return tuple(each[rng.integers(len(each))] for each in by_effect.values())
+
+
+def _on_a_wrist(case: Case) -> Case:
+    """Return the case on one of the wrong wrists."""
+    wrists = WRISTS if case.main else WRISTS_ELSEWHERE
+    return replace(case, seed=1 + crc32(f"wrist {case.key}".encode()) % wrists)
+
+
+def stage_of(case: Case) -> int:
+    """Return when a case is run: the main design, others of its experiment, all others."""
+    if case.main:
+        return 0
+    if case.experiment != "rich":
+        return 3
+    return 2 if case.static else 1
 
 
 def quick_cases() -> list[Case]:
@@ -138,7 +170,7 @@ def quick_cases() -> list[Case]:
 
 
 def full_cases() -> list[Case]:
-    """Return all cases in a mixed order, so that any beginning is a fair sample of the whole."""
+    """Return all cases stage by stage, mixed in each: its beginning is a fair sample of it."""
     nothing = Case((), 0.0)
     cases = [replace(nothing, seed=seed) for seed in range(1, 151)]
     cases += [replace(nothing, base="exact", seed=seed) for seed in range(1, 41)]
@@ -146,6 +178,17 @@ def full_cases() -> list[Case]:
         cases += [replace(nothing, experiment=experiment, seed=seed) for seed in range(1, 16)]
     for instrument_name in ("tracker", "cmm"):
         cases += [replace(nothing, instrument=instrument_name, seed=s) for s in range(1, 16)]
+    cases += [*map(_on_a_wrist, _hidden()), *map(_ordinary, range(1, 13))]
+    return sorted(cases, key=lambda case: (stage_of(case), crc32(case.key.encode())))
+
+
+def _ordinary(seed: int) -> Case:
+    return Case(ordinary_wrist(seed), 0.0, seed=seed)
+
+
+def _hidden() -> list[Case]:
+    """Return all cases with one or two effects, on no wrist yet."""
+    cases: list[Case] = []
     for place in searched(CATALOGUE):
         single = Case((place,), 3.0)
         cases += [replace(single, size=size) for size in SIZES]
@@ -157,8 +200,8 @@ def full_cases() -> list[Case]:
         cases += [replace(single, instrument="tracker", lost_beams=0.02)]
         cases += [replace(single, instrument="cmm")]
     for place in one_each(CATALOGUE):
-        cases += [Case((place,), 3.0, sees=sees, seed=2) for sees in ("points", "pointing")]
-        cases += [Case((place,), 3.0, lost_beams=0.02, seed=2)]
+        cases += [Case((place,), 3.0, sees=sees) for sees in ("points", "pointing")]
+        cases += [Case((place,), 3.0, lost_beams=0.02), Case((place,), TINY)]
     cases += [Case((place,), size) for place in searched(STRANGERS) for size in (1.0, 3.0, 30.0)]
     cases += [
         Case((place,), 3.0, "exact", instrument="cmm", path="exact")
@@ -168,6 +211,4 @@ def full_cases() -> list[Case]:
     singles = searched(CATALOGUE)
     partners = singles[len(singles) // 3 :] + singles[: len(singles) // 3]
     pairs = [pair for pair in zip(singles, partners, strict=True) if pair[0][0] != pair[1][0]]
-    cases += [Case(pair, 3.0, seed=2) for pair in pairs]
-    cases += [Case(ordinary_wrist(seed), 0.0, seed=seed) for seed in range(1, 13)]
-    return sorted(cases, key=lambda case: crc32(case.key.encode()))
+    return cases + [Case(pair, 3.0) for pair in pairs]

@@ -14,7 +14,7 @@ from bench_wrist import Array
 from dictionary import Dictionary
 from observe import Riddle
 from solvers import Answer, explained, nothing
-from whitened import Whitened
+from whitened import whitened
 
 from wrist_stiffness.diagnosis.candidates import Candidate, Parameter
 from wrist_stiffness.diagnosis.diagnose import diagnose
@@ -71,5 +71,5 @@ def diagnosis_core(riddle: Riddle, words: Dictionary) -> Answer:
     unseen = tuple(f"{each.effect}@{each.component}" for each in result.not_excited)
     if not chosen:
         return replace(nothing(riddle, result.verdict), not_excited=unseen)
-    fitted = explained(chosen, Whitened(train, words).fit(chosen)[0])
+    fitted = explained(chosen, whitened(riddle, words).fit(chosen)[0])
     return Answer(result.verdict, names, fitted, unseen)

@@ -60,7 +60,7 @@ class Word:
     test: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dictionary:
     """What the laws do in one design.
 

@@ -14,7 +14,7 @@ from observe import Riddle
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import enet_path
 from solvers import MOST_FINDINGS, Answer, explained, nothing
-from whitened import Whitened
+from whitened import whitened
 
 HALVES = 40
 """Half samples of the rows."""
@@ -33,9 +33,9 @@ STEPS = np.geomspace(1.0, 1e-2, 30)
 
 def elastic_net(riddle: Riddle, words: Dictionary) -> Answer:
     """Choose words by stability selection and fit them by least squares."""
-    fit = Whitened(riddle.train, words)
+    fit = whitened(riddle, words)
     candidates = words.searched
-    blocks = [fit.white(word.train) for word in candidates]
+    blocks = [fit.word(word) for word in candidates]
     owner = np.repeat(np.arange(len(blocks)), [block.shape[1] for block in blocks])
     design = np.concatenate(blocks, axis=1)
     length = np.linalg.norm(design, axis=0)

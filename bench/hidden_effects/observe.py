@@ -8,20 +8,25 @@ from zlib import crc32
 
 import numpy as np
 from bench_wrist import RATE_HZ, Array, Mask, wrist
-from cases import Case
+from cases import WRISTS, Case
 from registered import Registration, difference, register
 from units import last_sense, lost_samples, unit_labels, unit_means
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
+from wrist_stiffness.simulation.plausibility import LARGEST
 from wrist_stiffness.simulation.residual import BasePose, base_pose
 from wrist_stiffness.simulation.size import Scale, sample_covariance
 
 PROGRAM_SEED = 101
 """Of the first session; the second has the next one."""
+
+LEAST_SHARE = 0.5
+"""Of the wanted size: effects that can only be smaller are not posed."""
 
 SPREAD = 0.7
 """Of the logarithm of an ordinary wrist's magnitudes about the plausible one."""
@@ -90,7 +95,7 @@ class Day:
         return unit_means(self.labels, difference(seen.rotation, seen.shift, base))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Riddle:
     """A case as a solver gets it: learn from the first day, be judged by the second.
 
@@ -105,8 +110,8 @@ class Riddle:
     bare_days : (Day, Day)
         The same days, noise for noise, of the same wrist without the hidden effects: for scores
         and for the baseline that is told.
-    parts : dict of str to float
-        Of an ordinary wrist: how much each effect adds to the error of the second day.
+    parts : dict of str to (u, 6) float
+        Of an ordinary wrist: what each effect alone does to the second day.
     """
 
     case: Case
@@ -149,8 +154,8 @@ def settings_of(case: Case, session: int) -> CellSettings:
 
 
 def noise_seed(case: Case, session: int) -> int:
-    """Return the seed of all noise of one session: no two cases share it."""
-    return crc32(f"{case.key}|{session}".encode())
+    """Return the seed of all noise of one session: cases of one wrist in one design share it."""
+    return crc32(f"{case.bare.key}|{session}".encode())
 
 
 def times(case: Case) -> Array:
@@ -158,7 +163,7 @@ def times(case: Case) -> Array:
     return np.arange(round(case.seconds * RATE_HZ)) / RATE_HZ
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=64)
 def _scale(settings: CellSettings, seconds: float) -> Scale:
     return Scale(wrist(), settings, seconds)
 
@@ -176,7 +181,7 @@ def hidden_effects(case: Case) -> tuple[HiddenEffect, ...]:
     Raises
     ------
     InputError
-        If one cannot be as large as that.
+        If one cannot even be half as large.
     """
     shape = 1000 * case.seed
     drawn = [
@@ -186,10 +191,21 @@ def hidden_effects(case: Case) -> tuple[HiddenEffect, ...]:
     if case.ordinary:
         factors = np.exp(SPREAD * np.random.default_rng(shape).normal(size=len(drawn)))
         return tuple(
-            replace(each, magnitude=min(f * each.magnitude, ALL[each.effect].limit))
+            replace(each, magnitude=min(f * each.magnitude, LARGEST[each.effect][0]))
             for each, f in zip(drawn, factors, strict=True)
         )
-    return tuple(scale_of(case).sized(each, case.size) for each in drawn)
+    return tuple(_sized(scale_of(case), each, case.size) for each in drawn)
+
+
+def _sized(scale: Scale, start: HiddenEffect, size: float) -> HiddenEffect:
+    """Return the effect at a size, or at the largest it can have if that is half of it at least."""
+    try:
+        return scale.sized(start, size)
+    except InputError:
+        largest = replace(start, magnitude=ALL[start.effect].limit)
+        if scale.size(largest) >= LEAST_SHARE * size:
+            return largest
+        raise
 
 
 def run_cell(
@@ -226,17 +242,25 @@ def measured_session(case: Case, session: int, sample: CellSample) -> MeasuredSe
     )
 
 
-def observe(case: Case, hidden: tuple[HiddenEffect, ...], session: int) -> Day:
-    """Run one session of a case."""
-    return day_of(case, session, run_cell(case, hidden, session))
+def observe(
+    case: Case, hidden: tuple[HiddenEffect, ...], session: int, bare: Day | None = None
+) -> Day:
+    """Run one session of a case; `bare` is the same session without what hides."""
+    return day_of(case, session, run_cell(case, hidden, session), bare)
 
 
-def day_of(case: Case, session: int, sample: CellSample) -> Day:
+@lru_cache(maxsize=2 * WRISTS)
+def bare_day(case: Case, session: int) -> Day:
+    """Return a session in which nothing hides; cases of one wrist share it."""
+    return observe(case, (), session)
+
+
+def day_of(case: Case, session: int, sample: CellSample, bare: Day | None = None) -> Day:
     """Return a session in all its forms."""
     table, time_s = wrist(), times(case)
     cell = VirtualCell(table, settings_of(case, session), np.random.default_rng(0))
     labels = unit_labels(cell.program, time_s, case.static)
-    base = base_pose(table, sample.encoder, sample.wrench)
+    base = _base_of(sample, bare)
     rotation, shift = sample.measured_rotation.copy(), sample.measured_shift.copy()
     if case.lost_beams:
         lost = lost_samples(difference(rotation, shift, base))
@@ -286,23 +310,33 @@ def _session(
     )
 
 
+def _base_of(sample: CellSample, bare: Day | None) -> BasePose:
+    """Return what the table predicts; the same as for the bare day where readings are the same."""
+    if bare is not None:
+        block = bare.recorded.block
+        if np.array_equal(sample.encoder, block.theta) and np.array_equal(
+            sample.wrench, block.load
+        ):
+            return bare.base
+    return base_pose(wrist(), sample.encoder, sample.wrench)
+
+
 def pose_riddle(case: Case) -> Riddle:
     """Return a case ready to be solved.
 
     Raises
     ------
     InputError
-        If its size is out of reach.
+        If its size is out of reach, or the wrist with all of it finds no equilibrium.
     """
     hidden = hidden_effects(case)
-    one, two = (observe(case, hidden, session) for session in (0, 1))
+    bare = bare_day(case.bare, 0), bare_day(case.bare, 1)
     if not hidden:
-        return Riddle(case, hidden, (one, two), (one, two))
-    bare = tuple(observe(case, (), session) for session in (0, 1))
+        return Riddle(case, hidden, bare, bare)
+    one, two = (observe(case, hidden, session, bare[session]) for session in (0, 1))
     parts = {}
     if case.ordinary:
-        for number, each in enumerate(hidden):
-            others = hidden[:number] + hidden[number + 1 :]
-            without = observe(case, others, 1).units.residual
-            parts[f"{each.effect}@{each.component}"] = two.units.residual - without
-    return Riddle(case, hidden, (one, two), (bare[0], bare[1]), parts)
+        for each in hidden:
+            alone = observe(case, (each,), 1, bare[1]).units.residual
+            parts[f"{each.effect}@{each.component}"] = alone - bare[1].units.residual
+    return Riddle(case, hidden, (one, two), bare, parts)

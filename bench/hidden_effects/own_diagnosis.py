@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from bench_wrist import Array, wrist
+from bench_wrist import OWN, TRUTH, Array, code_version, wrist
 from cases import ABSORBED
 from dictionary import Dictionary
 from observe import Day, Riddle, noise_seed, settings_of
@@ -23,6 +23,11 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.workflows.simulate import simulate_recording
+
+
+def version_of_own() -> str:
+    """Return the digest of the project's own diagnosis and of the truth it is asked about."""
+    return code_version((*TRUTH, *OWN), ("cases.py", "observe.py", "own_diagnosis.py"))
 
 
 def own_diagnosis(riddle: Riddle, words: Dictionary | None = None) -> Answer:
@@ -50,11 +55,15 @@ def diagnosed(riddle: Riddle, session: MeasuredSession) -> Answer:
     result = found.diagnosis
     extended = model.with_effects(*refitted(found.base, found.effects), *found.effects)
     one, two = (predicted(extended, day) for day in riddle.days)
+    suspected = [e for e in found.suspected.effects(0) if e.law.id not in ABSORBED]
+    with_suspects = model.with_effects(*suspected)
     return Answer(
         result.verdict,
         tuple(finding.names for finding in result.findings),
         (one, two),
         tuple(f"{each.effect}@{each.component}" for each in result.not_excited),
+        {each.name: each.signal for each in found.contributions},
+        tuple(predicted(with_suspects, day) for day in riddle.days),
     )
 
 

@@ -11,16 +11,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from aims import CEILING, OWN, aims
 from run import SOLVERS, current
 from score import wilson
-from tables import Line, by_solver, of_one_solver
+from tables import Line, by_solver, of_one_solver, paired
 
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 BEGIN, END = "<!-- results: begin (page.py) -->", "<!-- results: end -->"
-OWN = "own_diagnosis"
-SHOWN = {OWN: "o", "spans_of_the_laws": "s", "elastic_net": "^", "stepwise_bic": "v"}
+SHOWN = {CEILING: "D", OWN: "o", "elastic_net": "^", "stepwise_bic": "v"}
 
 
 def text_of(lines: Sequence[Line]) -> str:
@@ -28,21 +28,36 @@ def text_of(lines: Sequence[Line]) -> str:
     scored = [line for line in lines if "verdict" in line]
     if not scored:
         return "No results yet."
-    cases = len({line["key"] for line in scored})
     unreached = len({line["key"] for line in lines if "out_of_reach" in line})
     failed = Counter(line["solver"] for line in lines if "error" in line)
     failures = ", ".join(f"{name}: {count}" for name, count in sorted(failed.items())) or "none"
     version = next((line["version"] for line in scored if line["solver"] == OWN), "-")
     return "\n\n".join(
         [
-            f"{cases} riddles posed; {unreached} more cannot be as large as wanted. "
+            f"{_posed(scored)}. {unreached} more cannot even be half as large as wanted. "
             f"Answers that failed with an error: {failures}. Code `{version}`.",
+            f"**Aims, main design** (wrong base, rich experiment, interferometer or tracker)\n\n"
+            f"{aims(scored)}",
             by_solver(scored),
+            f"**Against the ceiling**, effects that a wrist may have and that can be seen\n\n"
+            f"{paired([x for x in scored if _fair(x)], OWN, CEILING)}",
             "![Right answers by size](pictures/hidden_effects_by_size.png)",
             "![Right answers by effect](pictures/hidden_effects_by_effect.png)",
             of_one_solver(scored, OWN),
         ]
     )
+
+
+def _fair(line: Line) -> bool:
+    return bool(line["kind"] == "single" and line["main"] and line["plausible"])
+
+
+def _posed(scored: Sequence[Line]) -> str:
+    """Return how many riddles there were of each kind."""
+    kinds = Counter({line["key"]: line["kind"] for line in scored}.values())
+    counts = ", ".join(f"{kind} {count}" for kind, count in sorted(kinds.items()))
+    main = len({line["key"] for line in scored if line["main"]})
+    return f"{sum(kinds.values())} riddles posed, {main} of them in the main design ({counts})"
 
 
 def _rates(lines: Sequence[Line]) -> tuple[float, float, float]:
@@ -55,13 +70,7 @@ def draw_sizes(lines: Sequence[Line], path: Path) -> None:
     figure = new_figure(6.4, 3.6)
     axes = figure.subplots()
     for place, (solver, marker) in enumerate(SHOWN.items()):
-        mine = [
-            line
-            for line in lines
-            if line["solver"] == solver
-            and line["kind"] in ("single", "unexcitable")
-            and line["experiment"] == "rich"
-        ]
+        mine = [line for line in lines if line["solver"] == solver and _fair(line)]
         sizes = sorted({line["size"] for line in mine})
         if not sizes:
             continue
@@ -86,7 +95,7 @@ def draw_sizes(lines: Sequence[Line], path: Path) -> None:
 
 def draw_effects(lines: Sequence[Line], path: Path) -> None:
     """Draw how often the project's diagnosis has the true effect inside its first class."""
-    mine = [line for line in lines if line["solver"] == OWN and line["kind"] == "single"]
+    mine = [line for line in lines if line["solver"] == OWN and _fair(line)]
     effects = sorted({line["effect"] for line in mine}, reverse=True)
     if not effects:
         return

@@ -33,14 +33,14 @@ from types import FrameType
 from typing import Any
 
 from bench_wrist import OWN, TRUTH, code_version
-from cases import Case, full_cases, quick_cases
+from cases import Case, full_cases, quick_cases, stage_of
 from ceiling import knows_the_laws
 from diagnosis_core import diagnosis_core
 from dictionary import Dictionary, design_of, dictionary
 from elastic_net import elastic_net
 from observe import Riddle, pose_riddle
 from own_diagnosis import own_diagnosis, own_diagnosis_mcap
-from score import floor_of, score
+from score import Judge
 from solvers import (
     Solver,
     always_none,
@@ -67,7 +67,7 @@ SOLVERS: dict[str, Solver] = {
     "own_diagnosis_mcap": own_diagnosis_mcap,
     "knows_the_laws": knows_the_laws,
 }
-SAMPLED = ("own_diagnosis_mcap", "knows_the_laws")
+SAMPLED = ("own_diagnosis_mcap", "diagnosis_core", "spans_of_the_laws", "knows_the_laws")
 """Are slow and asked a sample of the cases only."""
 
 TRUTH_FILES = (
@@ -112,24 +112,24 @@ def solve(case: Case, solvers: Sequence[str], quick: bool, folder: Path) -> list
         with time_limit(LONGEST_S):
             riddle = pose_riddle(case)
             words = dictionary(design_of(case), quick, folder)
-            floor = floor_of(riddle, words)
+            judge = Judge(riddle, words)
     except InputError as error:
         return [_without(case, name, "out_of_reach", str(error)) for name in solvers]
     except Exception as error:
         return [_without(case, name, "error", repr(error)) for name in solvers]
     posed = time.perf_counter() - begun
-    return [_ask(riddle, name, words, floor, posed) for name in solvers]
+    return [_ask(riddle, name, words, judge, posed) for name in solvers]
 
 
 def _ask(
-    riddle: Riddle, name: str, words: Dictionary, floor: float, posed: float
+    riddle: Riddle, name: str, words: Dictionary, judge: Judge, posed: float
 ) -> dict[str, Any]:
     begun = time.perf_counter()
     try:
         with time_limit(LONGEST_S):
             answer = SOLVERS[name](riddle, words)
             seconds = time.perf_counter() - begun
-            line = asdict(score(riddle, name, answer, words, floor, version_of(name), seconds))
+            line = asdict(judge.line(name, answer, version_of(name), seconds))
             return line | {"posed_s": posed}
     except Exception as error:
         return _without(riddle.case, name, "error", repr(error))
@@ -141,13 +141,14 @@ def _without(case: Case, solver: str, why: str, text: str) -> dict[str, Any]:
         "solver": solver,
         "version": version_of(solver),
         "kind": case.kind,
+        "main": case.main,
         why: text,
     }
 
 
 def asked(case: Case, solvers: Sequence[str]) -> list[str]:
     """Return those of the solvers that are asked this case."""
-    return [name for name in solvers if name not in SAMPLED or case.sampled]
+    return [name for name in solvers if name not in SAMPLED or case.asked(name)]
 
 
 class time_limit:
@@ -226,9 +227,28 @@ def main() -> int:
 
 def run(todo: Sequence[tuple[Case, list[str]]], path: Path, arguments: argparse.Namespace) -> None:
     """Solve cases and append their scores to the results file as they come."""
-    for design in sorted({design_of(case) for case, _ in todo}):
-        dictionary(design, arguments.quick, arguments.output, arguments.processes)
-    begun, progress = time.monotonic(), Progress("cases")
+    begun = time.monotonic()
+    for stage in sorted({stage_of(case) for case, _ in todo}):
+        part = [each for each in todo if stage_of(each[0]) == stage]
+        print(f"stage {stage}: {len(part)} cases", flush=True)
+        for design in sorted({design_of(case) for case, _ in part}):
+            dictionary(design, arguments.quick, arguments.output, arguments.processes)
+        _stage(part, path, arguments, begun)
+        if _over(arguments, begun):
+            return
+
+
+def _over(arguments: argparse.Namespace, begun: float) -> bool:
+    return bool(arguments.minutes and time.monotonic() - begun > 60.0 * arguments.minutes)
+
+
+def _stage(
+    todo: Sequence[tuple[Case, list[str]]],
+    path: Path,
+    arguments: argparse.Namespace,
+    begun: float,
+) -> None:
+    progress = Progress("cases")
     left = dict.fromkeys(range(len(todo)))
     for _ in range(RESTARTS):
         try:
@@ -261,7 +281,7 @@ def _drain(
             out.flush()
             del left[waiting[finished]]
             progress(len(todo) - len(left), len(todo))
-            if arguments.minutes and time.monotonic() - begun > 60.0 * arguments.minutes:
+            if _over(arguments, begun):
                 for future in waiting:
                     future.cancel()
 

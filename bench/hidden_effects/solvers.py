@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from bench_wrist import Array
 from dictionary import Dictionary, Word
 from observe import Riddle
 from scipy.stats import chi2
-from whitened import Whitened
+from whitened import Whitened, whitened
 
 ALPHA = 0.01
 """Chance of a false alarm that the tests allow themselves over the whole catalogue."""
@@ -46,12 +46,18 @@ class Answer:
         afterwards, for all solvers alike.
     not_excited : tuple of str
         What the solver says that this experiment cannot show.
+    suspects : dict of str to float
+        How much each name may add to the error, in any unit; where empty the classes' order counts.
+    explained_with_suspects : ((u, 6), (u, 6)) float, optional
+        The same as `explained` with all suspects in the model.
     """
 
     verdict: str
     classes: tuple[tuple[str, ...], ...]
     explained: tuple[Array, Array]
     not_excited: tuple[str, ...] = ()
+    suspects: dict[str, float] = field(default_factory=dict)
+    explained_with_suspects: tuple[Array, ...] = ()
 
 
 Solver = Callable[[Riddle, Dictionary], Answer]
@@ -92,7 +98,7 @@ def told_the_answer(riddle: Riddle, words: Dictionary) -> Answer:
 def geometry_only(riddle: Riddle, words: Dictionary) -> Answer:
     """Calibrate joint axes and zeros without a prior, and believe that this is all."""
     chosen = [word for word in words.words if word.name.split("@")[0] in GEOMETRY]
-    values, gain, free = Whitened(riddle.train, words).fit(chosen)
+    values, gain, free = whitened(riddle, words).fit(chosen)
     if chi2.sf(gain, free) > ALPHA:
         return nothing(riddle)
     names = tuple(word.name for word in chosen if "axis" in word.name)
@@ -116,7 +122,7 @@ def spans_of_the_laws(riddle: Riddle, words: Dictionary) -> Answer:
 
     No ceiling: strong play and friction are not linear, and a wide span explains more.
     """
-    fit = Whitened(riddle.train, words)
+    fit = whitened(riddle, words)
     allowed = ALPHA / max(len(words.searched), 1)
 
     def evidence(gain: float, free: int, n: int) -> float:
@@ -130,7 +136,7 @@ def gaussian_process(riddle: Riddle, words: Dictionary) -> Answer:
     train, test = riddle.train, riddle.test
     used = train.measured.any(axis=0)
     factor, factor_test = (np.linalg.cholesky(each.covariance) for each in (train, test))
-    centred = Whitened(train, words).without_nuisance(train.residual)
+    centred = whitened(riddle, words).without_nuisance(train.residual)
     values = np.linalg.solve(factor, centred[..., None])[..., 0]
     rows = train.measured[:, used].all(axis=1)
     # What a sensor wandered with the time of one session says nothing about another.

@@ -49,6 +49,31 @@ def test_interval_of_a_rate_is_wilsons(hits, trials, bench):
     assert bench("score").wilson(hits, trials) == pytest.approx((low, high), abs=1e-4)
 
 
+def test_interval_of_a_paired_difference_is_newcombes(bench):
+    """Newcombe, Statist. Med. 17 (1998) 2635: 36, 12, 2 and 0 of 50 pairs, method 10."""
+    one = np.repeat([True, False], [48, 2])
+    two = np.repeat([True, False, True], [36, 12, 2])
+    assert bench("tables").newcombe(one, two) == pytest.approx((0.0569, 0.3404), abs=1e-4)
+
+
+def test_best_baseline_counts_and_what_was_not_run_says_so(bench):
+    aims = bench("aims")
+    usual = {"main": True, "kind": "none", "size": 0.0, "spurious": 0, "after": 1.0}
+    lines = [
+        usual | {"key": str(k), "solver": solver, "named": [["x"]] if k < hits else []}
+        for solver, hits in (("own_diagnosis", 1), ("elastic_net", 3), ("stepwise_bic", 9))
+        for k in range(10)
+    ]
+    rows = {row.split("|")[1].strip(): row for row in aims.aims(lines).splitlines()}
+    alarms = rows["nothing hides: names an effect in 2 % at most"]
+    assert "10 % (2–40)" in alarms
+    assert "missed" in alarms
+    best = rows["nothing hides: fewer false alarms than any baseline"]
+    assert "0.10, elastic_net 0.30" in best
+    assert "met" in best
+    assert "not run" in rows["two effects: both in 88 %"]
+
+
 def test_proposed_numbers_spread_as_a_generators_do(bench):
     numbers = bench("ceiling").Numbers(np.random.default_rng(5).standard_normal(3000))
     even = np.array([numbers.uniform(2.0, 4.0) for _ in range(1000)])
@@ -68,3 +93,8 @@ def test_cases_have_names_of_their_own_and_cover_the_catalogue(bench):
     hidden = {place for case in cases if case.kind == "single" for place in case.effects}
     assert hidden == set(bench("cases").searched(bench("cases").CATALOGUE))
     assert sum(case.path == "exact" for case in cases) >= 60
+    asked = [case for case in cases if case.asked("knows_the_laws")]
+    assert len(asked) >= 60
+    assert all(case.main and case.kind == "single" for case in asked)
+    stages = [bench("cases").stage_of(case) for case in cases]
+    assert stages == sorted(stages)
