@@ -205,6 +205,13 @@ def _held(
         A of the held sectors; the others have an equation of their own, 1.
     """
     n, m = closed.shape
+    if n == 1:
+        # One sample after the other comes this way as well.
+        (alone,) = np.nonzero(closed[0])
+        if len(alone):
+            matrix = approach[:, alone[:, None], alone]
+            yield np.zeros(1, dtype=np.intp), alone[None], np.ones((1, len(alone)), bool), matrix
+        return
     count = np.count_nonzero(closed, axis=1)
     width = WIDTH if n > MANY else max(1, int(count.max(initial=0)))
     stack = -(-count // width)
