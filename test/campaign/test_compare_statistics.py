@@ -14,6 +14,7 @@ from wrist_stiffness.campaign.noise_floor import (
     NoiseFloor,
     against_floor,
     by_side,
+    is_at_floor,
     noise_floor,
     repeatability,
 )
@@ -280,6 +281,17 @@ def test_verdict_says_whether_it_is_noise():
 def test_half_more_than_the_floor_is_more_than_noise():
     assert against_floor(1.1, "replicates") == "no more than the noise"
     assert against_floor(1.5, "replicates") == "1.5 x the noise"
+    assert not is_at_floor(1.2, "replicates")
+
+
+def test_without_repeats_wander_may_be_the_rest():
+    assert against_floor(1.1, "instrument") == "no more than the noise"
+    assert "slow wander of the instrument, which may be the rest" in against_floor(
+        1.4, "instrument"
+    )
+    assert against_floor(1.6, "instrument").startswith("1.6 x the noise without slow wander")
+    assert is_at_floor(1.4, "instrument")
+    assert not is_at_floor(1.6, "instrument")
 
 
 def test_without_a_known_floor_nothing_is_called_noise():

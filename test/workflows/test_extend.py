@@ -17,6 +17,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.instrument import instrument
 from wrist_stiffness.workflows import extend as workflow
 from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.extend import (
@@ -224,9 +225,12 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     assert main(["extend", *arguments, "--json", str(report)]) == 0
     told = json.loads(report.read_text())
     assert told["before"]["rmse_phi_mdeg"] > 4.0 * told["noise_floor"]["phi_mdeg"]
-    for key in ("s_um", "phi_mdeg"):
-        assert told["after"][f"rmse_{key}"] < 1.2 * told["noise_floor"][key]
-    assert "what is left is no more than the noise" in capsys.readouterr().out
+    # Half a second at 10 Hz: of the true noise the wander stays whole, and the floor knows it not.
+    shift = instrument("interferometer").shift
+    true_um = 1e6 * np.sqrt(3.0 * (shift.white**2 / 5.0 + shift.wander**2))
+    assert told["after"]["rmse_s_um"] < 1.1 * true_um
+    assert told["after"]["rmse_phi_mdeg"] < 1.2 * told["noise_floor"]["phi_mdeg"]
+    assert "slow wander of the instrument, which may be the rest" in capsys.readouterr().out
     summary = replay(RECORDING, output, tmp_path / "out.mcap")
     assert summary.predictions == summary.joint_states > 0
 

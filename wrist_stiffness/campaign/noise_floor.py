@@ -27,6 +27,10 @@ SOURCES = {
 AT_THE_FLOOR = 1.15
 """An error up to so many times the noise floor is called noise."""
 
+WITH_WANDER = 1.5
+"""Where no dwell was repeated, an error up to so many times the floor may be slow wander: means of
+many samples have little of the white scatter and all of the wander, which the floor then lacks."""
+
 
 def over_floor(rms: Mapping[str, float], floor: Mapping[str, float]) -> float:
     """Return errors over their floor by the key of the quantity, the largest of them."""
@@ -39,7 +43,19 @@ def against_floor(ratio: float, source: str) -> str:
         return f"{ratio:.1f} x what the conditions do not predict; the noise is not known"
     if ratio <= AT_THE_FLOOR:
         return "no more than the noise"
-    return "the instrument has no noise" if np.isinf(ratio) else f"{ratio:.1f} x the noise"
+    if is_at_floor(ratio, source):
+        return (
+            f"{ratio:.1f} x the noise without slow wander of the instrument, which may be the rest"
+        )
+    if np.isinf(ratio):
+        return "the instrument has no noise"
+    lacks = " without slow wander of the instrument" if source == "instrument" else ""
+    return f"{ratio:.1f} x the noise{lacks}"
+
+
+def is_at_floor(ratio: float, source: str) -> bool:
+    """Tell whether an error over the floor may be noise, by where the floor is known from."""
+    return ratio <= (WITH_WANDER if source == "instrument" else AT_THE_FLOOR)
 
 
 @dataclass(frozen=True, eq=False)

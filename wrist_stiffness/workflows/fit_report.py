@@ -11,7 +11,7 @@ import numpy as np
 from wrist_stiffness.campaign.fitting.judge import SEEN, THIS_SESSION, Judged
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.noise_floor import AT_THE_FLOOR, against_floor, over_floor
+from wrist_stiffness.campaign.noise_floor import against_floor, is_at_floor, over_floor
 
 FAR = 3.0
 """Standard deviations of its prior beyond which a parameter is farther off than usual."""
@@ -22,6 +22,8 @@ NOT_AT_THE_FLOOR = (
     "not at the floor: an effect is missing ('wrist-stiffness diagnose' finds out which), or the "
     "fit was caught where other flanges touch than on the wrist; then more poses and loads help"
 )
+
+OR_WANDER = "or the instrument wanders slowly, which poses that are visited again would tell"
 
 JUDGED_BY = {
     SEEN: "on the recordings of the fit; --hold-out judges by a part that the fit has not seen",
@@ -95,8 +97,9 @@ def left_lines(errors: Errors, judged: Judged) -> list[str]:
         f"judged {JUDGED_BY[judged.by]}",
         f"what is left is {against_floor(ratio, errors.floor_source)}",
     ]
-    if ratio > AT_THE_FLOOR:
-        lines.append(NOT_AT_THE_FLOOR)
+    if not is_at_floor(ratio, errors.floor_source):
+        wanders = f"; {OR_WANDER}" if errors.floor_source == "instrument" else ""
+        lines.append(f"{NOT_AT_THE_FLOOR}{wanders}")
     return lines
 
 
