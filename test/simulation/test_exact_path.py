@@ -19,6 +19,8 @@ SECOND_ORDER = 2e-3
 FORCE_SECOND_ORDER = 5e-3
 # Both integrate the slip from pose to pose; at whole degrees apart this is what is left of it.
 FRICTION = 1e-2
+# A pin with play leans further for the same error of a reaction that nearly vanishes.
+FRICTION_AND_PLAY = 2e-2
 LEVER = np.repeat([1.0, 0.03], 3)
 # At rest effects that live in motion or in sensors do nothing, and creep only in time.
 STATIC = [
@@ -108,3 +110,24 @@ def test_friction_along_a_path(joint, gap, wrist):
     effect = np.linalg.norm(theirs - without, axis=1)
     assert np.max(effect) > 1e-7
     assert np.max(np.linalg.norm(ours - theirs, axis=1)) < FRICTION * np.max(effect)
+
+
+@pytest.mark.parametrize(
+    ("rubbing", "loose"), [("joint_2", "joint_1"), ("joint_3", "joint_4"), ("joint_4", "joint_3")]
+)
+def test_friction_and_play_settle_together(rubbing, loose, wrist):
+    """A loose pin gives way to what friction pushes, and what it gives changes the friction."""
+    table, rng = with_gaps(wrist(), 1.0), np.random.default_rng(11)
+    start, end = random_pose(table.workspace, rng), random_pose(table.workspace, rng)
+    loads = [random_load(rng), random_load(rng)]
+    steps = [(start + x * (end - start), loads[0]) for x in np.linspace(0.0, 1.0, 8)]
+    steps += [(end, loads[0] + x * (loads[1] - loads[0])) for x in np.linspace(0.1, 1.0, 8)]
+    hidden = [
+        HiddenEffect("joint_friction", rubbing, "coulomb", 0.1, 2),
+        HiddenEffect("joint_clearance", loose, "algebraic", 2e-6, 3),
+    ]
+    ours, theirs, _, _ = compare(table, hidden, steps, np.zeros(len(HEATED)))
+    without, _, _, _ = compare(table, hidden[1:], steps, np.zeros(len(HEATED)))
+    effect = np.linalg.norm(theirs - without, axis=1)
+    assert np.max(effect) > 1e-7
+    assert np.max(np.linalg.norm(ours - theirs, axis=1)) < FRICTION_AND_PLAY * np.max(effect)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
@@ -34,6 +34,18 @@ class Block:
     load: Array
     flexibility: Array
     temperature: Array
+
+    def __getitem__(self, rows: slice) -> Block:
+        """Return some of the samples."""
+        whole = self.configuration
+        configuration = Configuration(*(getattr(whole, f.name)[rows] for f in fields(whole)))
+        return Block(
+            self.time_s[rows],
+            configuration,
+            self.load[rows],
+            self.flexibility[rows],
+            self.temperature[rows],
+        )
 
     @cached_property
     def rotations(self) -> Array:

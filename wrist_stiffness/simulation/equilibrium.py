@@ -12,13 +12,13 @@ with the tangent flexibilities of the laws.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.influence import Influence, influence
 from wrist_stiffness.mechanism.kinematics import Configuration
@@ -43,6 +43,9 @@ SMALL_FORCE = 1e-6
 """Flange forces below this do not count [N]."""
 
 BISECTIONS = 12
+
+FLAT = 0.3
+"""A search along a line ends where its slope has fallen to this share of the one at its start."""
 
 ROUNDING = 1e-11
 
@@ -70,6 +73,14 @@ class Equilibrium:
     slips: Array
     force: Array
     closed: NDArray[np.bool_]
+
+    @staticmethod
+    def joined(parts: Sequence[Equilibrium]) -> Equilibrium:
+        """Return samples in a row as one."""
+        if len(parts) == 1:
+            return parts[0]
+        names = [field.name for field in fields(Equilibrium)]
+        return Equilibrium(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 class Pose:
@@ -112,12 +123,52 @@ class Pose:
         halves = np.einsum("nkjx,njh->nkhx", self.rows, friction)
         return halves.reshape(*halves.shape[:2], 6)
 
+    def give(self, state: Equilibrium, bends: Sequence[tuple[int, Bend]]) -> Array:
+        """Return what unit friction of each passive joint moves there, (n, 3, 2, 2).
+
+        Parameters
+        ----------
+        state : Equilibrium
+            Whose touching flanges and slopes of the laws count.
+        bends : sequence of (int, Bend)
+            As in `solve`.
+
+        Returns
+        -------
+        (n, 3, 2, 2) float
+            Slide and turn by force and torque along the axis.
+        """
+        soft = self.flexibility.copy()
+        for k, law in bends:
+            soft[:, k] += law(state.through[:, k])[1]
+        n_k, on = self.operators.screw_gap, state.closed
+        tangent = self.operators.approach.copy()
+        for k in {k for k, _ in bends}:
+            down = n_k[:, :, k] @ (soft[:, k] - self.flexibility[:, k])
+            tangent += down @ np.swapaxes(n_k[:, :, k], -1, -2)
+        # Rows of flanges that do not touch are the identity's, and nothing pushes on them.
+        tangent = np.where(on[:, :, None] & on[:, None, :], tangent, np.eye(on.shape[1]))
+        out = np.empty((len(on), len(PASSIVE_JOINTS), 2, 2))
+        for j in range(len(PASSIVE_JOINTS)):
+            rows = self.rows[:, :, j]
+            halves = np.zeros((*rows.shape[:2], 2, 6))
+            halves[:, :, 0, :3] = halves[:, :, 1, 3:] = rows
+            bent = halves @ soft
+            out[:, j] = (bent @ np.swapaxes(halves, -1, -2)).sum(axis=1)
+            opened = np.einsum("nkhi,nmki->nhm", bent, n_k)
+            opened += np.einsum("nmhi,nmi->nhm", halves[:, self._own], self._sector_screw)
+            opened *= on[:, None]
+            pressed = np.linalg.solve(tangent, np.swapaxes(opened, -1, -2))
+            out[:, j] -= opened @ pressed
+        return out
+
     def solve(
         self,
         load: Array,
         screws: Array,
         bends: Sequence[tuple[int, Bend]] = (),
         extra: Array | None = None,
+        near: Equilibrium | None = None,
     ) -> Equilibrium:
         """Find the equilibrium.
 
@@ -131,6 +182,8 @@ class Pose:
             Number of a component and its law besides its elasticity.
         extra : (n, 8, 6) float, optional
             Wrench through the components from inside the wrist, friction for instance.
+        near : Equilibrium, optional
+            Where the iteration begins.
 
         Returns
         -------
@@ -153,7 +206,7 @@ class Pose:
         n, m = gap.shape
         flat = n_k.reshape(n, m, given[0].size)
         gap = gap + _times(flat, given.reshape(n, -1))
-        force, closed = self._contact(gap, free, bends)
+        force, closed = self._contact(gap, free, bends, near)
         through = free + _times(np.swapaxes(flat, -1, -2), force).reshape(free.shape)
         total = given.copy()
         for k, law in bends:
@@ -175,11 +228,17 @@ class Pose:
         return Equilibrium(twist, through, slips, force, closed)
 
     def _contact(
-        self, gap: Array, free: Array, bends: Sequence[tuple[int, Bend]]
+        self,
+        gap: Array,
+        free: Array,
+        bends: Sequence[tuple[int, Bend]],
+        near: Equilibrium | None,
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Return forces and contact state for gaps (n, m) and wrenches (n, 8, 6) without them."""
         approach, n_k = self.operators.approach, self.operators.screw_gap
         force, closed = np.zeros_like(gap), np.zeros(gap.shape, dtype=bool)
+        if near is not None:
+            force, closed = near.force, near.closed.copy()
         if gap.shape[1] == 0:
             return force, closed
 
@@ -226,26 +285,29 @@ def _times(matrix: Array, vector: Array) -> Array:
 
 
 def _step_length(opening: Callable[[Array], Array], force: Array, change: Array) -> Array:
-    """Return how far to go from `force` by `change` (n, m) to the least energy, (n,) in 0 to 1.
+    """Return how far to go from `force` by `change` (n, m) towards the least energy, (n,) to 1.
 
     The slope of the convex energy along the way is the opening times the change; where a full
-    step would pass its zero, the zero is found by bisection.
+    step would pass its zero, bisection comes near it.
     """
 
-    def slope(share: Array) -> Array:
-        return np.sum(opening(force + share[:, None] * change) * change, axis=1)
+    def slope(share: Array | float) -> Array:
+        return np.sum(opening(force + np.reshape(share, (-1, 1)) * change) * change, axis=1)
 
-    high = np.ones(len(force))
-    passed = slope(high) > 0.0
-    if not passed.any():
-        return high
-    low = np.where(passed, 0.0, 1.0)
+    low, middle, high = np.zeros(len(force)), np.ones(len(force)), np.ones(len(force))
+    here = slope(1.0)
+    if not (here > 0.0).any():
+        return middle
+    enough = np.where(here > 0.0, FLAT * np.abs(slope(0.0)), np.inf)
     for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        beyond = slope(middle) > 0.0
-        high = np.where(passed & beyond, middle, high)
-        low = np.where(passed & ~beyond, middle, low)
-    return high
+        search = np.abs(here) > enough
+        if not search.any():
+            break
+        high = np.where(search & (here > 0.0), middle, high)
+        low = np.where(search & (here <= 0.0), middle, low)
+        middle = np.where(search, 0.5 * (low + high), middle)
+        here = slope(middle)
+    return middle
 
 
 def solve_contacts(

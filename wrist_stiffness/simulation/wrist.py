@@ -17,13 +17,22 @@ from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
 from wrist_stiffness.simulation.heat import HeatNetwork
 from wrist_stiffness.simulation.laws.law import Law, no_screws
 
-MAX_SWEEPS = 80
+MAX_SWEEPS = 20
 """Passes in which histories (creep, friction) and equilibrium find each other."""
 
-FULL_SWEEPS = 15
-"""Passes after which the steps are halved."""
+MAX_SWEEPS_OF_ONE = 400
+"""The same for a sample on its own."""
 
-SWEEP_TOLERANCE = 1e-11
+RUBBING_BLOCK = 64
+"""Samples in a row that find their friction together."""
+
+LEAST_SHARE, LARGEST_SHARE = 0.02, 5.0
+"""Of a step of friction or creep."""
+
+LONGEST_BELIEVED = 8
+"""Halvings in a row towards the same bound."""
+
+SWEEP_TOLERANCE = 1e-10
 """Largest change of the platform's twist in the last pass, up to `TWIST_SCALE` [m, rad]."""
 
 TWIST_SCALE = 1e-3
@@ -122,6 +131,35 @@ class TrueWrist:
     def _equilibrium(self, block: Block, pose: Pose) -> Equilibrium:
         load = block.load + sum((law.wrench(block) for law in self._laws), np.zeros(6))
         screws = no_screws(block) + sum(law.screws(block) for law in self._laws)
+        rubbing = any(law.rubs is not None for law in self._laws)
+        size = RUBBING_BLOCK if rubbing else len(block.time_s)
+        parts: list[Equilibrium] = []
+        for first in range(0, len(block.time_s), size):
+            parts += self._settled(block, pose, load, screws, slice(first, first + size))
+        return Equilibrium.joined(parts)
+
+    def _settled(
+        self, block: Block, pose: Pose, load: Array, screws: Array, rows: slice
+    ) -> list[Equilibrium]:
+        """Return the equilibria of some of the samples, one after another."""
+        few, n = block[rows], len(block.time_s[rows])
+        # The operators of a part are made again: that is cheap beside one pass.
+        own = pose if n == len(block.time_s) else Pose(few.configuration, self.parts, self.gravity)
+        state = self._passes(few, own, load[rows], screws[rows])
+        if state is not None:
+            return [state]
+        if n == 1:
+            raise InputError(
+                f"true wrist: creep or friction found no equilibrium in {MAX_SWEEPS_OF_ONE} passes "
+                f"at {few.time_s[0]:.3f} s"
+            )
+        # A sample can settle only after the one before it: shorter rows take fewer passes.
+        middle = rows.start + n // 2
+        halves = slice(rows.start, middle), slice(middle, rows.start + n)
+        return [each for half in halves for each in self._settled(block, pose, load, screws, half)]
+
+    def _passes(self, block: Block, pose: Pose, load: Array, screws: Array) -> Equilibrium | None:
+        """Return the equilibrium with the histories of creep and friction, None if not found."""
         bends = [
             (ELASTIC.index(law.bends), partial(law.bend, block))
             for law in self._laws
@@ -132,30 +170,30 @@ class TrueWrist:
         if not rubbing and all(law.flows is None for law in self._laws):
             return state
         moved, acting = screws, np.zeros((len(rubbing), len(block.time_s), 2))
-        for sweep in range(MAX_SWEEPS):
+        along, across = _Steps(moved), _Steps(acting)
+        for _ in range(MAX_SWEEPS if len(block.time_s) > 1 else MAX_SWEEPS_OF_ONE):
             before = state
-            new_moved, new_acting = self._histories(block, pose, state, screws, acting, False)
-            # Flanges that hold what friction pushes can make full steps jump to and fro.
-            share = 1.0 if sweep < FULL_SWEEPS else 0.5
-            moved = moved + share * (new_moved - moved)
-            acting = acting + share * (new_acting - acting)
+            give = pose.give(state, bends) if rubbing else np.zeros(0)
+            new_moved, new_acting = self._histories(block, give, state, screws, acting, False)
+            moved, acting = along.towards(moved, new_moved), across.towards(acting, new_acting)
             friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
             for law, force in zip(rubbing, acting, strict=True):
                 friction[:, PASSIVE_JOINTS.index(law.rubs or "")] += force
-            state = pose.solve(load, moved, bends, pose.friction_wrench(friction))
-            change = np.max(np.abs(state.twist - before.twist))
+            state = pose.solve(load, moved, bends, pose.friction_wrench(friction), state)
+            # What whole steps would have changed.
+            share = np.minimum(
+                along.share.min(axis=(1, 2)), across.share.min(axis=(0, 2), initial=1.0)
+            )
+            change = np.max(np.abs(state.twist - before.twist) / share[:, None])
             if change <= SWEEP_TOLERANCE * max(1.0, np.max(np.abs(state.twist)) / TWIST_SCALE):
-                self._histories(block, pose, state, screws, acting, True)
+                self._histories(block, give, state, screws, acting, True)
                 return state
-        raise InputError(
-            f"true wrist: creep or friction found no equilibrium in {MAX_SWEEPS} passes; the "
-            f"last changed the platform's twist by {change:.1e}"
-        )
+        return None
 
     def _histories(
         self,
         block: Block,
-        pose: Pose,
+        give: Array,
         state: Equilibrium,
         screws: Array,
         acting: Array,
@@ -172,5 +210,42 @@ class TrueWrist:
                 k = ELASTIC.index(law.flows)
                 moved[:, k] += law.flow(block, state.through[:, k], remember)
             if law.rubs is not None:
-                rubbed.append(law.rub(block, pose, state, acting[len(rubbed)], remember))
+                rubbed.append(law.rub(block, give, state, acting[len(rubbed)], remember))
         return moved, np.reshape(rubbed, acting.shape)
+
+
+class _Steps:
+    """Steps of numbers that look for themselves, each by its own secant and inside its own bounds.
+
+    Pins with play and flanges that hold what friction pushes make whole steps jump to and fro, or
+    crawl.
+    """
+
+    def __init__(self, like: Array) -> None:
+        self.share = np.ones_like(like)
+        self._step, self._moved = np.zeros_like(like), np.zeros_like(like)
+        self._low, self._high = np.full_like(like, -np.inf), np.full_like(like, np.inf)
+        self._halved = np.zeros(like.shape, dtype=int)
+
+    def towards(self, now: Array, wanted: Array) -> Array:
+        """Return numbers nearer to those that are wanted."""
+        step = wanted - now
+        with np.errstate(invalid="ignore", divide="ignore"):
+            secant = self._moved / (self._step - step)
+        known = np.isfinite(secant) & (secant > 0.0)
+        share = np.where(known, np.clip(secant, LEAST_SHARE, LARGEST_SHARE), 1.0)
+        out = now + share * step
+        self._low = np.where(step > 0.0, now, self._low)
+        self._high = np.where(step < 0.0, now, self._high)
+        # Neighbours move what was too much before: a bound is not believed for long.
+        old = (self._low >= self._high) | (self._halved >= LONGEST_BELIEVED)
+        self._low = np.where(old & (step < 0.0), -np.inf, self._low)
+        self._high = np.where(old & (step > 0.0), np.inf, self._high)
+        beyond = ((out >= self._high) & (step > 0.0)) | ((out <= self._low) & (step < 0.0))
+        self._halved = np.where(beyond, self._halved + 1, 0)
+        with np.errstate(invalid="ignore"):
+            out = np.where(beyond, 0.5 * (self._low + self._high), out)
+            share = np.abs(out - now) / np.abs(step)
+        self.share = np.where(step == 0.0, 1.0, np.clip(share, LEAST_SHARE, LARGEST_SHARE))
+        self._step, self._moved = step, out - now
+        return np.asarray(out)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from math import exp, hypot
 
 import numpy as np
+from scipy.optimize import brentq
 
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
+from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.law import Law
 from wrist_stiffness.simulation.seat import Seat
 
@@ -21,7 +22,8 @@ BODIES_JOINED = {
 """Inner and outer body of each passive joint."""
 
 
-SLIP_PASSES = 6
+BUDGET_TOLERANCE = 1e-12
+"""Error of the friction of a joint that slips, relative to its budget."""
 
 Pair = tuple[float, float]
 """Along the slide and round it [m] or [N]."""
@@ -74,7 +76,7 @@ class JointFriction(Law):
         return self._joint
 
     def rub(
-        self, block: Block, pose: Pose, state: Equilibrium, acting: Array, remember: bool
+        self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
     ) -> Array:
         """Return the friction of each sample by an implicit step from the one before."""
         joint = self._joint
@@ -82,7 +84,7 @@ class JointFriction(Law):
         to_slip = np.array([1.0, arm])
         path = state.slips[:, j] * to_slip
         path[:, 1] += arm * self.turn_of(block)
-        give = self._give(pose, j) * to_slip[:, None] * to_slip
+        give = give[:, j] * to_slip[:, None] * to_slip
         free = path - (give @ (acting / to_slip)[..., None])[..., 0]
         budget = self.budget(self.reaction(block, state.through[:, ELASTIC.index(joint)]))
         if self._state is None:
@@ -100,12 +102,7 @@ class JointFriction(Law):
             speed = hypot(at[0] - past[0], at[1] - past[1]) / max(now - before, 1e-9)
             most = slow * (1.0 + self._stribeck * exp(-speed / self.STRIBECK_SPEED))
             if hypot(*force) > most:
-                for _ in range(SLIP_PASSES):
-                    # Dragged along, the bristles lie in the direction of slip, which depends on
-                    # the friction itself; the secant stiffness finds it.
-                    force = _implicit(most / hypot(*_given(soft, force, pull)), soft, pull)
-                least = most / hypot(*force)
-                force = least * force[0], least * force[1]
+                force = _dragged(most, self.stiffness, soft, pull)
             out[i] = force
             bristle = -force[0] / self.stiffness, -force[1] / self.stiffness
             before, past = now, _given(soft, force, to)
@@ -134,13 +131,6 @@ class JointFriction(Law):
         push = np.einsum("rij,nj->nri", self.seat.rings, local)
         return np.asarray(np.sqrt(dot(push, push)).sum(axis=-1))
 
-    def _give(self, pose: Pose, j: int) -> Array:
-        """Slide and turn that unit friction makes with open flanges, (n, 2, 2)."""
-        rows = pose.rows[:, :, j]
-        on = np.zeros((*rows.shape[:2], 2, 6))
-        on[:, :, 0, :3] = on[:, :, 1, 3:] = rows
-        return np.asarray((on @ pose.flexibility @ np.swapaxes(on, -1, -2)).sum(axis=1))
-
 
 def _implicit(stiffness: float, give: list[list[float]], pull: Pair) -> Pair:
     """Return the force of bristles on joint surfaces that themselves give way (2, 2)."""
@@ -148,6 +138,20 @@ def _implicit(stiffness: float, give: list[list[float]], pull: Pair) -> Pair:
     a, b, c, d = 1.0 + stiffness * a, stiffness * b, stiffness * c, 1.0 + stiffness * d
     share = -stiffness / (a * d - b * c)
     return share * (d * pull[0] - b * pull[1]), share * (a * pull[1] - c * pull[0])
+
+
+def _dragged(most: float, stiffness: float, give: list[list[float]], pull: Pair) -> Pair:
+    """Return the force of the size `most` against a slip that depends on the force itself.
+
+    Dragged along, the bristles lie in the direction of slip.  The stiffness that would give the
+    same force is found between none and their own: the force grows with it.
+    """
+
+    def excess(secant: float) -> float:
+        return hypot(*_implicit(secant, give, pull)) / most - 1.0
+
+    secant = brentq(excess, 0.0, stiffness, xtol=1e-12 * stiffness, rtol=BUDGET_TOLERANCE)
+    return _implicit(secant, give, pull)
 
 
 def _given(give: list[list[float]], force: Pair, start: Pair) -> Pair:

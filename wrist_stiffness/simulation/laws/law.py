@@ -10,7 +10,7 @@ from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponen
 from wrist_stiffness.simulation.block import Block
 
 if TYPE_CHECKING:
-    from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
+    from wrist_stiffness.simulation.equilibrium import Equilibrium
 
 
 class Law:
@@ -64,11 +64,12 @@ class Law:
         raise NotImplementedError
 
     def rub(
-        self, block: Block, pose: Pose, state: Equilibrium, acting: Array, remember: bool
+        self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
     ) -> Array:
         """Return force and torque of friction along the axis of `rubs`, (n, 2) [N, N m].
 
-        `state` was found with the friction `acting` (n, 2) in this joint.
+        `state` was found with the friction `acting` (n, 2) in this joint; `give` (n, 3, 2, 2) is
+        what a little more of it moves there.
         """
         raise NotImplementedError
 
