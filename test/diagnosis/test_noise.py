@@ -66,6 +66,37 @@ def test_a_drift_in_the_catalogue_does_not_widen_the_replicate_floor(rng):
     np.testing.assert_allclose(total_variance(noise, table), 1.0, rtol=0.5)
 
 
+def wandering_means(rng, stated):
+    """A third of the rows are means over long rests: they state little, and wander like all."""
+    return rng.normal(0, np.sqrt(stated + 1.0), stated.shape)
+
+
+def test_a_wander_is_added_to_what_is_stated(rng):
+    stated = np.where(np.arange(300)[:, None] % 3 == 0, 0.04, 4.0) * np.ones((300, 2))
+    label = np.where(np.arange(300) % 3 == 0, np.arange(300) // 6, -1)
+    covariance = stated[:, :, None] * np.eye(2)
+    values = wandering_means(rng, stated)
+    for replicate in (label, None):
+        table = Observations(values, {}, covariance, replicate=replicate)
+        noise = estimate_noise(table, np.empty((300, 2, 0)), np.empty((300, 2, 0)))
+        factors = np.linalg.inv(noise.factors(table))
+        variance = np.einsum("nij,nij->ni", factors, factors)
+        # 50 repeats of two components: the variance is known to 20 %.
+        np.testing.assert_allclose(variance, stated + 1.0, rtol=0.4)
+
+
+def test_what_repeats_have_in_common_is_no_scatter_however_they_are_weighted(rng):
+    condition = np.repeat(np.arange(20), 6)
+    far = rng.normal(0, 1e4, (20, 2))[condition]
+    structure = np.einsum("nk,ij->nikj", np.eye(20)[condition], np.eye(2)).reshape(120, 2, 40)
+    covariance = rng.uniform(0.5, 1.5, (120, 1, 1)) * np.eye(2)
+    values = far + rng.normal(0, 1.0, (120, 2)) * np.sqrt(covariance[:, :1, 0])
+    table = Observations(values, {}, covariance, replicate=condition)
+    noise = estimate_noise(table, np.empty((120, 2, 0)), structure)
+    assert noise.source == "replicates"
+    assert total_variance(noise, table) == pytest.approx(1.0, rel=0.5)
+
+
 @pytest.mark.parametrize(("scatter", "variance"), [(5.0, MOST_BEYOND_STATED), (0.2, 1.0)])
 def test_stated_scatter_is_believed_but_for_some_wander(rng, scatter, variance):
     table = Observations(rng.normal(0, scatter, (60, 2)), {}, np.eye(2))

@@ -21,7 +21,9 @@ EVIDENCE = 3.0
 """Gain of log likelihood that the two numbers of the wander must bring."""
 
 
-def find_colour(reduced: Array, observations: Observations) -> tuple[float, float]:
+def find_colour(
+    reduced: Array, observations: Observations, wandering: Array
+) -> tuple[float, float, float]:
     """Share and correlation time of the slow wander.
 
     Parameters
@@ -31,17 +33,22 @@ def find_colour(reduced: Array, observations: Observations) -> tuple[float, floa
         are the last column.
     observations : Observations
         Tells what was measured, and when.
+    wandering : (n, m) array
+        Part of each variance that may wander at all.
 
     Returns
     -------
-    float, float
-        Share in [0, 1) and time, share 0 if white noise does as well.
+    float, float, float
+        Share of that part in [0, 1), time, and logarithm of the likelihood over that of white
+        noise; share 0 if white noise does as well.
     """
     steps = np.diff(observations.times)[np.diff(observations.sessions) == 0]
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    if not wandering.any():
+        return 0.0, step, 0.0
 
     def unlikely(share: float, time_constant: float) -> float:
-        return -_restricted_likelihood(reduced, observations, share, time_constant)
+        return -_restricted_likelihood(reduced, observations, share * wandering, time_constant)
 
     grid = [(share, step * factor) for share in SHARES for factor in TIMES_IN_STEPS]
     share, time_constant = min(grid, key=lambda model: unlikely(*model))
@@ -52,13 +59,14 @@ def find_colour(reduced: Array, observations: Observations) -> tuple[float, floa
         method="bounded",
         options={"maxiter": 10, "xatol": 0.01},
     )
-    if finer.fun > unlikely(0.0, step) - EVIDENCE:
-        return 0.0, step
-    return float(finer.x), time_constant
+    gain = unlikely(0.0, step) - float(finer.fun)
+    if gain < EVIDENCE:
+        return 0.0, step, 0.0
+    return float(finer.x), time_constant, gain
 
 
 def _restricted_likelihood(
-    reduced: Array, observations: Observations, share: float, time_constant: float
+    reduced: Array, observations: Observations, share: Array, time_constant: float
 ) -> float:
     measured = observations.measured
     white, log_sum = innovations(

@@ -5,18 +5,24 @@ from what a model with every candidate in it leaves.  The colour comes from that
 by restricted likelihood, so that slow effects in the catalogue are not taken for wander.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from wrist_stiffness.diagnosis.colour import find_colour
-from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.observations import Array, Mask, Observations
 from wrist_stiffness.diagnosis.projection import leading_directions, orthonormal
-from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors
+from wrist_stiffness.diagnosis.whitening import (
+    NoiseModel,
+    component_factors,
+    stated_covariance,
+)
 
 FEWEST_REPLICATE_DOF = 12
 """Below this the scatter of the replicates is itself too uncertain to be a floor."""
 
 MOST_BEYOND_STATED = 2.0
-"""Variance of a unit over what its observer states that may still be wander."""
+"""Variance of a single measurement over what its observer states that may still be wander."""
 
 RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
@@ -28,7 +34,8 @@ def replicate_variance(
     """Pooled variance inside the groups of replicates.
 
     What a candidate does between two replicates (drift, warming) is taken out; what it does
-    between conditions cannot reach the differences inside a group.
+    between conditions cannot reach the differences inside a group.  Nothing is weighted: a
+    large value common to a group would not cancel under weights that differ.
 
     Parameters
     ----------
@@ -60,6 +67,10 @@ def replicate_variance(
     np.add.at(total, group, stacked)
     centre = total / np.maximum(count, 1)[:, :, None]
     inside = np.where(measured[:, :, None], stacked - centre[group], 0.0)
+    # Metres and radians: what a column can take out is judged in scatters of each component.
+    size = np.sqrt(np.mean(inside[:, :, -1] ** 2, axis=0))
+    size = np.where(size > 0, size, 1.0)
+    inside, stacked = inside / size[:, None], stacked / size[:, None]
     freedom = np.maximum(count - 1, 0).sum(axis=0)
 
     rows = inside.reshape(-1, stacked.shape[2])
@@ -68,7 +79,7 @@ def replicate_variance(
     left = rows[:, -1] - basis @ (basis.T @ rows[:, -1])
     freedom = freedom - basis.shape[1] / m
     seen = observations.measured.any(axis=0)
-    variance = np.sum(left.reshape(-1, m) ** 2, axis=0) / np.maximum(freedom, 1)
+    variance = size**2 * np.sum(left.reshape(-1, m) ** 2, axis=0) / np.maximum(freedom, 1)
     return np.where(seen, variance, 1.0), float(freedom[seen].min())
 
 
@@ -111,43 +122,98 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
     structure : (n, m, q) array
         Columns of all candidates.
     """
-    n, m = observations.values.shape
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
-    count = np.maximum(measured.sum(axis=0), 1)
-    variance = np.sum(values**2, axis=0) / count
-    reference = np.diag(np.where(variance > 0, variance, 1.0))
-    stated = reference if observations.covariance is None else observations.covariance
-    factor = component_factors(np.broadcast_to(stated, (n, m, m)), measured)
-
-    everything = factor @ np.where(
-        measured[:, :, None], np.concatenate([base, structure, values[:, :, None]], axis=2), 0.0
-    )
-    basis = rich_basis(everything[:, :, :-1].reshape(n * m, -1), int(measured.sum()))
-    target = everything[:, :, -1].reshape(-1)
-    left = np.where(measured, (target - basis @ (basis.T @ target)).reshape(n, m), np.nan)
-
-    loss = 1 - basis.shape[1] / measured.sum()
-    coupled = residual_covariance(left, loss)
-    size = np.sqrt(np.diag(coupled))
-    reduced = np.concatenate([basis, target[:, None]], axis=1).reshape(n, m, -1)
-    share, time_constant = find_colour(reduced / size[:, None], observations)
-    repeated, freedom = replicate_variance(
-        everything[:, :, -1], everything[:, :, :-1], observations
-    )
+    columns = np.where(measured[:, :, None], np.concatenate([base, structure], axis=2), 0.0)
+    repeated, freedom = replicate_variance(values, columns, observations)
     if freedom >= FEWEST_REPLICATE_DOF:
         # 1/s^2 of a scatter s^2 with few degrees of freedom is too large on average.
-        visible = share_inside_groups(observations, share, time_constant)
-        scatter = np.diag(repeated * freedom / (freedom - 2) / visible)
-        return NoiseModel(reference, scatter, share, time_constant, freedom * m, "replicates")
+        repeated = repeated * freedom / (freedom - 2)
+        known, dof = _stated_of_replicates(observations), freedom * measured.shape[1]
+        noise = NoiseModel(np.diag(np.maximum(repeated - known, 0.0)), 0.0, 1.0, dof, "replicates")
+        noise = _coloured(noise, values, columns, observations)
+        visible = share_inside_groups(observations, noise.colour_share, noise.colour_time)
+        if noise.all_wanders:
+            return replace(noise, beyond=np.diag(np.maximum(repeated / visible - known, 0.0)))
+        return replace(noise, beyond=noise.beyond / visible)
+    stated = stated_covariance(observations)
+    told = observations.covariance is not None
+    if not told:
+        count = np.maximum(measured.sum(axis=0), 1)
+        variance = np.sum(values**2, axis=0) / count
+        stated = stated + np.diag(np.where(variance > 0, variance, 1.0))
+    basis, left = _rich(values, columns, stated, measured)
+    loss = 1 - basis.shape[2] / measured.sum()
+    coupled = residual_covariance(np.where(measured, left, np.nan), loss)
     dof = float(measured.sum() * loss)
-    if observations.covariance is not None:
-        # What was stated is the white part; a wander comes on top of it.  No more than that: what
-        # nothing in the catalogue explains may also be an effect outside of it.
-        beyond = np.clip(np.diag(coupled), 1.0, MOST_BEYOND_STATED)
-        scatter = np.diag(np.maximum(beyond, 1 / (1 - share)))
-        return NoiseModel(reference, scatter, share, time_constant, dof, "given")
-    return NoiseModel(reference, coupled, share, time_constant, dof, "residual")
+    if told:
+        noise = NoiseModel(_wander_beside(np.diag(coupled), stated), 0.0, 1.0, dof, "given")
+    else:
+        size = np.sqrt(stated[0])
+        noise = NoiseModel(size @ coupled @ size, 0.0, 1.0, dof, "residual")
+    return _coloured(noise, values, columns, observations)
+
+
+def _stated_of_replicates(observations: Observations) -> Array:
+    """Mean variance that the table states of the units that are repeated, (m,)."""
+    own = np.diagonal(stated_covariance(observations), axis1=1, axis2=2)
+    repeated = np.ones(len(own), bool)
+    if observations.replicate is not None:
+        repeated = observations.replicate >= 0
+    return np.asarray(own[repeated].mean(axis=0))
+
+
+def _wander_beside(excess: Array, stated: Array) -> Array:
+    """Covariance that comes on top of a stated one, (m, m).
+
+    What was stated is the white part; a wander comes on top of it.  No more than a single
+    measurement scatters: what nothing in the catalogue explains may also be an effect outside.
+
+    Parameters
+    ----------
+    excess : (m,) array
+        Mean square of what the rich model leaves, in units of the stated variance.
+    stated : (n, m, m) array
+        Covariance of each unit.
+    """
+    own = np.diagonal(stated, axis1=1, axis2=2)
+    beside = np.maximum(excess - 1.0, 0.0) / np.mean(1.0 / own, axis=0)
+    return np.diag(np.minimum(beside, (MOST_BEYOND_STATED - 1.0) * own.max(axis=0)))
+
+
+def _rich(values: Array, columns: Array, covariance: Array, measured: Mask) -> tuple[Array, Array]:
+    """Fit everything that could be structure.
+
+    Returns
+    -------
+    (n, m, r) array
+        Orthonormal columns, weighted.
+    (n, m) array
+        What they leave of the weighted values.
+    """
+    factor = component_factors(covariance, measured)
+    flat = (factor @ columns).reshape(measured.size, -1)
+    target = (factor @ values[:, :, None]).reshape(-1)
+    basis = rich_basis(flat, int(measured.sum()))
+    left = target - basis @ (basis.T @ target)
+    return basis.reshape(*measured.shape, -1), left.reshape(measured.shape)
+
+
+def _coloured(
+    noise: NoiseModel, values: Array, columns: Array, observations: Observations
+) -> NoiseModel:
+    """Find how much of the scatter wanders slowly, and how slowly."""
+    stated = stated_covariance(observations)
+    covariance = stated + np.diag(np.diag(noise.beyond))
+    basis, left = _rich(values, columns, covariance, observations.measured)
+    reduced = np.concatenate([basis, left[:, :, None]], axis=2)
+    best, most = noise, 0.0
+    for all_wanders in (True, False):
+        trial = replace(noise, colour_share=1.0, all_wanders=all_wanders)
+        share, time, gain = find_colour(reduced, observations, trial.wandering(observations))
+        if gain > most:
+            best, most = replace(trial, colour_share=share, colour_time=time), gain
+    return best
 
 
 def residual_covariance(left: Array, loss: float) -> Array:

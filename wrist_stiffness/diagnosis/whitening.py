@@ -14,14 +14,14 @@ from wrist_stiffness.diagnosis.observations import Array, Labels, Mask, Observat
 
 @dataclass(frozen=True, eq=False)
 class NoiseModel:
-    """Scatter of one unit.
+    """Scatter of one unit: what the table states of it, and what comes on top of that.
+
+    A mean over a long rest states little scatter of its own, and wanders like any other.
 
     Parameters
     ----------
-    reference : (m, m) array
-        Covariance of a unit of which the table states none.
-    scatter : (m, m) array
-        Covariance that remains after the stated (or reference) one was divided out.
+    beyond : (m, m) array
+        Covariance beyond the stated one; all of it where the table states none.
     colour_share : float
         Part of the variance that wanders slowly, in [0, 1).
     colour_time : float
@@ -30,22 +30,33 @@ class NoiseModel:
         On how many independent numbers the size of the scatter rests; infinite = as told.
     source : str
         Where the size comes from: ``replicates``, ``given`` or ``residual``.
+    all_wanders : bool
+        Whether that part is of all variance, or only of what is beyond the stated one: some tables
+        state the wander too, others the white scatter alone.
+    scale : float
+        Factor of all covariances.
     """
 
-    reference: Array
-    scatter: Array
+    beyond: Array
     colour_share: float
     colour_time: float
     dof: float
     source: str
+    all_wanders: bool = True
+    scale: float = 1.0
 
     def factors(self, observations: Observations) -> Array:
         """Inverse factors that bring each unit's components to unit scatter, (n, m, m)."""
-        n, m = observations.values.shape
-        stated = self.reference if observations.covariance is None else observations.covariance
-        measured = observations.measured
-        inner = component_factors(np.broadcast_to(stated, (n, m, m)), measured)
-        return component_factors(np.broadcast_to(self.scatter, (n, m, m)), measured) @ inner
+        covariance = self.scale * (stated_covariance(observations) + self.beyond)
+        return component_factors(covariance, observations.measured)
+
+    def wandering(self, observations: Observations) -> Array:
+        """Part of each variance that wanders slowly, (n, m)."""
+        if self.all_wanders:
+            return np.full(observations.values.shape, self.colour_share)
+        stated = np.diagonal(stated_covariance(observations), axis1=1, axis2=2)
+        own = np.diagonal(self.beyond)
+        return np.asarray(self.colour_share * own / (stated + own))
 
     def whiten(self, observations: Observations, columns: Array) -> Array:
         """Whitened columns of these units, (n m, k); rows that were not measured become zero.
@@ -59,24 +70,36 @@ class NoiseModel:
         """
         measured = observations.measured
         filled = np.where(measured[:, :, None], columns, 0.0)
-        white = self._filter(observations, self.factors(observations) @ filled, measured)
+        weighted = self.factors(observations) @ filled
+        white = self._filter(observations, weighted, measured, self.wandering(observations))
         return white.reshape(measured.size, columns.shape[2])
 
     def filtered(self, observations: Observations, columns: Array) -> Array:
         """Columns (n, q) filtered in time only, like a component that was always measured."""
         always = np.ones((len(columns), 1), dtype=bool)
-        return self._filter(observations, columns[:, None, :], always)[:, 0]
+        share = self.wandering(observations).mean(axis=1, keepdims=True)
+        return self._filter(observations, columns[:, None, :], always, share)[:, 0]
 
-    def _filter(self, observations: Observations, columns: Array, measured: Mask) -> Array:
+    def _filter(
+        self, observations: Observations, columns: Array, measured: Mask, share: Array
+    ) -> Array:
         white, _ = innovations(
             columns,
             measured,
             observations.times,
             observations.sessions,
-            self.colour_share,
+            share,
             self.colour_time,
         )
         return white
+
+
+def stated_covariance(observations: Observations) -> Array:
+    """Return the covariance that a table states of each unit, (n, m, m); zero where none."""
+    n, m = observations.values.shape
+    if observations.covariance is None:
+        return np.zeros((n, m, m))
+    return np.broadcast_to(observations.covariance, (n, m, m))
 
 
 def component_factors(covariance: Array, measured: Mask) -> Array:
@@ -105,7 +128,7 @@ def innovations(
     measured: Mask,
     times: Array,
     sessions: Labels,
-    share: float,
+    share: Array,
     time_constant: float,
 ) -> tuple[Array, float]:
     """Standardised innovations of white noise plus slow wander of unit variance together.
@@ -118,8 +141,10 @@ def innovations(
         Entries that take part.
     times, sessions : (n,) arrays
         The wander starts afresh in every session.
-    share, time_constant : float
-        Share of the wander in the variance and its correlation time.
+    share : (n, m) array
+        Of the wander in the variance of each unit.
+    time_constant : float
+        Correlation time of the wander.
 
     Returns
     -------
@@ -128,23 +153,24 @@ def innovations(
     float
         Sum of the logarithms of the innovation variances.
     """
-    if share == 0:
+    if not share.any():
         return np.where(measured[:, :, None], columns, 0.0), 0.0
     gap = np.diff(times, prepend=times[0])
     fresh = np.diff(sessions, prepend=sessions[0] - 1) != 0
     memory = np.where(fresh, 0.0, np.exp(-gap / time_constant))
     n, m, k = columns.shape
+    slow, white = np.sqrt(share), 1 - share
     state, variance = np.zeros((m, k)), np.zeros(m)
     result, log_sum = np.zeros((n, m, k)), 0.0
     for i, a in enumerate(memory):
         seen = measured[i]
         state = a * state
-        variance = a**2 * variance + share * (1 - a**2)
-        total = variance + (1 - share)
-        surprise = np.where(seen[:, None], columns[i] - state, 0.0)
+        variance = a**2 * variance + (1 - a**2)
+        total = slow[i] ** 2 * variance + white[i]
+        surprise = np.where(seen[:, None], columns[i] - slow[i, :, None] * state, 0.0)
         result[i] = surprise / np.sqrt(total)[:, None]
         log_sum += float(np.log(total) @ seen)
-        gain = np.where(seen, variance / total, 0.0)
+        gain = np.where(seen, slow[i] * variance / total, 0.0)
         state = state + gain[:, None] * surprise
-        variance = variance * (1 - gain)
+        variance = variance * (1 - gain * slow[i])
     return result, log_sum

@@ -142,7 +142,7 @@ def _settled(
 
 def _without_colour(noise: NoiseModel) -> NoiseModel:
     white = 1.0 - noise.colour_share if noise.source == "given" else 1.0
-    return replace(noise, colour_share=0.0, scatter=white * noise.scatter)
+    return replace(noise, colour_share=0.0, beyond=white * noise.beyond)
 
 
 def start_of(problem: FitProblem, other: FitProblem, z: Array) -> Array:
@@ -215,7 +215,7 @@ class _Linear:
         more = max(misfit, 1.0)
         share = np.concatenate([np.full(len(design), 1.0 / np.sqrt(more)), np.ones(len(z))])
         return cls(
-            replace(noise, scatter=noise.scatter * more),
+            replace(noise, scale=more),
             rows * share[:, None],
             left * share,
             np.asarray(np.linalg.inv(information / more + prior), dtype=float),
