@@ -33,11 +33,11 @@ from wrist_stiffness.simulation.wrist import TrueWrist
 PLACES = 5
 """Likeliest places by linear words, which are fitted with their laws."""
 
-DRAWS = 4
+DRAWS = 3
 """Random shapes of which the best one begins a fit."""
 
 MOST_EFFECTS = 2
-EVALUATIONS = 10
+EVALUATIONS = 6
 """Of a fit, the differences for its slopes aside."""
 
 SMALL_STEP = 3e-3
@@ -161,6 +161,8 @@ def knows_the_laws(riddle: Riddle, words: Dictionary) -> Answer:
     for _ in range(MOST_EFFECTS):
         rest = fit.white(left)
         start = float(rest @ rest)
+        if chosen and chi2.sf(start, n) > ALPHA:
+            break
         fits = sorted(_fits(fit, left, words, signatures, rng), key=lambda each: each.cost)
         if not fits:
             break
