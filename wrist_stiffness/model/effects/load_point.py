@@ -28,7 +28,10 @@ class LoadPoint(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return both lever arms."""
-        return (*symmetric_vector(IN_BASE, 1000.0, 2.0), *symmetric_vector(IN_PLATFORM, 1000.0, 2.0))
+        return (
+            *symmetric_vector(IN_BASE, 1000.0, 2.0),
+            *symmetric_vector(IN_PLATFORM, 1000.0, 2.0),
+        )
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
