@@ -55,7 +55,7 @@ def test_what_a_session_sets_up_anew_is_no_evidence_on_its_sealed_part():
     wander = Nuisance(
         "wander", lambda units: np.stack([units.times, units.times**2], 1)[:, None], None, True
     )
-    noise = NoiseModel(np.eye(1), np.eye(1), 0.0, 1.0, np.inf, "given")
+    noise = NoiseModel(np.eye(1), 0.0, 1.0, np.inf, "given")
     model = FittedModel((wander,), {("wander", 0, 0): 0.0, ("wander", 0, 1): 0.0}, (), noise)
     values = rng.normal(size=(40, 1))
     seen = Observations(values, {}, np.eye(1), time)
