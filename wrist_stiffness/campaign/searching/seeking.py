@@ -39,7 +39,10 @@ ROUGH = 10.0
 """Variance of what is left, in units of the noise, from which a fit is also begun from the drawing:
 a base that gave way to a large effect does not find back."""
 
-MOST_EXTRAS = 5
+MOST_TRIED = 3
+"""So many candidates are fitted with the whole base before a step is given up."""
+
+MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
 
 
@@ -158,6 +161,7 @@ def _one_more(model: ErrorModel, reached: Reached, candidates: Candidates) -> Re
     fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
     # Columns may promise what the law itself, within its bounds, does not keep.
     hopeful = sorted((each for each in fits if each.gain > least), key=lambda each: -each.gain)
+    hopeful = hopeful[:MOST_TRIED]
     while hopeful:
         close = [each for each in hopeful if each.gain > CLOSE * hopeful[0].gain][:MOST_REFITTED]
         trials = [_with(model, reached, each) for each in close]
