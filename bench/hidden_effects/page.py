@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from aims import CEILING, OWN, aims
+from cases import SIZES, TINY
 from run import SOLVERS, current
 from score import wilson
 from tables import Line, by_solver, of_one_solver, paired
@@ -21,6 +22,7 @@ from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 BEGIN, END = "<!-- results: begin (page.py) -->", "<!-- results: end -->"
 SHOWN = {CEILING: "D", OWN: "o", "elastic_net": "^", "stepwise_bic": "v"}
+SHOWN_SIZES = (TINY, *SIZES)
 
 
 def text_of(lines: Sequence[Line]) -> str:
@@ -31,13 +33,15 @@ def text_of(lines: Sequence[Line]) -> str:
     unreached = len({line["key"] for line in lines if "out_of_reach" in line})
     failed = Counter(line["solver"] for line in lines if "error" in line)
     failures = ", ".join(f"{name}: {count}" for name, count in sorted(failed.items())) or "none"
+    main = [line for line in scored if line["main"]]
     version = next((line["version"] for line in scored if line["solver"] == OWN), "-")
     return "\n\n".join(
         [
             f"{_posed(scored)}. {unreached} more cannot even be half as large as wanted. "
             f"Answers that failed with an error: {failures}. Code `{version}`.",
-            f"**Aims, main design** (wrong base, rich experiment, interferometer or tracker)\n\n"
-            f"{aims(scored)}",
+            f"**Aims** (main design: wrong base, rich experiment, interferometer or tracker; "
+            f"effects that a wrist may have)\n\n{aims([x for x in main if x['plausible']])}",
+            f"**The same with magnitudes that no working wrist has**\n\n{aims(main)}",
             by_solver(scored),
             f"**Against the ceiling**, effects that a wrist may have and that can be seen\n\n"
             f"{paired([x for x in scored if _fair(x)], OWN, CEILING)}",
@@ -57,7 +61,13 @@ def _posed(scored: Sequence[Line]) -> str:
     kinds = Counter({line["key"]: line["kind"] for line in scored}.values())
     counts = ", ".join(f"{kind} {count}" for kind, count in sorted(kinds.items()))
     main = len({line["key"] for line in scored if line["main"]})
-    return f"{sum(kinds.values())} riddles posed, {main} of them in the main design ({counts})"
+    own = [line for line in scored if line["solver"] == OWN]
+    seconds = np.median([line["seconds"] for line in own]) if own else np.nan
+    posing = np.median([line["posed_s"] for line in scored])
+    return (
+        f"{sum(kinds.values())} riddles posed, {main} of them in the main design ({counts}); "
+        f"median {posing:.1f} s to pose one and {seconds:.1f} s for a diagnosis"
+    )
 
 
 def _rates(lines: Sequence[Line]) -> tuple[float, float, float]:
@@ -85,10 +95,12 @@ def draw_sizes(lines: Sequence[Line], path: Path) -> None:
             label=solver,
         )
     axes.set_xscale("log")
+    axes.set_xticks(SHOWN_SIZES, [f"{size:g}" for size in SHOWN_SIZES])
+    axes.minorticks_off()
     axes.set_ylim(0, 102)
     axes.set_xlabel("size of the hidden effect, in noise of one sample")
     axes.set_ylabel("true effect inside the first class [%]")
-    axes.legend(fontsize=8)
+    figure.legend(fontsize=8, loc="outside upper center", ncols=len(SHOWN))
     axes.grid(alpha=0.3)
     save_figure(figure, path)
 
@@ -106,7 +118,9 @@ def draw_effects(lines: Sequence[Line], path: Path) -> None:
     axes.barh(place, 100 * rates[0], color="0.75")
     spread = 100 * np.abs(rates[1:] - rates[0])
     axes.errorbar(100 * rates[0], place, xerr=spread, fmt="none", ecolor="0.2", capsize=2)
-    axes.set_yticks(place, effects, fontsize=7)
+    counts = Counter(line["effect"] for line in mine)
+    axes.set_yticks(place, [f"{effect} ({counts[effect]})" for effect in effects], fontsize=7)
+    axes.set_ylim(-0.7, len(effects) - 0.3)
     axes.set_xlim(0, 102)
     axes.set_xlabel("true effect inside the first class of own_diagnosis [%], 95 % interval")
     save_figure(figure, path)
