@@ -21,6 +21,8 @@ FORCE_SECOND_ORDER = 5e-3
 FRICTION = 1e-2
 # A pin with play leans further for the same error of a reaction that nearly vanishes.
 FRICTION_AND_PLAY = 2e-2
+# Passes end at 0.1 nm; what they leave goes on along the path [m].
+SETTLED = 3e-9
 LEVER = np.repeat([1.0, 0.03], 3)
 # At rest effects that live in motion or in sensors do nothing, and creep only in time.
 STATIC = [
@@ -131,3 +133,42 @@ def test_friction_and_play_settle_together(rubbing, loose, wrist):
     effect = np.linalg.norm(theirs - without, axis=1)
     assert np.max(effect) > 1e-7
     assert np.max(np.linalg.norm(ours - theirs, axis=1)) < FRICTION_AND_PLAY * np.max(effect)
+
+
+@pytest.mark.parametrize(
+    ("rubbing", "loose", "form", "mu", "play"),
+    [
+        ("joint_3", "joint_4", "exponential", 0.05, 1.4e-5),
+        ("joint_4", "joint_3", "algebraic", 0.05, 2e-5),
+        ("joint_3", "joint_4", "algebraic", 0.3, 1e-5),
+    ],
+)
+def test_friction_beside_much_play_is_the_same_in_one_block_and_sample_by_sample(
+    rubbing, loose, form, mu, play, wrist
+):
+    """The exact path finds no equilibrium there; the fast one must not depend on how it is cut."""
+    table, rng = with_gaps(wrist(), 1.0), np.random.default_rng(11)
+    poses, loads = (
+        np.array([draw() for _ in range(4)])
+        for draw in (lambda: random_pose(table.workspace, rng), lambda: random_load(rng))
+    )
+    knots, at = np.arange(4.0), np.linspace(0.0, 3.0, 90)
+    theta, load = (
+        np.column_stack([np.interp(at, knots, column) for column in values.T])
+        for values in (poses, loads)
+    )
+    hidden = [
+        HiddenEffect("joint_friction", rubbing, "coulomb", mu, 2),
+        HiddenEffect("joint_clearance", loose, form, play, 3),
+    ]
+    shifts = []
+    for size in (len(at), 1):
+        true = TrueWrist(table, [build(each, table) for each in hidden])
+        parts = [slice(first, first + size) for first in range(0, len(at), size)]
+        states = [
+            true.at(at[rows], theta[rows], load[rows], np.zeros((len(at[rows]), len(HEATED))))
+            for rows in parts
+        ]
+        shifts.append(np.concatenate([state.shift for state in states]))
+    assert np.ptp(shifts[0], axis=0).max() > 1e-5
+    assert np.max(np.abs(shifts[0] - shifts[1])) < SETTLED
