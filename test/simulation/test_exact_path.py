@@ -21,8 +21,9 @@ FORCE_SECOND_ORDER = 5e-3
 FRICTION = 1e-2
 # A pin with play leans further for the same error of a reaction that nearly vanishes.
 FRICTION_AND_PLAY = 2e-2
-# Passes end at 0.1 nm; what they leave goes on along the path [m].
-SETTLED = 3e-9
+# Passes end at 0.1 nm; where a pin is about to flip, what they leave grows along the path.  A tenth
+# of the white noise of the finest instrument is not seen [m].
+SETTLED = 7e-8
 LEVER = np.repeat([1.0, 0.03], 3)
 # At rest effects that live in motion or in sensors do nothing, and creep only in time.
 STATIC = [
