@@ -98,3 +98,35 @@ def test_cases_have_names_of_their_own_and_cover_the_catalogue(bench):
     assert all(case.main and case.kind == "single" for case in asked)
     stages = [bench("cases").stage_of(case) for case in cases]
     assert stages == sorted(stages)
+
+
+@pytest.fixture
+def twelve_units(bench):
+    """Session of twelve units, and a dictionary of one zero and one direction of a wrong base."""
+    rng, units = np.random.default_rng(8), 12
+    zero, base = rng.normal(size=(2, units, 6, 1))
+    session = bench("observe").Session(
+        residual=np.zeros((units, 6)),
+        measured=np.ones((units, 6), dtype=bool),
+        covariance=np.tile(np.eye(6), (units, 1, 1)),
+        wander=np.zeros((6 * units, 6 * units)),
+        conditions=np.zeros((units, 14)),
+    )
+    word, tools = bench("dictionary").Word, bench("dictionary")
+    name = tools.nuisance_names()[0]
+    words = tools.Dictionary((word(name, zero, zero),), word("base", 2.0 * base, 2.0 * base))
+    return session, words, zero[..., 0], base[..., 0]
+
+
+def test_what_zeros_take_up_is_unexcited_and_what_a_base_takes_up_is_absorbed(bench, twelve_units):
+    session, words, zero, base = twelve_units
+    whole, known_base = (
+        bench("whitened").Whitened(session, words, with_base=flag) for flag in (True, False)
+    )
+    for change, excitation, detectability in (
+        (30.0 * zero, 0.1, 0.1),
+        # With the zero known: the part of the base across it; else a prior of two standard ones.
+        (1.0 * base, np.linalg.norm(base - zero * np.sum(base * zero) / np.sum(zero**2)), 0.5),
+    ):
+        assert np.linalg.norm(known_base.white(change)) == pytest.approx(excitation, abs=0.11)
+        assert np.linalg.norm(whole.white(change)) == pytest.approx(detectability, abs=0.11)
