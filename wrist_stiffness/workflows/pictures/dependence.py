@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import rankdata
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.figure import new_figure
@@ -68,8 +69,8 @@ def _draw(plot: Any, values: Array, residual: Array, few: bool, number: int, nam
     if few:
         classes = np.unique(np.round(values, 9), return_inverse=True)[1]
     else:
-        order = np.argsort(np.argsort(values, kind="stable"), kind="stable")
-        classes = order * CLASSES // len(values)
+        # Equal values share a rank, so what is the same condition is one class.
+        classes = np.floor((rankdata(np.round(values, 9)) - 0.5) * CLASSES / len(values))
     centres, means, errors = [], [], []
     for place in np.unique(classes):
         own = residual[classes == place]
