@@ -130,6 +130,13 @@ def test_wrong_use_is_one_line_that_names_it(argv, named, capsys):
     assert named in err
 
 
+@pytest.mark.parametrize("number", ["-3", "-.5", "-1e-6", "-2.5E+3"])
+def test_a_negative_number_is_no_option(number):
+    seen = []
+    assert main(["try", "--number", number], [command(lambda given: seen.append(given) or 0)]) == 0
+    assert seen[0].number == float(number)
+
+
 def test_version_and_module_entry():
     ran = subprocess.run(
         [sys.executable, "-m", "wrist_stiffness", "--version"], capture_output=True, text=True

@@ -255,13 +255,20 @@ def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_b
         (["along +z"], [0, 0, 1, 0, 0, 0]),
         (["along", "y"], [0, 1, 0, 0, 0, 0]),
         (["about -x"], [0, 0, 0, -1, 0, 0]),
-        (["about (-0.38, -0.88, 0.29)"], [0, 0, 0, -0.38, -0.88, 0.29]),
+        (["about (-0.38, -0.88, 0.29)"], [0, 0, 0, -0.3795, -0.8787, 0.2896]),
+        (["along (1, -2, 2)"], [1 / 3, -2 / 3, 2 / 3, 0, 0, 0]),
         (["along", "0.6", "0", "-0.8"], [0.6, 0, -0.8, 0, 0, 0]),
         (["0", "0", "1e-6", "-1", "0", "0"], [0, 0, 1e-6, -1, 0, 0]),
     ],
 )
 def test_a_direction_is_taken_in_the_words_of_compare(words, direction):
-    assert direction_of(words) == direction
+    assert direction_of(words) == pytest.approx(direction, abs=1e-4)
+
+
+@pytest.mark.parametrize("words", ["along (0, 0, 0)", "about (1, inf, 0)", "along nan nan nan"])
+def test_an_axis_without_a_direction_is_refused(words):
+    with pytest.raises(InputError, match="an axis of length .* has no direction"):
+        direction_of([words])
 
 
 @pytest.mark.parametrize(

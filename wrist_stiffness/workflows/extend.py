@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -131,17 +132,18 @@ def direction_of(words: Sequence[str]) -> list[float]:
     ----------
     words : sequence of str
         Six numbers; or "along" (a shift) or "about" (a turn) with an axis such as "+z" or three
-        numbers such as "(-0.38, -0.88, 0.29)".
+        numbers such as "(-0.38, -0.88, 0.29)", of which only the direction counts: `compare`
+        rounds them, and a parameter in um should be the way in um.
 
     Returns
     -------
     list of 6 float
-        Translation [m], rotation [rad], for a value of 1.
+        Translation [m], rotation [rad], for a value of 1; of length 1 where words named it.
 
     Raises
     ------
     InputError
-        If it is neither.
+        If it is neither, or the three numbers are no direction.
     """
     text = " ".join(words)
     kind, *rest = re.sub(r"[(),]", " ", text).split() or [""]
@@ -155,6 +157,10 @@ def direction_of(words: Sequence[str]) -> list[float]:
         except ValueError:
             three = []
     if kind in KINDS and len(three) == 3:
+        length = math.hypot(*three)
+        if not 0.0 < length < math.inf:
+            raise InputError(f"--direction {text}: an axis of length {length:g} has no direction")
+        three = [number / length for number in three]
         return [*three, 0.0, 0.0, 0.0] if kind == "along" else [0.0, 0.0, 0.0, *three]
     if kind in KINDS or len(three) != 6:
         raise InputError(
