@@ -12,7 +12,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.parameters import Estimate, Parameter
+from wrist_stiffness.model.parameters import Parameter
 
 STEP = 0.1
 """Step of a difference, in plausible sizes; a law linear in its parameters is taken at full size
@@ -149,15 +149,3 @@ def _step(parameter: Parameter, base: Effect, linear: bool) -> float:
 
 def _values(effect: Effect) -> Array:
     return np.array([effect.estimates[p.key].value for p in effect.parameters])
-
-
-def at_estimate(effect: Effect, values: dict[str, Estimate]) -> Effect:
-    """Return the effect with the values that a diagnosis found for those parameters it has."""
-    known = {p.key: p for p in effect.parameters}
-    return effect.with_values(
-        {
-            key: float(np.clip(estimate.value, known[key].lower, known[key].upper))
-            for key, estimate in values.items()
-            if key in known
-        }
-    )
