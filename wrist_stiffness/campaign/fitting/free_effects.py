@@ -35,6 +35,9 @@ A gap is free here by the prior of its law, tens of micrometres: a calibration d
 wrist stands there.  A diagnosis holds it to what shims leave (`searching.base_fit`), because a
 flange that stands otherwise is a fault to be named."""
 
+TOLERATED = frozenset(law for law, _ in BUILT)
+"""Laws of the wrist's tolerances: what they do within their priors is no finding."""
+
 
 @dataclass(frozen=True)
 class FreeEffect:

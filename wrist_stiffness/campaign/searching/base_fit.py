@@ -15,7 +15,7 @@ from scipy.linalg import lstsq
 from scipy.stats import chi2
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import BUILT, FreeEffect, commissioning
+from wrist_stiffness.campaign.fitting.free_effects import TOLERATED, FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.diagnosis.shared import apart, own_covariance
@@ -36,8 +36,6 @@ COOLING = 0.05
 
 ENOUGH = 3e-3
 """Relative fall of the sum of squares below which the fit has converged."""
-
-TOLERATED = {law for law, _ in BUILT}
 
 WIDE = 1e3
 """Factor of the prior of what belongs to the base and is under suspicion."""

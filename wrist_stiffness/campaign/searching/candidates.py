@@ -9,7 +9,8 @@ from itertools import product
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP
+from wrist_stiffness.campaign.fitting.free_effects import SET_UP, TOLERATED
+from wrist_stiffness.campaign.fitting.problem import Progress, silent
 from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
@@ -26,18 +27,10 @@ LARGE = 5.0
 FAR = 10.0
 """What an estimate may be against the bounds of its law; at zero they stay."""
 
-TOLERANCES = {*(law for law, _ in BUILT), "load_scale"}
-"""Laws of the base: what they do within their priors is no finding, however well it shows."""
-
 SET_UP_ANEW = {law for law, _ in SET_UP}
 """Laws refitted in every session before any search; there is nothing to find."""
 
-Progress = Callable[[int, int], None]
 Trial = tuple[Law, str, Values]
-
-
-def silent(done: int, total: int) -> None:
-    """Show no progress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +128,7 @@ class WristCandidate:
     def _testable(self, factor: Factor) -> Factor:
         """Return a factor with the size at which it must show to be tested, and its far bounds."""
         plausible = factor.plausible
-        if self.seen or self.law.id in TOLERANCES or plausible is None:
+        if self.seen or self.law.id in TOLERATED or plausible is None:
             size = None
         else:
             size = LARGE * plausible

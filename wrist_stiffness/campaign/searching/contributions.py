@@ -63,17 +63,17 @@ def contributions(fitted: BaseFit, named: Collection[str]) -> tuple[Contribution
     tuple of Contribution
         Of every effect that is the wrist's own, not the set-up's.
     """
-    ranking = _Ranking(fitted)
+    whole = _Decomposed(fitted)
     found = []
-    for name in dict.fromkeys(ranking.names):
+    for name in dict.fromkeys(whole.names):
         effect, component = name.split("@")
         kind = "tolerance"
         if name in fitted.extras:
             kind = "finding" if name in named else "suspect"
-        change, places = ranking.beyond(ranking.change(name)), ranking.places(name)
+        change, places = whole.beyond(whole.change(name)), whole.places(name)
         if not places:
             continue
-        scatter = ranking.scatter(places)
+        scatter = whole.scatter(places)
         sizes = {}
         for quantity in QUANTITIES:
             own = list(quantity.components)
@@ -85,7 +85,7 @@ def contributions(fitted: BaseFit, named: Collection[str]) -> tuple[Contribution
     return tuple(sorted(found, key=lambda each: -each.signal))
 
 
-class _Ranking:
+class _Decomposed:
     """A fitted wrist, taken apart.
 
     Parameters

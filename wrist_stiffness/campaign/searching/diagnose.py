@@ -6,12 +6,13 @@ sought first, by fits of the leading candidates with their own laws, the base al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
+from wrist_stiffness.campaign.fitting.problem import Progress, silent
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
@@ -24,8 +25,6 @@ from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Setting
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-
-Progress = Callable[[int, int], None]
 
 WANDER_SHARES = (0.7, 0.5, 0.35)
 """Root mean square of slope, curvature and third order of a wander, against its own."""
@@ -50,7 +49,7 @@ class WristDiagnosis:
     contributions : tuple of Contribution
         What each effect of that fit adds to the error, largest first.
     absorbed : tuple of TakenUp
-        What that base took up, furthest from its prior first.
+        What that base took up: the set-up first, then tolerances, furthest from its prior first.
     """
 
     diagnosis: Diagnosis
@@ -60,10 +59,6 @@ class WristDiagnosis:
     suspected: BaseFit
     contributions: tuple[Contribution, ...]
     absorbed: tuple[TakenUp, ...]
-
-
-def silent(done: int, total: int) -> None:
-    """Show no progress."""
 
 
 def diagnose_sessions(

@@ -23,10 +23,10 @@ from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
 
-ROUGH = 1.5
+INEXACT = 1.5
 """Variance of what is left, in units of the noise, from which a law is not taken as exact."""
 
-BEYOND = 30.0
+FAR_BEYOND = 30.0
 """Usual sizes of a parameter that are far beyond the usual: is it this effect, in this unit?"""
 
 
@@ -51,7 +51,7 @@ def refit(
     """
     kept = list(named)
     fitted = _along(model, base, kept)
-    if not kept or _variance(fitted) < ROUGH:
+    if not kept or _variance(fitted) < INEXACT:
         return fitted
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
@@ -73,7 +73,7 @@ def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit
         return fit_base(model, sessions) if base.extras else base
     same = {each.name for each in named} == set(base.extras)
     fitted = base if same else fit_base(model, sessions, named, base)
-    if _variance(fitted) < ROUGH:
+    if _variance(fitted) < INEXACT:
         return fitted
     # Flanges and play let a base that took up a large effect not find back: so from the drawing.
     return min(fitted, fit_base(model, sessions, named), key=lambda each: each.cost)
@@ -123,7 +123,7 @@ def sized(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
         by_size = {p.key: _usual_sizes(effect, p) for p in effect.parameters}
         key = max(by_size, key=lambda each: by_size[each])
         sentence = finding.evidence
-        if by_size[key] > BEYOND:
+        if by_size[key] > FAR_BEYOND:
             value = effect.estimates[key].value
             sentence += f"; far beyond its usual size: {key} = {value:.3g}"
         told.append(replace(finding, evidence=sentence))

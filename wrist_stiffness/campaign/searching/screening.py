@@ -19,11 +19,8 @@ from wrist_stiffness.diagnosis.worth import worth
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 
-MOST_FITTED = 6
-"""So many leaders are fitted with their own law."""
-
 MOST_TRIALS = 7
-"""Steps of each of these fits."""
+"""Steps of the fit of one leader."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,17 +6,17 @@ After each the earlier ones must still pay, and at the end each must be the best
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from wrist_stiffness.campaign.fitting.problem import Progress
 from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
-from wrist_stiffness.campaign.searching.screening import MOST_FITTED, Fitted, Screen
+from wrist_stiffness.campaign.searching.screening import Fitted, Screen
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
-Progress = Callable[[int, int], None]
 Candidates = Sequence[WristCandidate]
 Sessions = tuple[UnitSession, ...]
 
@@ -26,6 +26,9 @@ worth moving the point for."""
 
 LEADING = 0.3
 """Candidates that explain this share of what the best explains are fitted too."""
+
+MOST_FITTED = 6
+"""So many leaders are fitted with their own law, the base to first order."""
 
 CLOSE, MOST_REFITTED = 0.6, 2
 """So many candidates that gain nearly as much as the best are fitted with the whole base: what the
@@ -176,7 +179,7 @@ def _thinned(model: ErrorModel, reached: Reached) -> Reached:
     """Take out effects that do not pay any more beside the newest."""
     for name in list(reached.prices)[:-1]:
         lost = reached.screen(without=name).energy - reached.screen().energy
-        if name in reached.prices and lost < WORTH + reached.prices[name]:
+        if lost < WORTH + reached.prices[name]:
             less = _without(model, reached, name)
             reached = less if less.total < reached.total else reached
     return reached
