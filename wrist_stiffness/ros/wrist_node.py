@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -46,7 +47,7 @@ REPORT_EVERY_S = 1.0
 Numbers = TypeVar("Numbers")
 
 
-class WristNode(LifecycleNode):
+class WristNode(LifecycleNode, ABC):
     """A managed node around one stream of the core.
 
     Without a model it is active all the same and gives the safe output, so that a wrong file never
@@ -105,9 +106,9 @@ class WristNode(LifecycleNode):
             REPORT_EVERY_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
+    @abstractmethod
     def make_stream(self, settings: StreamSettings) -> Stream:
         """Return the node's stream, without a model."""
-        raise NotImplementedError
 
     def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
         """Check parameters and return the settings that they stand for (may raise InputError)."""
@@ -168,9 +169,9 @@ class WristNode(LifecycleNode):
             self.destroy_subscription(subscription)
         return super().on_deactivate(state)
 
+    @abstractmethod
     def make_inputs(self) -> list[Subscription]:
         """Return the node's subscriptions beside the load's, what is to be taken first first."""
-        raise NotImplementedError
 
     def hear(
         self, message_type: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile
