@@ -58,10 +58,6 @@ def _abstains(line: Line) -> bool:
     return not line["named"]
 
 
-def _at_the_floor(line: Line) -> bool:
-    return bool(line["after"] <= 1.1)
-
-
 def _both(line: Line) -> bool:
     return bool(line["found"] == 1.0)
 

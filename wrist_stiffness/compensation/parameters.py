@@ -282,39 +282,13 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
 
 
 def prediction_settings(values: Mapping[str, Any]) -> StreamSettings:
-    """Return the settings of the sample path of the predictor.
-
-    Parameters
-    ----------
-    values : mapping
-        Parameters of `COMMON` and `PREDICTION` by name.
-
-    Returns
-    -------
-    StreamSettings
-        In SI units.
-
-    Raises
-    ------
-    InputError
-        As `stream_settings`.
-    """
+    """Return the same of the predictor, from the parameters `COMMON` and `PREDICTION`."""
     noise = np.repeat([values["load_noise_N"], values["load_noise_Nm"]], 3)
     return replace(stream_settings(values), load_noise=noise if noise.any() else None)
 
 
 def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
-    """Return the settings of the sample path of a node that corrects.
-
-    Parameters
-    ----------
-    values : mapping
-        Parameters of `COMMON` and `CORRECTION` by name.
-
-    Returns
-    -------
-    StreamSettings
-        In SI units.
+    """Return the same of a node that corrects, from the parameters `COMMON` and `CORRECTION`.
 
     Raises
     ------

@@ -86,15 +86,12 @@ class Budget:
         Of the platform, own weight left out [m, rad].
     shares : (n, 8) float
         Part of the strain energy by component, in the order of `ELASTIC`; rows add up to 1.
-    touching : (n,) int
-        Flange sectors in contact.
     """
 
     theta: Array
     operative: NDArray[np.bool_]
     twist: Array
     shares: Array
-    touching: NDArray[np.intp]
 
 
 def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
@@ -133,5 +130,4 @@ def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
         operative=table.workspace.operative(theta),
         twist=response.twist,
         shares=energy / np.where(total > 0.0, total, 1.0),
-        touching=np.count_nonzero(response.active, axis=-1),
     )
