@@ -73,6 +73,8 @@ def test_kept_moments_tell_what_all_samples_tell(model, session, added, share):
     off = np.abs(column - full) / np.repeat(scale, 3)
     dwell = units.cut.dwell
     assert off[dwell].max() < share
-    # In motion only while the load changes: there it is a mean over some 50 ms.
+    # In motion only while the load changes: there it is a mean over some 50 ms.  Play jumps where
+    # the load passes zero: one moment of five on the other side is two fifths of its size.
     assert np.median(off[~dwell]) < 1e-3
-    assert np.quantile(off[~dwell], 0.99) < 0.05
+    most = 0.42 if added.law.id == "joint_clearance" else 0.05
+    assert np.quantile(off[~dwell], 0.99) < most

@@ -53,7 +53,9 @@ def test_a_unit_in_motion_is_half_a_second_of_regular_moments():
     # A stretch may begin between two moments of the grid.
     assert max(len(each) for each in times) in (round(UNIT_S / PATH_S), round(UNIT_S / PATH_S) + 1)
     assert all(np.ptp(each) < UNIT_S for each in times)
-    assert np.concatenate([np.diff(each) for each in times]) == pytest.approx(PATH_S, abs=0.011)
+    steps = np.concatenate([np.diff(each) for each in times])
+    assert steps.max() < PATH_S + 0.011
+    assert np.sum(steps < PATH_S - 0.011) <= 1
     assert sum(len(each) for each in times) == pytest.approx(2.0 / PATH_S, abs=5)
 
 
