@@ -29,7 +29,7 @@ from wrist_stiffness.simulation.seat import Seat
 from wrist_stiffness.simulation.wrist import TrueWrist
 
 QUIET = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
-# Creep and friction find their equilibrium to 10 pm; a history carries that on.
+# Creep and friction find their equilibrium to this [m, rad].
 HISTORY = 1e-10
 COLD = np.zeros(len(HEATED))
 
