@@ -89,6 +89,13 @@ def test_too_few_poses_are_refused_with_the_limit(tmp_path, campaign, table):
         read_session(campaign.written(tmp_path / "few"), table)
 
 
+def test_poses_without_stamps_of_their_own_are_said(tmp_path, campaign, table):
+    stamps = np.full(len(campaign.pose_ns), campaign.pose_ns[9])
+    campaign.with_joints().with_loads().with_poses(stamps=stamps)
+    with pytest.raises(InputError, match="1 of 1 .* 798 of 799 have the stamp of another one"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
 def test_just_enough_poses_are_read(tmp_path, campaign, table):
     campaign.with_joints().with_loads().with_poses(stamps=campaign.pose_ns[:LEAST_POSES])
     assert len(read_session(campaign.written(tmp_path / "bag"), table)) == LEAST_POSES

@@ -77,3 +77,23 @@ def test_a_transform_that_is_none_is_said(tmp_path, campaign, table):
     (remark,) = read_session(campaign.written(tmp_path / "bag"), table).remarks
     assert remark.startswith("/tf_static: static transform wrist_base -> ft:")
     assert remark.endswith("not used")
+
+
+def test_two_places_of_one_frame_are_said(tmp_path, tracked, table):
+    """As two publishers do; the same place told twice is no contradiction."""
+    start = tracked.joint_ns[0]
+    for place in (ORIGIN + 0.01, ORIGIN, ORIGIN + 1e-9):
+        step = placed("wrist_base", "tracker", place, TURN)
+        tracked.add("/tf_static", start, TFMessage((step,)))
+    session = read_session(tracked.written(tmp_path / "bag"), table)
+    np.testing.assert_allclose(session.shift, tracked.shift, atol=1e-8)
+    (remark,) = session.remarks
+    assert "'tracker' stands in two places" in remark
+
+
+def test_a_frame_that_is_missing_for_its_transform_is_none_says_so(tmp_path, tracked, table):
+    broken = placed("wrist_base", "tracker", [np.nan, 0.0, 0.0], TURN)
+    tracked.add("/tf_static", tracked.joint_ns[0], TFMessage((broken,)))
+    path = tracked.written(tmp_path / "bag")
+    with pytest.raises(FrameError, match="bag: .*'tracker'.*static transform wrist_base -> track"):
+        read_session(path, table)

@@ -156,6 +156,8 @@ def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
         ("component: joint_3\n", "component: joint_3\n  color: red\n", "unknown key color"),
         ("- effect: joint_clearance", "- 7\n- effect: joint_clearance", r"effects\[0\]: 7 is not"),
         ("component: link_2", "component: pose_sensor", "component 'pose_sensor' is not one of"),
+        ("id: sag", "id: sag@link_2", "effect 'sag@link_2': a name has letters"),
+        ("id: sag", "id: ''", "effect '': a name has letters"),
         ("[0, 0, 0, 1, 0, 0]", "[0, 0, 1]", "is not a list of 6 finite numbers"),
         ("[0, 0, 0, 1, 0, 0]", "[0, 0, 0, 0, 0, 0]", "is not six finite numbers, one not zero"),
         ("tanh(fz", "tang(fz", "column 12: unknown function tang"),
@@ -187,6 +189,7 @@ def test_bad_model_files_give_one_line(tmp_path, old, new, text):
         ("import does_not_exist", "cannot be run: No module"),
         ("def (", "cannot be run"),
         (OWN.replace('    check = "look"\n', ""), "Twist does not define check"),
+        (OWN.replace('id = "twist"', 'id = "twist@z"'), "effect 'twist@z': a name has letters"),
     ],
 )
 def test_bad_law_files_give_one_line(tmp_path, own, text):

@@ -10,7 +10,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula import FUNCTIONS, Formula
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Contribution, Law, require_id
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.places import LIMB
 from wrist_stiffness.model.situation import Situation
@@ -54,8 +54,8 @@ class FormulaLaw(Law):
     Raises
     ------
     InputError
-        If the component carries no screw, the direction is not six finite numbers or zero, a name
-        is no name or used twice, or the expression is not allowed.
+        If the id cannot be one, the component carries no screw, the direction is not six finite
+        numbers or zero, a name is no name or used twice, or the expression is not allowed.
     """
 
     stage = "reaction"
@@ -71,6 +71,7 @@ class FormulaLaw(Law):
         covariates: Sequence[str],
         keys: Sequence[str],
     ) -> None:
+        require_id(name)
         if place not in LIMB:
             raise InputError(f"{name}: component {place!r} is not one of {', '.join(LIMB)}")
         if direction.shape != (6,) or not np.isfinite(direction).all() or not direction.any():

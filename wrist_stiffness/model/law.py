@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
@@ -122,4 +124,16 @@ class Law(ABC):
         return 1.0
 
 
-__all__ = ["NOTHING", "STAGES", "Contribution", "Law", "MissingSignalError", "Stage"]
+def require_id(name: str) -> None:
+    """Refuse an id that cannot stand in NAME@COMPONENT, as arguments and reports have it.
+
+    Raises
+    ------
+    InputError
+        If it holds anything but letters, digits, '_', '-' and '.'.
+    """
+    if not re.fullmatch(r"[\w.-]+", name):
+        raise InputError(f"effect {name!r}: a name has letters, digits, '_', '-' and '.' only")
+
+
+__all__ = ["NOTHING", "STAGES", "Contribution", "Law", "MissingSignalError", "Stage", "require_id"]

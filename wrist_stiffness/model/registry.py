@@ -10,7 +10,7 @@ from pkgutil import iter_modules
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model import effects
-from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.law import Law, require_id
 
 ENTRY_POINTS = "wrist_stiffness.effects"
 """Group in which another package offers its own `Law` classes."""
@@ -74,7 +74,7 @@ def law_of(found: object, place: str) -> Law:
     Raises
     ------
     InputError
-        If it is no complete law.
+        If it is no complete law, or its id cannot be one.
     """
     if not (inspect.isclass(found) and issubclass(found, Law)):
         raise InputError(f"{place}: {found!r} is not a class derived from Law")
@@ -84,7 +84,9 @@ def law_of(found: object, place: str) -> Law:
     wanted = ("id", "stage", "places", "sentence", "check", "excited_by")
     if missing := ", ".join(name for name in wanted if not hasattr(found, name)):
         raise InputError(f"{place}: {found.__name__} does not define {missing}")
-    return found()
+    law = found()
+    require_id(law.id)
+    return law
 
 
 def law_from_file(reference: str, folder: Path) -> Law:

@@ -245,4 +245,9 @@ def _in_time_order(
     order = last_of_equal(time_ns)
     if lost:
         remarks.append(f"{what}: {lost} of {len(time_ns)} lost by the instrument")
+    if len(order) < len(time_ns):
+        remarks.append(
+            f"{what}: {len(time_ns) - len(order)} of {len(time_ns)} have the stamp of another one: "
+            "of each only the last is used"
+        )
     return PoseTrack(time_ns[order], shift[order], rotation[order], covariance, tuple(remarks))

@@ -33,7 +33,7 @@ from wrist_stiffness.campaign.table_range import beyond_range
 from wrist_stiffness.compensation.intake import BASE_FRAME, Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.errors import InputError, RecordingError
+from wrist_stiffness.errors import FrameError, InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording import open_recording, read_samples
@@ -139,8 +139,9 @@ def read_session(
         markers = table.geometry.platform.readout_points
         track = pose_track(samples, markers, known)
         session = _session(recording.path.name, machine, track, table, load_age_limit_s)
-    except (InputError, RecordingError) as error:
-        raise type(error)(f"{recording.path}: {error}") from error
+    except (FrameError, InputError, RecordingError) as error:
+        hints = unusable if isinstance(error, FrameError) else []
+        raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
     damage = [f"the recording is damaged: {recording.damage}"] if recording.damage else []
     faults = [str(fault) for fault in samples.faults]
     other = _another_geometry(notes, table)
