@@ -156,7 +156,8 @@ def extend(
     sessions : sequence of MeasuredSession
         In the order of time.
     progress : callable
-        Told steps done and steps at most of each of three fits.
+        Told steps done and steps at most of each fit in turn: three, and one more for each time
+        that the effect's prior is made wider.
 
     Returns
     -------
