@@ -8,7 +8,6 @@ from wrist_stiffness.mechanism.vectors import (
     cross,
     dot,
     skew,
-    translate_wrench,
     triad,
     unit,
 )
@@ -44,10 +43,3 @@ def test_angles_near_0_and_pi_keep_their_digits(small):
     assert angle_between(u, v) == pytest.approx(small, rel=1e-12)
     # Near pi the double itself has a step of 4e-16.
     assert np.pi - angle_between(u, -v) == pytest.approx(small, abs=1e-15)
-
-
-def test_a_force_off_centre_has_a_moment():
-    force_along_x = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.5])
-    at_o = translate_wrench(force_along_x, np.array([0.0, 0.03, 0.0]))
-    assert np.allclose(at_o, [2.0, 0.0, 0.0, 0.0, 0.0, 0.5 - 0.06], atol=ROUNDING)
-    assert np.array_equal(force_along_x, [2.0, 0.0, 0.0, 0.0, 0.0, 0.5])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
-from wrist_stiffness.mechanism.vectors import block_diagonal, translate_wrench
+from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Block
 
 POSE = (20.0, -10.0)
@@ -38,9 +38,7 @@ def test_load_beside_its_point(model, make):
     arms = {"base": np.array([0.0, 3e-3, 0.0]), "platform": turn @ [0.0, 3e-3, 0.0]}
     for where, arm in arms.items():
         effect = make.effect("load_point@load_sensor", **{f"{where}_y_mm": 3.0})
-        true = TRUE + translate_wrench(np.array([*TRUE[:3], 0.0, 0.0, 0.0]), arm) - [
-            *TRUE[:3], 0.0, 0.0, 0.0,
-        ]  # fmt: skip
+        true = TRUE + np.append(np.zeros(3), np.cross(arm, TRUE[:3]))
         assert same(model, effect, make.rest(POSE, TRUE), make.rest(POSE, true))
 
 

@@ -55,12 +55,3 @@ def block_diagonal(rotation: Array) -> Array:
     out[..., :3, :3] = rotation
     out[..., 3:, 3:] = rotation
     return out
-
-
-def translate_wrench(wrench: Array, point: Array) -> Array:
-    """Return at O a wrench (..., 6) given at `point` (..., 3): its moment plus point x force."""
-    out = np.array(
-        np.broadcast_to(wrench, (*np.broadcast_shapes(wrench.shape[:-1], point.shape[:-1]), 6))
-    )
-    out[..., 3:] += cross(np.asarray(point), out[..., :3])
-    return out
