@@ -255,3 +255,19 @@ def test_an_effect_where_it_cannot_be_names_the_places(effect, named, tmp_path, 
 
 def test_a_secret_is_told_and_not_recorded(refused):
     assert "leave out -o" in refused("simulate", "--reveal", "3", "-o", "riddle")
+
+
+@pytest.mark.parametrize("option", ["--json", "--report"])
+def test_a_result_replaces_no_recording_and_no_model(option, refused, tmp_path):
+    """As where --json is taken for a switch: the recording behind it would be gone."""
+    for content in (b"\x89MCAP0\r\n", b"schema: 1\nname: wrist_7\n"):
+        path = tmp_path / "monday"
+        path.write_bytes(content)
+        assert "it is not replaced" in refused("compare", option, str(path), "tuesday.mcap")
+        assert path.read_bytes() == content
+
+
+def test_an_earlier_result_is_replaced(tmp_path):
+    path = tmp_path / "pose.json"
+    for _ in range(2):
+        assert main(["predict", "--angles", "0", "0", "--json", str(path)]) == 0

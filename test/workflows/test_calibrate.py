@@ -70,6 +70,15 @@ def test_the_output_folder_is_looked_for_before_the_work(tmp_path, capsys):
     assert "there is no folder" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("output", "why"), [("", "it is a folder"), ("monday.mcap", "a model is no recording")]
+)
+def test_what_is_no_place_for_a_model_is_told_before_the_work(tmp_path, capsys, output, why):
+    fit = ["--fit", str(tmp_path / "monday.mcap")]
+    assert main(["calibrate", *fit, "-o", str(tmp_path / output), "--overwrite"]) == 2
+    assert why in capsys.readouterr().err
+
+
 def test_a_recording_that_is_not_there_is_one_line(tmp_path, capsys):
     arguments = ["--fit", str(tmp_path / "x.mcap"), "-o", str(tmp_path / "m.yaml")]
     assert main(["calibrate", *arguments]) == 2

@@ -59,6 +59,10 @@ EXTRA_OF = {
 """The extra that installs a library which a robot does without."""
 
 
+RESULTS = {"report": b"<", "json": b"{["}
+"""Options that name a file to write a result to, and how such a file begins."""
+
+
 class CommandModule(Protocol):
     """What a module of this folder offers to become a command.
 
@@ -136,8 +140,8 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     """
     arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
     try:
-        for option in ("report", "json"):
-            _require_place(getattr(arguments, option, None))
+        for option, begins in RESULTS.items():
+            _require_place(getattr(arguments, option, None), option, begins)
         with cleaned_up_on_sigterm():
             code: int = arguments.run(arguments)
         if sys.stdout is not None:  # None where the caller closed it
@@ -164,14 +168,25 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     return code
 
 
-def _require_place(path: str | None) -> None:
-    """Refuse a result's file that cannot be written, before minutes of work for it."""
+def _require_place(path: str | None, option: str, begins: bytes) -> None:
+    """Refuse a result's file that cannot be written or is something else, before the work for it.
+
+    `compare --json monday.mcap tuesday.mcap` would put its result in the place of a recording.
+    """
     if path is None:
         return
     if Path(path).is_dir():
         raise InputError(f"{path}: cannot be written: it is a folder")
     if not Path(path).absolute().parent.is_dir():
         raise InputError(f"{path}: folder {Path(path).parent} does not exist")
+    if Path(path).is_file():
+        try:
+            with open(path, "rb") as old:
+                first = old.read(1)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be replaced: {error.strerror}") from error
+        if first and first not in begins:
+            raise InputError(f"{path} is no earlier result of --{option}: it is not replaced")
 
 
 def _refuse(reason: str) -> int:

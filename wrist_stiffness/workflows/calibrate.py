@@ -160,9 +160,13 @@ def writable(output: str | Path) -> Path:
     Raises
     ------
     InputError
-        If its folder does not exist.
+        If its folder does not exist, it is a folder, or its name is that of a recording.
     """
     output = Path(output)
     if not output.parent.is_dir():
         raise InputError(f"{output}: there is no folder {output.parent}")
+    if output.is_dir():
+        raise InputError(f"{output}: cannot be written: it is a folder")
+    if output.suffix == ".mcap":
+        raise InputError(f"{output}: a model is no recording; choose another name")
     return output
