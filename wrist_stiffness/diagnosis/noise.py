@@ -10,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from wrist_stiffness.diagnosis.colour import find_colour
-from wrist_stiffness.diagnosis.observations import Array, Mask, Observations
-from wrist_stiffness.diagnosis.projection import leading_directions, orthonormal
+from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.projection import ABSORBED, leading_directions, orthonormal
+from wrist_stiffness.diagnosis.shared import apart, own_covariance
 from wrist_stiffness.diagnosis.whitening import (
     NoiseModel,
     component_factors,
@@ -105,9 +106,26 @@ def share_inside_groups(
     return expected / freedom if freedom and expected > 0 else 1.0
 
 
-def rich_basis(columns: Array, n_measured: int) -> Array:
-    """Orthonormal basis of everything that could be structure, leading directions first."""
-    return leading_directions(columns, int(RICH_SHARE * n_measured))
+def rich_basis(base: Array, structure: Array, n_measured: int) -> Array:
+    """Orthonormal basis of everything that could be structure, leading directions first.
+
+    All of the base is in it: registrations and tolerances are far above the scatter, so that what
+    a rough basis leaves of them would pass for it.
+
+    Parameters
+    ----------
+    base : (N, p) array
+        Weighted nuisance columns.
+    structure : (N, q) array
+        Weighted columns of all candidates.
+    n_measured : int
+        Measured numbers.
+    """
+    first = orthonormal(base)
+    beyond = structure - first @ (first.T @ structure)
+    seen = np.linalg.norm(beyond, axis=0) > ABSORBED * np.linalg.norm(structure, axis=0)
+    most = max(int(RICH_SHARE * n_measured) - first.shape[1], 0)
+    return np.hstack([first, leading_directions(beyond[:, seen], most)])
 
 
 def estimate_noise(observations: Observations, base: Array, structure: Array) -> NoiseModel:
@@ -131,7 +149,7 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
         repeated = repeated * freedom / (freedom - 2)
         known, dof = _stated_of_replicates(observations), freedom * measured.shape[1]
         noise = NoiseModel(np.diag(np.maximum(repeated - known, 0.0)), 0.0, 1.0, dof, "replicates")
-        noise = _coloured(noise, values, columns, observations)
+        noise = _coloured(noise, base, structure, observations)
         visible = share_inside_groups(observations, noise.colour_share, noise.colour_time)
         if noise.all_wanders:
             return replace(noise, beyond=np.diag(np.maximum(repeated / visible - known, 0.0)))
@@ -142,16 +160,18 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
         count = np.maximum(measured.sum(axis=0), 1)
         variance = np.sum(values**2, axis=0) / count
         stated = stated + np.diag(np.where(variance > 0, variance, 1.0))
-    basis, left = _rich(values, columns, stated, measured)
+    basis, left = _rich(base, structure, observations, stated)
     loss = 1 - basis.shape[2] / measured.sum()
     coupled = residual_covariance(np.where(measured, left, np.nan), loss)
     dof = float(measured.sum() * loss)
     if told:
-        noise = NoiseModel(_wander_beside(np.diag(coupled), stated), 0.0, 1.0, dof, "given")
+        excess = _pooled(np.diag(coupled), observations)
+        beyond = _wander_beside(excess, own_covariance(observations, stated))
+        noise = NoiseModel(beyond, 0.0, 1.0, dof, "given")
     else:
         size = np.sqrt(stated[0])
         noise = NoiseModel(size @ coupled @ size, 0.0, 1.0, dof, "residual")
-    return _coloured(noise, values, columns, observations)
+    return _coloured(noise, base, structure, observations)
 
 
 def _stated_of_replicates(observations: Observations) -> Array:
@@ -181,7 +201,9 @@ def _wander_beside(excess: Array, stated: Array) -> Array:
     return np.diag(np.minimum(beside, (MOST_BEYOND_STATED - 1.0) * own.max(axis=0)))
 
 
-def _rich(values: Array, columns: Array, covariance: Array, measured: Mask) -> tuple[Array, Array]:
+def _rich(
+    base: Array, structure: Array, observations: Observations, covariance: Array
+) -> tuple[Array, Array]:
     """Fit everything that could be structure.
 
     Returns
@@ -191,21 +213,26 @@ def _rich(values: Array, columns: Array, covariance: Array, measured: Mask) -> t
     (n, m) array
         What they leave of the weighted values.
     """
-    factor = component_factors(covariance, measured)
-    flat = (factor @ columns).reshape(measured.size, -1)
-    target = (factor @ values[:, :, None]).reshape(-1)
-    basis = rich_basis(flat, int(measured.sum()))
+    measured = observations.measured
+    factors = component_factors(own_covariance(observations, covariance), measured)
+
+    def weighted(columns: Array) -> Array:
+        filled = np.where(measured[:, :, None], columns, 0.0)
+        return apart(observations, factors, filled).reshape(measured.size, -1)
+
+    basis = rich_basis(weighted(base), weighted(structure), int(measured.sum()))
+    target = weighted(observations.values[:, :, None])[:, 0]
     left = target - basis @ (basis.T @ target)
     return basis.reshape(*measured.shape, -1), left.reshape(measured.shape)
 
 
 def _coloured(
-    noise: NoiseModel, values: Array, columns: Array, observations: Observations
+    noise: NoiseModel, base: Array, structure: Array, observations: Observations
 ) -> NoiseModel:
     """Find how much of the scatter wanders slowly, and how slowly."""
     stated = stated_covariance(observations)
     covariance = stated + np.diag(np.diag(noise.beyond))
-    basis, left = _rich(values, columns, covariance, observations.measured)
+    basis, left = _rich(base, structure, observations, covariance)
     reduced = np.concatenate([basis, left[:, :, None]], axis=2)
     best, most = noise, 0.0
     for all_wanders in (True, False):
@@ -214,6 +241,19 @@ def _coloured(
         if gain > most:
             best, most = replace(trial, colour_share=share, colour_time=time), gain
     return best
+
+
+def _pooled(variance: Array, observations: Observations) -> Array:
+    """Mean variance over the components of each quantity: what was stated differs, its error less.
+
+    The largest of several uncertain ones would always look like more than was stated.
+    """
+    count, pooled = observations.measured.sum(axis=0), variance.copy()
+    for quantity in observations.reported:
+        own = list(quantity.components)
+        if count[own].any():
+            pooled[own] = np.average(variance[own], weights=count[own])
+    return pooled
 
 
 def residual_covariance(left: Array, loss: float) -> Array:

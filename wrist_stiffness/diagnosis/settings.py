@@ -39,7 +39,7 @@ class Settings:
     """
 
     alpha: float = 0.005
-    law_accuracy: float = 0.05
+    law_accuracy: float = 0.1
     unexplained_share: float = 0.10
     sealed_share: float = 0.2
     blocks: int = 10

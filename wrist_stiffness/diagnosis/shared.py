@@ -3,9 +3,6 @@
 A rest, a change of the load and the next rest have the same hidden angles: their differences know
 nothing of them, and their mean is no better than one of them.  Taken for independent, the hidden
 counts would both drown what a load does and make the mean look too good.
-
-A fit that whitens its table with `apart` knows that.  `diagnose` does not: it takes units for
-independent, so it is cautious about what changes at rest and a little bold about means of rests.
 """
 
 import numpy as np

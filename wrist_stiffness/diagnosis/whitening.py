@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.diagnosis.observations import Array, Labels, Mask, Observations
+from wrist_stiffness.diagnosis.shared import apart, own_covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class NoiseModel:
     scale: float = 1.0
 
     def factors(self, observations: Observations) -> Array:
-        """Inverse factors that bring each unit's components to unit scatter, (n, m, m)."""
+        """Inverse factors that bring each unit by itself to unit scatter, (n, m, m)."""
         covariance = self.scale * (stated_covariance(observations) + self.beyond)
         return component_factors(covariance, observations.measured)
 
@@ -70,7 +71,9 @@ class NoiseModel:
         """
         measured = observations.measured
         filled = np.where(measured[:, :, None], columns, 0.0)
-        weighted = self.factors(observations) @ filled
+        own = own_covariance(observations, stated_covariance(observations)) + self.beyond
+        weighted = apart(observations, component_factors(own, measured), filled)
+        weighted /= np.sqrt(self.scale)
         white = self._filter(observations, weighted, measured, self.wandering(observations))
         return white.reshape(measured.size, columns.shape[2])
 
