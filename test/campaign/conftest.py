@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.model.block import Block
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import (
     Float64,
@@ -25,6 +27,8 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.cell import SENSED, VirtualCell
+from wrist_stiffness.simulation.instrument import instrument
 
 START_NS = 1_700_000_000_000_000_000
 MILLISECOND = 1_000_000
@@ -121,6 +125,27 @@ class Campaign:
 @pytest.fixture(scope="session")
 def table():
     return load_table(shipped_file("precomputed/palmieri2015.npz"))
+
+
+@pytest.fixture(scope="session")
+def in_the_cell():
+    """Return a function of a table, settings and a seed: one run of the virtual cell's program."""
+
+    def session(table, settings, seed, **more):
+        cell = VirtualCell(table, settings, np.random.default_rng(seed))
+        time = np.arange(round(settings.rate_hz * settings.program_seconds)) / settings.rate_hz
+        sample = cell.run(time, cell.desired(time))
+        warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
+        return MeasuredSession(
+            "a session",
+            Block(time, sample.encoder, sample.wrench, temperatures=warm),
+            sample.measured_shift,
+            sample.measured_rotation,
+            np.diag(instrument(settings.instrument).sigma ** 2),
+            **more,
+        )
+
+    return session
 
 
 @pytest.fixture

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base, free_base
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
-from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
-from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.cell import CellSettings
 
 
 @pytest.fixture(scope="module")
@@ -19,29 +16,13 @@ def model():
     return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
-def measured(model, base_seed, seconds):
-    settings = CellSettings(
-        rate_hz=10.0,
-        program_seconds=seconds,
-        program_seed=101,
-        experiment="rich",
-        instrument="interferometer",
-        base="wrong",
-        base_seed=base_seed,
-    )
-    cell = VirtualCell(model.table, settings, np.random.default_rng(1))
-    time = np.arange(round(10.0 * seconds)) / 10.0
-    sample = cell.run(time, cell.desired(time))
-    warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
-    block = Block(time, sample.encoder, sample.wrench, temperatures=warm)
-    white = np.diag(instrument("interferometer").sigma ** 2)
-    return MeasuredSession("a day", block, sample.measured_shift, sample.measured_rotation, white)
-
-
 @pytest.mark.slow
-def test_no_wrong_flange_catches_the_fit(model):
+def test_no_wrong_flange_catches_the_fit(model, in_the_cell):
     """This base closed a flange that is open when its data were believed at once."""
-    units = as_units(model, measured(model, 1029, 120.0))
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=120.0, program_seed=101, base="wrong", base_seed=1029
+    )
+    units = as_units(model, in_the_cell(model.table, settings, 1))
     found = fit_base(model, (units,))
     assert found.cost < 1.3 * 6 * units.measured.sum()
     assert np.abs(found.z * found.problem.weights).max() < 4.0

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.base import base_laws
-from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
 
 SECONDS, RATE_HZ = 60.0, 10.0
@@ -24,21 +21,12 @@ parts of one wrist are told by the same data.  Over twelve seeds it was 0.78."""
 FARTHEST = 4.0
 
 
-def errors_over_sigma(model, seed):
+def errors_over_sigma(in_the_cell, model, seed):
     """Return (estimate - truth) / sigma of the flexibility of every part of one wrong wrist."""
     settings = CellSettings(
         rate_hz=RATE_HZ, program_seconds=SECONDS, program_seed=seed, base="wrong", base_seed=seed
     )
-    cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
-    time = np.arange(round(RATE_HZ * SECONDS)) / RATE_HZ
-    sample = cell.run(time, cell.desired(time))
-    session = MeasuredSession(
-        f"wrist {seed}",
-        Block(time, sample.encoder, sample.wrench),
-        sample.measured_shift,
-        sample.measured_rotation,
-        np.diag(instrument(settings.instrument).sigma ** 2),
-    )
+    session = in_the_cell(model.table, settings, seed)
     found = {
         each.effect.partition("@")[2]: each
         for each in calibrate(model, [session]).parameters
@@ -53,9 +41,9 @@ def errors_over_sigma(model, seed):
 
 
 @pytest.mark.slow
-def test_errors_of_stiffness_are_as_large_as_their_uncertainties():
+def test_errors_of_stiffness_are_as_large_as_their_uncertainties(in_the_cell):
     model = load_model(shipped_file("config/palmieri2015_model.yaml"))
-    errors = np.array([errors_over_sigma(model, seed) for seed in SEEDS])
+    errors = np.array([errors_over_sigma(in_the_cell, model, seed) for seed in SEEDS])
     assert errors.shape == (len(SEEDS), 8)
     assert LEAST_RMS < np.sqrt(np.mean(errors**2)) < MOST_RMS
     assert np.abs(errors).max() < FARTHEST

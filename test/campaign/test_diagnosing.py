@@ -6,17 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
-from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.cell import CellSettings
 
 QUICK = Settings(permutations=299)
 RECORDINGS = Path(__file__).parents[1] / "data"
@@ -28,7 +25,7 @@ def model():
     return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
-def measured(model, hidden=(), base="wrong", seed=3):
+def measured(in_the_cell, model, hidden=(), base="wrong", seed=3):
     """One session of a wrist with a wrong base, ten measurements a second."""
     settings = CellSettings(
         rate_hz=10.0,
@@ -38,15 +35,7 @@ def measured(model, hidden=(), base="wrong", seed=3):
         base=base,
         base_seed=seed,
     )
-    cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
-    time = np.arange(round(10.0 * SECONDS)) / 10.0
-    sample = cell.run(time, cell.desired(time))
-    warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
-    block = Block(time, sample.encoder, sample.wrench, temperatures=warm)
-    scatter = np.diag(instrument("interferometer").sigma ** 2)
-    return MeasuredSession(
-        "a session", block, sample.measured_shift, sample.measured_rotation, scatter
-    )
+    return in_the_cell(model.table, settings, seed)
 
 
 def answer(model, session, seed=0):
@@ -54,8 +43,8 @@ def answer(model, session, seed=0):
 
 
 @pytest.mark.slow
-def test_a_wrong_base_alone_is_no_missing_effect(model):
-    found = answer(model, measured(model))
+def test_a_wrong_base_alone_is_no_missing_effect(model, in_the_cell):
+    found = answer(model, measured(in_the_cell, model))
     assert found.diagnosis.verdict == "none"
     assert found.effects == ()
     # The millimetre and the fifth of a degree of the registrations are told instead.
@@ -65,9 +54,11 @@ def test_a_wrong_base_alone_is_no_missing_effect(model):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("blank", ["nothing", "position"])
-def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, blank):
+def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, in_the_cell, blank):
     width = 1e-3
-    session = measured(model, (HiddenEffect("backlash", "motor_1", "single", width, 5),))
+    session = measured(
+        in_the_cell, model, (HiddenEffect("backlash", "motor_1", "single", width, 5),)
+    )
     if blank == "position":
         session = replace(session, shift=np.full_like(session.shift, np.nan))
     found = answer(model, session)

@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.extend import extend
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.makers import Draw
 
 SECONDS, REACH_S = 60.0, 300.0
@@ -26,22 +23,12 @@ DRIFT = HiddenEffect("drift", "pose_sensor", "linear", 2e-5, 101)
 
 
 @pytest.fixture(scope="module")
-def extension():
+def extension(in_the_cell):
     model = load_model(shipped_file("config/palmieri2015_model.yaml"))
     settings = CellSettings(
         rate_hz=10.0, program_seconds=SECONDS, program_seed=101, hidden=(DRIFT,)
     )
-    cell = VirtualCell(model.table, settings, np.random.default_rng(5))
-    time = np.arange(round(10 * SECONDS)) / 10.0
-    sample = cell.run(time, cell.desired(time))
-    session = MeasuredSession(
-        "drifting",
-        Block(time, sample.encoder, sample.wrench),
-        sample.measured_shift,
-        sample.measured_rotation,
-        np.diag(instrument("interferometer").sigma ** 2),
-        notes={"calibrated": COMMISSIONED},
-    )
+    session = in_the_cell(model.table, settings, 5, notes={"calibrated": COMMISSIONED})
     return extend(model, Effect(find_law("drift"), "pose_sensor"), [session])
 
 

@@ -5,20 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.refit import blanked, refit, sized, unseen, withdrawn
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
-from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.cell import CellSettings
 
 SHARE = 0.25
 WIDTH_RAD = 2e-3
@@ -29,7 +26,7 @@ def model():
     return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
-def measured(model, *hidden, session=0):
+def measured(in_the_cell, model, *hidden, session=0):
     """Forty seconds of a wrist as it was built, registered anew in each session."""
     settings = CellSettings(
         rate_hz=10.0,
@@ -40,22 +37,12 @@ def measured(model, *hidden, session=0):
         base_seed=3,
         session=session,
     )
-    cell = VirtualCell(model.table, settings, np.random.default_rng(session))
-    time = np.arange(400) / 10.0
-    sample = cell.run(time, cell.desired(time))
-    warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
-    return MeasuredSession(
-        f"session {session}",
-        Block(time, sample.encoder, sample.wrench, temperatures=warm),
-        sample.measured_shift,
-        sample.measured_rotation,
-        np.diag(instrument("interferometer").sigma ** 2),
-    )
+    return replace(in_the_cell(model.table, settings, session), name=f"session {session}")
 
 
 @pytest.fixture(scope="module")
-def lost_motion(model):
-    return measured(model, HiddenEffect("backlash", "motor_1", "single", WIDTH_RAD, 5))
+def lost_motion(model, in_the_cell):
+    return measured(in_the_cell, model, HiddenEffect("backlash", "motor_1", "single", WIDTH_RAD, 5))
 
 
 def backlash(width_mdeg):
@@ -76,9 +63,9 @@ def test_a_named_effect_gets_the_value_of_its_own_law(model, lost_motion):
     assert fitted.cost < 0.5 * base.cost
 
 
-def test_an_effect_that_fails_on_unseen_units_is_withdrawn(model, lost_motion):
+def test_an_effect_that_fails_on_unseen_units_is_withdrawn(model, in_the_cell, lost_motion):
     # The backlash was mended before the last ten seconds: what was learnt makes these worse.
-    mended, late = measured(model), np.arange(400) >= 300
+    mended, late = measured(in_the_cell, model), np.arange(400) >= 300
     both = replace(
         lost_motion,
         shift=np.where(late[:, None], mended.shift, lost_motion.shift),
@@ -90,8 +77,9 @@ def test_an_effect_that_fails_on_unseen_units_is_withdrawn(model, lost_motion):
 
 
 @pytest.mark.slow
-def test_a_session_put_aside_is_registered_anew_and_nothing_else(model, lost_motion):
-    sessions = (as_units(model, lost_motion), as_units(model, measured(model, session=1)))
+def test_a_session_put_aside_is_registered_anew_and_nothing_else(model, in_the_cell, lost_motion):
+    days = (lost_motion, measured(in_the_cell, model, session=1))
+    sessions = tuple(as_units(model, day) for day in days)
     fitted = fit_base(model, sessions, [backlash(1e3 * np.degrees(WIDTH_RAD))])
     aside = fitted.problem.table.sessions == 1
     seen = blanked(sessions, aside)

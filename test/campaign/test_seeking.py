@@ -4,20 +4,17 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.recipes import effect_at
-from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching import seeking
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.seeking import Reached, point_of
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
-from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.simulation.cell import CellSettings
 
 SECONDS = 40.0
 WIDTH = 1e-3
@@ -36,23 +33,12 @@ def model():
 
 
 @pytest.fixture(scope="module")
-def units(model):
+def units(model, in_the_cell):
     """Forty seconds of a wrist with play in one motor's gear, and late stamps of the other."""
     settings = CellSettings(
         rate_hz=10.0, program_seconds=SECONDS, program_seed=41, hidden=HIDDEN, base="exact"
     )
-    cell = VirtualCell(model.table, settings, np.random.default_rng(3))
-    time = np.arange(round(10.0 * SECONDS)) / 10.0
-    sample = cell.run(time, cell.desired(time))
-    warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
-    session = MeasuredSession(
-        "a session",
-        Block(time, sample.encoder, sample.wrench, temperatures=warm),
-        sample.measured_shift,
-        sample.measured_rotation,
-        np.diag(instrument("interferometer").sigma ** 2),
-    )
-    return (as_units(model, session),)
+    return (as_units(model, in_the_cell(model.table, settings, 3)),)
 
 
 @pytest.fixture(scope="module")
