@@ -71,8 +71,7 @@ class Observations:
     row : (n,) array of int, optional
         Number of each unit in the table that it was taken from; by default this one.
     stand : (n,) array of int, optional
-        Units with the same label >= 0 share a part of their scatter; for fits (`shared.apart`),
-        `diagnose` takes all units for independent.
+        Units with the same label >= 0 share a part of their scatter.
     shared : (n, m, s) array, optional
         That part: what each of s standard normal numbers does to a unit; `covariance` holds it.
     """
