@@ -271,3 +271,11 @@ def test_an_earlier_result_is_replaced(tmp_path):
     path = tmp_path / "pose.json"
     for _ in range(2):
         assert main(["predict", "--angles", "0", "0", "--json", str(path)]) == 0
+
+
+@pytest.mark.parametrize(("seed", "lines"), [("8", 2), ("3", 1)])
+def test_what_every_session_sets_up_anew_is_nothing_to_find(seed, lines, capsys):
+    assert main(["simulate", "--reveal", seed, "--seconds", "20"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert len(told) == lines
+    assert "nothing is missing" in told[-1] or lines == 1

@@ -148,6 +148,7 @@ def _run(arguments: argparse.Namespace) -> int:
 def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
     from dataclasses import asdict
 
+    from wrist_stiffness.campaign.fitting.free_effects import SET_UP
     from wrist_stiffness.simulation.blind import draw
     from wrist_stiffness.simulation.catalogue import ALL
     from wrist_stiffness.workflows.json_file import write_json
@@ -160,4 +161,6 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
         f"{hidden.effect}@{hidden.component} ({hidden.form}): {hidden.magnitude:.4g} "
         f"{ALL[hidden.effect].unit}, size {secret.size:.3g} times the noise of one sample"
     )
+    if hidden.effect in {law for law, _ in SET_UP}:
+        print("every session sets this up anew: the right diagnosis is that nothing is missing")
     return EXIT_DONE
