@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.comparing.compare import compare_models
+from wrist_stiffness.campaign.comparing.wiring import _share
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -101,9 +102,25 @@ def test_a_unit_that_makes_all_numbers_small_is_no_mistake(model):
     assert found.mistake == ""
 
 
-def test_what_explains_a_little_is_not_told(model):
-    """Beside a large error of a gear the frame of the load hardly matters."""
+def test_a_mistake_is_told_beside_a_fault_that_it_does_not_touch(model):
+    """A gear makes most of phi; the load's sign is seen in s."""
     wave = Effect(find_law("encoder_eccentricity"), "motor_1").with_values({"cos_2_mdeg": 300.0})
-    measured = session(model, (wave,), on_platform=True)
+    measured = session(model, (wave,))
+    assert told(model, measured) == ""
+    block = replace(measured.block, load=-measured.block.load)
+    assert "with the load's sign turned" in told(model, replace(measured, block=block))
+
+
+def test_what_lowers_s_and_raises_phi_is_no_mistake():
+    before = {"s_um": 12.0, "phi_mdeg": 8.0}
+    assert _share(before, {"s_um": 1.0, "phi_mdeg": 8.1}) == pytest.approx(1 / 12)
+    assert _share(before, {"s_um": 1.0, "phi_mdeg": 9.0}) == 1.0
+
+
+def test_what_explains_a_little_is_not_told(model):
+    """Beside large errors of a gear and of a drift the frame of the load hardly matters."""
+    wave = Effect(find_law("encoder_eccentricity"), "motor_1").with_values({"cos_2_mdeg": 300.0})
+    drift = Effect(find_law("drift"), "pose_sensor").with_values({"shift_x_um_per_h": 900.0})
+    measured = session(model, (wave, drift), on_platform=True)
     block = replace(measured.block, load_on_platform=False)
     assert told(model, replace(measured, block=block)) == ""

@@ -16,7 +16,6 @@ from wrist_stiffness.campaign.comparing.comparison import sizes
 from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
 from wrist_stiffness.campaign.observing import UnitSession, predict_units, tabulate
 from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -24,7 +23,10 @@ WORTH_ASKING = 2.0
 """Error over the noise floor from which a mistake is looked for."""
 
 CLEAR = 0.5
-"""A mistake is told if the error without it is less than this share."""
+"""A mistake is told if s or phi without it is less than this share of what it is with it."""
+
+GROWN = 1.05
+"""A mistake is none if s or phi without it is more than that times as large."""
 
 
 @dataclass(frozen=True)
@@ -108,30 +110,43 @@ def told_mistake(
         Noise floor by the key of the quantity.
     """
     before = {key: size.rms for key, size in sizes(left).items()}
-    if _over(before, floor, 1.0) < WORTH_ASKING:
+    over = _over(before, floor)
+    if max(over.values(), default=0.0) < WORTH_ASKING:
         return ""
-    best = (CLEAR * _over(before, floor, 1.0), "")
+    best = (CLEAR, "")
     for mistake in MISTAKES:
         after = _without(mistake, model, sessions, calibrated)
-        if after and (size := _over(after, floor, mistake.shift_factor)) < best[0]:
+        share = _share(over, _over(after, floor, mistake.shift_factor))
+        if share < best[0]:
             fall = " and ".join(
                 f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
                 for q in left.reported
             )
             best = (
-                size,
+                share,
                 f"Look at the set-up first: with {mistake.without} the error falls {fall}; "
                 f"{mistake.check}",
             )
     return best[1]
 
 
-def _over(rms: dict[str, float], floor: dict[str, float], shift_factor: float) -> float:
-    """Return the error over its floor, all quantities together."""
+def _over(
+    rms: dict[str, float], floor: dict[str, float], shift_factor: float = 1.0
+) -> dict[str, float]:
+    """Return the errors over their floors."""
     # A smaller unit makes noise and error smaller alike.
     scale = {"s_um": shift_factor}
-    ratio: Array = np.array([rms[k] / (floor[k] * scale.get(k, 1.0)) for k in rms if floor[k] > 0])
-    return float(np.sqrt(np.mean(ratio**2))) if len(ratio) else 0.0
+    return {k: rms[k] / (floor[k] * scale.get(k, 1.0)) for k in rms if floor[k] > 0.0}
+
+
+def _share(before: dict[str, float], after: dict[str, float]) -> float:
+    """Return what is left of s or of phi, whichever falls more; 1 where the other grows.
+
+    One of them is enough: backlash makes a phi that no sign of the load changes.
+    """
+    if any(after[k] > max(GROWN * before[k], WORTH_ASKING) for k in after):
+        return 1.0
+    return min((after[k] / before[k] for k in after if before[k] >= WORTH_ASKING), default=1.0)
 
 
 def _without(
