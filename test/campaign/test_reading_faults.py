@@ -156,6 +156,23 @@ def test_angles_of_a_wrong_sign_or_unit_are_named(tmp_path, campaign, table, fac
         read_session(campaign.written(tmp_path / "bag"), table)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "change"),
+    [
+        (lambda right: Rotation.from_quat(right.as_quat()[:, [3, 0, 1, 2]]), "order w x y z"),
+        (lambda right: right.inv(), "the rotations taken from base to platform"),
+    ],
+    ids=["w first", "inverse"],
+)
+def test_rotations_in_another_order_or_direction_are_named(
+    tmp_path, campaign, table, wrong, change
+):
+    rotation = wrong(Rotation.from_matrix(campaign.rigid(campaign.pose_ns))).as_matrix()
+    campaign.with_joints().with_loads().with_poses(rotation=rotation)
+    with pytest.raises(InputError, match=f"{change} they agree"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
 def test_poses_of_another_wrist_are_refused(tmp_path, campaign, table):
     campaign.with_joints().with_loads()
     stretched = Rotation.from_matrix(campaign.rigid(campaign.pose_ns)).as_rotvec()

@@ -65,7 +65,7 @@ def agreement(measured: Array, rigid: Array) -> Agreement:
 
 
 def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
-    """Return what to change in the motor angles so that rotations agree, empty for nothing known.
+    """Return what to change so that rotations agree, empty for nothing known.
 
     Parameters
     ----------
@@ -78,15 +78,21 @@ def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
     limit : float
         Largest misfit of rotations that agree [rad].
     """
-    for change, angles in (
-        ("the motors swapped", theta[:, ::-1]),
-        ("the sign of motor 1 turned", theta * [-1.0, 1.0]),
-        ("the sign of motor 2 turned", theta * [1.0, -1.0]),
-        ("both signs turned", -theta),
-        ("angles taken as degrees", np.radians(theta)),
-    ):
-        if not table.mechanism.reachable(angles).all():
-            continue
-        if agreement(measured, rigid_rotation(table, angles)).misfit <= limit:
-            return change
-    return ""
+    w_first = Rotation.from_quat(Rotation.from_matrix(measured).as_quat()[:, [1, 2, 3, 0]])
+    changes = (
+        ("the motors swapped", measured, theta[:, ::-1]),
+        ("the sign of motor 1 turned", measured, theta * [-1.0, 1.0]),
+        ("the sign of motor 2 turned", measured, theta * [1.0, -1.0]),
+        ("both signs turned", measured, -theta),
+        ("angles taken as degrees", measured, np.radians(theta)),
+        ("quaternions taken in the order w x y z", w_first.as_matrix(), theta),
+        ("the rotations taken from base to platform", np.swapaxes(measured, 1, 2), theta),
+    )
+    # Small turns nearly agree with both signs turned and taken the other way round.
+    best, said = limit, ""
+    for change, rotation, angles in changes:
+        if table.mechanism.reachable(angles).all():
+            misfit = agreement(rotation, rigid_rotation(table, angles)).misfit
+            if misfit < best:
+                best, said = misfit, change
+    return said
