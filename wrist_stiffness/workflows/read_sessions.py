@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from wrist_stiffness.campaign.fitting.calibrate import CALIBRATED
+from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.campaign.reading.session import read_session
@@ -53,7 +55,7 @@ def read_sessions(
     Returns
     -------
     dict of Path to MeasuredSession
-        In the order of time.
+        In the order of time.  A copy of another one is no second session, and is said.
 
     Raises
     ------
@@ -61,10 +63,11 @@ def read_sessions(
         If a recording cannot be used.
     """
     paths, motors = recordings_in(recordings.paths), recordings.settings.motors
-    found = {}
+    found: dict[Path, MeasuredSession] = {}
+    first: dict[str, Path] = {}
     for done, path in enumerate(paths):
         progress(done, len(paths))
-        found[path] = read_session(
+        session = read_session(
             path,
             table,
             remaps=recordings.topics,
@@ -72,6 +75,11 @@ def read_sessions(
             frames=recordings.settings.frames,
             load_age_limit_s=recordings.settings.load_age_limit_s,
         )
+        same = first.setdefault(recording_sha256(path), path)
+        if same == path:
+            found[path] = _with_remarks(session, _without_meaning(session))
+        else:
+            found[same] = _with_remarks(found[same], [f"{path} is a copy of it: used once"])
     progress(len(paths), len(paths))
     names = Counter(session.name for session in found.values())
     named = {
@@ -79,6 +87,23 @@ def read_sessions(
         for path, session in found.items()
     }
     return dict(sorted(named.items(), key=lambda item: float(item[1].block.time[0])))
+
+
+def _with_remarks(session: MeasuredSession, remarks: Sequence[str]) -> MeasuredSession:
+    return replace(session, remarks=(*session.remarks, *remarks))
+
+
+def _without_meaning(session: MeasuredSession) -> list[str]:
+    """Return a warning where the notes call something calibrated that no fit refits."""
+    said = session.notes.get(CALIBRATED)
+    known = [law for law, _ in (*SET_UP, *BUILT)]
+    names = [name for name in said if name not in known] if isinstance(said, list) else []
+    if not names:
+        return []
+    return [
+        f"note {CALIBRATED!r} names {', '.join(map(str, names))}, without effect; what is refitted "
+        f"are {', '.join(known)}"
+    ]
 
 
 def was_fitted_to(model: ErrorModel, recordings: Iterable[Path]) -> bool:
