@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.observing import QUANTITIES
+from wrist_stiffness.campaign.searching.contributions import Contribution
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations
 from wrist_stiffness.diagnosis.result import NotExcited, Unexplained
 from wrist_stiffness.workflows.provenance import Provenance
@@ -58,10 +59,11 @@ def observations():
     return Observations(values, conditions, time_s=conditions["time_s"], quantities=QUANTITIES)
 
 
-def page_of(result, observations, notes=()):
+def page_of(result, observations, notes=(), contributions=()):
     shown = shown_by(observations, np.random.default_rng(0), 0.1 * observations.values)
     provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
-    return unescape(html_of(report_of_diagnosis(result, shown, ["monday"], notes, provenance)))
+    page = report_of_diagnosis(result, contributions, shown, ["monday"], notes, provenance)
+    return unescape(html_of(page))
 
 
 def test_everything_of_a_finding_is_on_the_page(observations):
@@ -100,3 +102,21 @@ def test_unknown_tells_on_what_it_depends(observations):
     assert "31 % of the structure above the noise is explained by no known effect." in page
     assert "It depends on humidity, T_link_1." in page
     assert "Missing in the model" in page
+
+
+def test_suspects_are_ranked_and_called_not_proven(observations):
+    found, tolerance, suspect = (
+        Contribution(effect, place, kind, {"s_um": (size, 0.5), "phi_mdeg": (0.5, 0.2)}, size)
+        for effect, place, kind, size in (
+            ("joint_clearance", "joint_3", "finding", 6.25),
+            ("link_stiffness", "link_1", "tolerance", 4.0),
+            ("drift", "pose_sensor", "suspect", 1.75),
+        )
+    )
+    page = page_of(RESULT, observations, contributions=(found, tolerance, suspect))
+    _, section = page.split("What adds most to the error", 1)
+    section, _ = section.split("</section>", 1)
+    assert section.index("6.25 ± 0.5") < section.index("1.75 ± 0.5")
+    assert section.index("drift@pose_sensor") < section.index("suspect, not proven")
+    assert "link_stiffness" not in section
+    assert "What adds most" not in page_of(RESULT, observations, contributions=(found, tolerance))

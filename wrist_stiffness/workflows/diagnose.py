@@ -117,7 +117,14 @@ class Diagnosed:
         observed, result = self.answer.observed.observations, self.result
         explained = self.answer.base.residual if result.findings else None
         shown = shown_by(observed, np.random.default_rng(SEED), explained)
-        return report_of_diagnosis(result, shown, self.recordings, self.remarks, self.provenance)
+        return report_of_diagnosis(
+            result,
+            self.answer.contributions,
+            shown,
+            self.recordings,
+            self.remarks,
+            self.provenance,
+        )
 
 
 def diagnose_recordings(

@@ -9,6 +9,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.sentences import Statement, Told, tell
 from wrist_stiffness.campaign.noise_floor import noise_floor
+from wrist_stiffness.campaign.searching.contributions import Contribution
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.dependence import draw_against
@@ -41,6 +42,8 @@ COMPENSABLE = {
     "no": "no",
 }
 
+PROVEN = {"finding": "found", "suspect": "suspect, not proven"}
+
 HOW = (
     "Registrations, encoder zeros, load tare and the tolerances of the wrist were fitted first; an "
     "effect counts only for what it explains beyond them.",
@@ -63,7 +66,7 @@ class Shown:
         Residuals after the base was refitted, without any effect; covariates as
         `observing.observe` names them.
     told : Told
-        On what those residuals depend, of `contrast_sentences.tell`.
+        On what those residuals depend, of `sentences.tell`.
     explained : (n, 6) float, optional
         Residuals with the findings in the model, of the same units.
     """
@@ -92,6 +95,7 @@ def shown_by(
 
 def report_of_diagnosis(
     result: Diagnosis,
+    contributions: Sequence[Contribution],
     shown: Shown,
     recordings: Sequence[str],
     notes: Sequence[str],
@@ -103,6 +107,8 @@ def report_of_diagnosis(
     ----------
     result : Diagnosis
         What the statistics say.
+    contributions : sequence of Contribution
+        What each effect adds, largest first.
     shown : Shown
         For the pictures and the sentences.
     recordings : sequence of str
@@ -116,6 +122,7 @@ def report_of_diagnosis(
     sections = [
         Section("Findings", tuple(_findings(result, quantities))),
         Section("How much it brings", _fall(result, quantities)),
+        *_suspects(contributions, quantities),
         Section("Where it shows", _depends(shown)),
         Section("What remains", _remains(result)),
         Section("What these recordings cannot show", _not_excited(result)),
@@ -202,6 +209,23 @@ def _fall(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[Part, ..
         "the model."
     )
     return (drawn(draw_bars(bars), caption),)
+
+
+def _suspects(
+    contributions: Sequence[Contribution], quantities: tuple[Quantity, ...]
+) -> list[Section]:
+    """Return what findings and suspects add to the error; nothing without suspects."""
+    if all(each.kind != "suspect" for each in contributions):
+        return []
+    rows = []
+    for each in contributions:
+        if each.kind in PROVEN:
+            sizes = [each.sizes[q.key] for q in quantities]
+            cells = [f"{size:.3g} ± {error:.2g}" for size, error in sizes]
+            rows.append((each.name, *cells, PROVEN[each.kind]))
+    titles = ("effect", *(f"{q.name} [{unit_of(q.unit)}]" for q in quantities), "")
+    caption = "RMS of what each adds, beyond what a new set-up would take up. Look at the first."
+    return [Section("What adds most to the error", (Table(caption, titles, tuple(rows)),))]
 
 
 def _depends(shown: Shown) -> tuple[Part, ...]:
