@@ -1,4 +1,4 @@
-"""Units of a session: dwells and moments in motion, and the path that is kept of it."""
+"""Units of a session: dwells and half seconds of motion, and the path that is kept of it."""
 
 import numpy as np
 import pytest

@@ -81,7 +81,7 @@ def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
     lost = found.lost + sum(each.lost for each in found.problem.sessions)
     lines = [
         f"{', '.join(session.name for session in sessions)}: {dwells} rests and "
-        f"{table.n_units - dwells} moments in motion"
+        f"{table.n_units - dwells} half seconds in motion"
         + (f", {lost} lost beams left out" if lost else "")
     ]
     lines += [f"  {session.name}: {remark}" for session in sessions for remark in session.remarks]

@@ -70,7 +70,7 @@ def report_of_comparison(compared: Compared) -> Page:
     ]
     return Page(
         f"{models} compared with measurements",
-        f"{', '.join(found.sessions)}: {units} dwells and moments in motion",
+        f"{', '.join(found.sessions)}: {units} dwells and half seconds in motion",
         tuple(typeset(line) for line in found.verdict),
         tuple(sections),
     )
@@ -121,7 +121,9 @@ def _sizes(compared: Compared) -> Table:
             ]
             rows.append((model.name, stage, *cells))
     return Table(
-        "Error of every dwell and moment, before and after the refit.", tuple(head), tuple(rows)
+        "Error of every dwell and half second in motion, before and after the refit.",
+        tuple(head),
+        tuple(rows),
     )
 
 

@@ -132,7 +132,7 @@ def report_of_diagnosis(
     ]
     return Page(
         "Which physical effect is missing?",
-        f"{', '.join(recordings)}: {shown.observations.n_units} dwells and moments in motion",
+        f"{', '.join(recordings)}: {shown.observations.n_units} dwells and half seconds in motion",
         _verdict(result, quantities),
         tuple(sections),
     )
@@ -241,7 +241,8 @@ def _depends(shown: Shown) -> tuple[Part, ...]:
         drawn(
             draw_against(pictures),
             "What the refitted base leaves against the conditions that show it best: every dwell "
-            "and moment (pale), and means of equal numbers of them with standard errors.",
+            "and half second in motion (pale), and means of equal numbers of them with standard "
+            "errors.",
         )
     )
     return tuple(parts)
