@@ -89,6 +89,12 @@ def test_too_few_poses_are_refused_with_the_limit(tmp_path, campaign, table):
         read_session(campaign.written(tmp_path / "few"), table)
 
 
+def test_a_load_sensor_without_a_number_is_one_line(tmp_path, campaign, table):
+    campaign.with_joints().with_loads(force=lambda i: (np.nan, 0.0, 0.0)).with_poses()
+    with pytest.raises(InputError, match="no load estimate is finite; .* not finite, first at"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
 def test_poses_without_stamps_of_their_own_are_said(tmp_path, campaign, table):
     stamps = np.full(len(campaign.pose_ns), campaign.pose_ns[9])
     campaign.with_joints().with_loads().with_poses(stamps=stamps)

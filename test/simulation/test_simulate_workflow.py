@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from wrist_stiffness.recording import open_recording, read_samples, topics
 from wrist_stiffness.simulation.catalogue import CATALOGUE
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.workflows import simulate as workflow
-from wrist_stiffness.workflows.simulate import hide, simulate_recording
+from wrist_stiffness.workflows.simulate import hide, hide_blind, simulate_recording
 
 SETTINGS = CellSettings(rate_hz=50.0)
 
@@ -167,7 +168,7 @@ def test_blind_recording_is_opened_by_its_seed_alone(wrist, tmp_path, capsys):
     assert told.startswith(f"{key['effect']}@{key['component']} ({key['form']})")
 
 
-def test_another_day_is_of_the_same_wrist_and_effect(wrist, tmp_path, monkeypatch):
+def test_another_day_is_of_the_same_wrist_and_effect(wrist, tmp_path, monkeypatch, capsys):
     save_table(wrist(), tmp_path / "table.npz")
     common = ["simulate", "--table", str(tmp_path / "table.npz"), "--seconds", "6", "--rate", "10"]
     hidden, told = [], workflow.VirtualCell
@@ -188,7 +189,9 @@ def test_another_day_is_of_the_same_wrist_and_effect(wrist, tmp_path, monkeypatc
     samples = [read_samples(open_recording(path)).joints for path in days]
     assert samples[1].time_ns[0] - samples[0].time_ns[0] == 86_400 * 10**9
     assert not np.allclose(samples[0].position, samples[1].position)
-    assert main([*common, "-o", str(tmp_path / "x"), "--day", "0"], [command]) == 2
+    for day in ("0", "10001"):
+        assert main([*common, "-o", str(tmp_path / "x"), "--day", day], [command]) == 2
+        assert f"day {day} is not 1 to 10000" in capsys.readouterr().err
 
 
 def test_chosen_effect_is_hidden_and_a_wrong_name_refused(wrist):
@@ -201,3 +204,11 @@ def test_chosen_effect_is_hidden_and_a_wrong_name_refused(wrist):
             hide(wrong, 2.0, table, SETTINGS, 6.0)
     with pytest.raises(InputError, match="size -1"):
         hide("backlash@motor_2", -1.0, table, SETTINGS, 6.0)
+
+
+def test_an_instrument_without_noise_has_no_size_of_an_effect(wrist):
+    ideal = replace(SETTINGS, instrument="ideal")
+    with pytest.raises(InputError, match="'ideal' has none"):
+        hide("backlash@motor_2", 2.0, wrist(), ideal, 6.0)
+    with pytest.raises(InputError, match="'ideal' has none"):
+        hide_blind(7, wrist(), ideal, 6.0)

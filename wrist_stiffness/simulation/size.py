@@ -69,9 +69,19 @@ class Scale:
         Experiment, rate and instrument; other hidden effects in it act in both runs.
     seconds : float
         Duration of the experiment [s].
+
+    Raises
+    ------
+    InputError
+        If the instrument has no noise to measure in.
     """
 
     def __init__(self, table: Table, settings: CellSettings, seconds: float) -> None:
+        if settings.instrument == "ideal":
+            raise InputError(
+                "a hidden effect is as large as so many times the noise, and the instrument "
+                "'ideal' has none: take another one"
+            )
         self._table, self._settings = table, settings
         quiet = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
         # The size is that of the whole motion, whatever part of it the sensor sees.

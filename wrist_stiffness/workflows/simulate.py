@@ -40,6 +40,9 @@ START_NS = 1_700_000_000_000_000_000
 
 DAY_NS = 86_400 * 10**9
 
+LAST_DAY = 10_000
+"""Stamps in nanoseconds end long after it."""
+
 DAY_SEEDS = 1_000_003
 """From the seed of one day's noise and program to that of the next."""
 
@@ -222,8 +225,8 @@ def on_day(day: int, settings: CellSettings) -> CellSettings:
     InputError
         If there is no such day.
     """
-    if day < 1:
-        raise InputError(f"simulate: day {day} is not 1 or more")
+    if not 1 <= day <= LAST_DAY:
+        raise InputError(f"simulate: day {day} is not 1 to {LAST_DAY}")
     later = DAY_SEEDS * (day - 1)
     return replace(settings, session=day - 1, program_seed=settings.program_seed + later)
 

@@ -140,7 +140,7 @@ def read_session(
         track = pose_track(samples, markers, known)
         session = _session(recording.path.name, machine, track, table, load_age_limit_s)
     except (FrameError, InputError, RecordingError) as error:
-        hints = unusable if isinstance(error, FrameError) else []
+        hints = unusable if isinstance(error, FrameError) else [str(f) for f in samples.faults]
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
     damage = [f"the recording is damaged: {recording.damage}"] if recording.damage else []
     faults = [str(fault) for fault in samples.faults]
@@ -153,7 +153,7 @@ def _session(
     name: str, machine: MachineSignals, track: PoseTrack, table: Table, load_age_limit_s: float
 ) -> MeasuredSession:
     remarks = list(track.remarks)
-    _require_overlap(machine.angles.time_ns, track.time_ns)
+    _require_overlap(machine.angles.time_ns, machine.loads.time_ns, track.time_ns)
     offset = _offset(machine, track, table)
     if offset is not None and _another_clock(offset, machine, track):
         remarks.append(
@@ -252,9 +252,11 @@ def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, 
             )
 
 
-def _require_overlap(angles_ns: Stamps, poses_ns: Stamps) -> None:
+def _require_overlap(angles_ns: Stamps, loads_ns: Stamps, poses_ns: Stamps) -> None:
     if len(angles_ns) == 0:
         raise InputError("no joint state has finite angles")
+    if len(loads_ns) == 0:
+        raise InputError("no load estimate is finite")
     if poses_ns[-1] < angles_ns[0] or poses_ns[0] > angles_ns[-1]:
         ranges = [
             f"{stamps[0] / NANOSECONDS:.3f} to {stamps[-1] / NANOSECONDS:.3f} s"
