@@ -210,7 +210,8 @@ def rubbed(table, joint, mu, time_s, theta, load):
 
     law.rub = listen
     TrueWrist(table, [law]).at(time_s, theta, load, np.zeros((len(time_s), len(HEATED))))
-    return law, *told[0]
+    # A row of samples that does not settle is halved: each part is remembered once, in its order.
+    return law, *(np.concatenate(each) for each in zip(*told, strict=True))
 
 
 @pytest.mark.parametrize("joint", ["joint_2", "joint_3", "joint_4"])
