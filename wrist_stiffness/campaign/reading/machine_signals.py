@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps, in_order
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.errors import FrameError
+from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSamples, WrenchSamples
@@ -94,10 +94,19 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
     ------
     FrameError
         If loads are in an unknown frame, or some in F and some in U.
+    InputError
+        If no angle or no load is finite.
     """
     loads, on_platform = _loads(samples.loads, frames)
+    angles = in_order(samples.joints.time_ns, samples.joints.position)
+    for signal, nothing in (
+        (angles, "no joint state has finite angles"),
+        (loads, "no load estimate is finite"),
+    ):
+        if len(signal) == 0:
+            raise InputError(nothing)
     return MachineSignals(
-        in_order(samples.joints.time_ns, samples.joints.position),
+        angles,
         _speeds(samples.joints),
         loads,
         on_platform,

@@ -153,7 +153,7 @@ def _session(
     name: str, machine: MachineSignals, track: PoseTrack, table: Table, load_age_limit_s: float
 ) -> MeasuredSession:
     remarks = list(track.remarks)
-    _require_overlap(machine.angles.time_ns, machine.loads.time_ns, track.time_ns)
+    _require_overlap(machine.angles.time_ns, track.time_ns)
     offset = _offset(machine, track, table)
     if offset is not None and _another_clock(offset, machine, track):
         remarks.append(
@@ -252,11 +252,7 @@ def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, 
             )
 
 
-def _require_overlap(angles_ns: Stamps, loads_ns: Stamps, poses_ns: Stamps) -> None:
-    if len(angles_ns) == 0:
-        raise InputError("no joint state has finite angles")
-    if len(loads_ns) == 0:
-        raise InputError("no load estimate is finite")
+def _require_overlap(angles_ns: Stamps, poses_ns: Stamps) -> None:
     if poses_ns[-1] < angles_ns[0] or poses_ns[0] > angles_ns[-1]:
         ranges = [
             f"{stamps[0] / NANOSECONDS:.3f} to {stamps[-1] / NANOSECONDS:.3f} s"
