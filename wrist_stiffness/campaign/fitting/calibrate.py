@@ -11,7 +11,7 @@ import numpy as np
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
 from wrist_stiffness.campaign.fitting.free_effects import commissioning, unfitted
 from wrist_stiffness.campaign.fitting.judge import Judged, judged, judged_by_itself
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, require_units, silent
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
@@ -104,7 +104,7 @@ def calibrate(
     Raises
     ------
     InputError
-        If nothing is measured, or nothing is free.
+        If too little is measured, or nothing is free.
     """
     calibrated = said_calibrated(sessions)
     start = unfitted(model) if again else model
@@ -116,6 +116,7 @@ def calibrate(
         )
     units = tuple(as_units(model, session) for session in sessions)
     problem = FitProblem(start.with_effects(*held), units, free)
+    require_units(problem)
     if hold_out:
         seen = judged(problem, progress=progress)
         found = fit(problem, start_of(problem, seen.fit.problem, seen.fit.z), progress=progress)

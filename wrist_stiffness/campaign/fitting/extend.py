@@ -12,7 +12,13 @@ from wrist_stiffness.campaign.fitting.calibrate import said_calibrated, told_mod
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
-from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import (
+    NO_PRIOR,
+    FitProblem,
+    Progress,
+    require_units,
+    silent,
+)
 from wrist_stiffness.campaign.fitting.recipes import recipe
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.fitting.start_search import start_values
@@ -175,6 +181,7 @@ def extend(
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)
     base = FitProblem(model.with_effects(*held), units, free)
+    require_units(base)
     before = judged(base, progress=progress)
     wide = replace(base, free=(*free, _free(effect, units)))
     start = _with_effect(wide, before.fit, start_values(before.fit, effect))

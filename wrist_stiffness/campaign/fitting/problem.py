@@ -13,6 +13,7 @@ from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
 from wrist_stiffness.campaign.fitting.shims import GAP, Shims
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.diagnosis.observations import Observations
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -28,12 +29,30 @@ MOST_KNOWN = 4096
 Progress = Callable[[int, int], None]
 Values = tuple[tuple[str, float], ...]
 
+FEWEST_UNITS = 12
+"""Dwells and moments in motion from which a fit can tell noise from error."""
+
 STEP = 1e-2
 """Step of the difference quotients, in standard deviations of the prior."""
 
 
 def silent(done: int, total: int) -> None:
     """Show no progress."""
+
+
+def require_units(problem: FitProblem) -> None:
+    """Refuse recordings that are too short to fit to.
+
+    Raises
+    ------
+    InputError
+        With the number of units and the least one.
+    """
+    units = problem.table.n_units
+    if units < FEWEST_UNITS:
+        raise InputError(
+            f"{units} dwells and moments are too few to fit to, it needs {FEWEST_UNITS}"
+        )
 
 
 @dataclass(frozen=True)
