@@ -79,10 +79,18 @@ def test_what_is_no_place_for_a_model_is_told_before_the_work(tmp_path, capsys, 
     assert why in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [["calibrate"], ["extend", "--effect", "backlash@motor_1"]])
-def test_a_recording_of_two_seconds_is_too_short_to_fit_to(tmp_path, capsys, command):
+@pytest.mark.parametrize(
+    ("command", "seconds"),
+    [
+        (["calibrate"], "2"),
+        (["calibrate", "--hold-out"], "8"),
+        (["extend", "--effect", "backlash@motor_1"], "8"),
+    ],
+)
+def test_a_recording_of_seconds_is_too_short_to_fit_to(tmp_path, capsys, command, seconds):
+    """What is put aside is not fitted to: of eight seconds it leaves less than twelve units."""
     short = str(tmp_path / "short.mcap")
-    assert main(["simulate", "-o", short, "--seconds", "2"]) == 0
+    assert main(["simulate", "-o", short, "--seconds", seconds]) == 0
     assert main([*command, "--fit", short, "-o", str(tmp_path / "m.yaml")]) == 2
     assert "too few to fit to, it needs 12" in capsys.readouterr().err
 

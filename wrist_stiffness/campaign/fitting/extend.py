@@ -16,7 +16,6 @@ from wrist_stiffness.campaign.fitting.problem import (
     NO_PRIOR,
     FitProblem,
     Progress,
-    require_units,
     silent,
 )
 from wrist_stiffness.campaign.fitting.recipes import recipe
@@ -181,7 +180,6 @@ def extend(
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)
     base = FitProblem(model.with_effects(*held), units, free)
-    require_units(base)
     before = judged(base, progress=progress)
     wide = replace(base, free=(*free, _free(effect, units)))
     start = _with_effect(wide, before.fit, start_values(before.fit, effect))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, require_units, silent
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.campaign.fitting.wander import with_wander
 from wrist_stiffness.diagnosis.observations import Labels, Observations
@@ -77,9 +77,11 @@ def judged(
     table = problem.table
     aside = sealed_units(table, Settings().sealed_share)
     if len(problem.sessions) == 1:
+        require_units(problem, int(np.count_nonzero(aside)))
         found = fit(problem, _begin(problem, start), aside, progress)
         return Judged(found, found.observations.take(aside), table.rows[aside], THIS_SESSION)
     earlier = replace(problem, sessions=problem.sessions[:-1])
+    require_units(earlier)
     found = fit(earlier, _begin(earlier, start), None, progress)
     again = tuple(each for each in problem.free if each.per_session)
     own = {each.effect.name for each in again}

@@ -40,15 +40,15 @@ def silent(done: int, total: int) -> None:
     """Show no progress."""
 
 
-def require_units(problem: FitProblem) -> None:
-    """Refuse recordings that are too short to fit to.
+def require_units(problem: FitProblem, aside: int = 0) -> None:
+    """Refuse recordings that are too short to fit to, so many units of them put aside.
 
     Raises
     ------
     InputError
         With the number of units and the least one.
     """
-    units = problem.table.n_units
+    units = problem.table.n_units - aside
     if units < FEWEST_UNITS:
         raise InputError(
             f"{units} dwells and moments are too few to fit to, it needs {FEWEST_UNITS}"
