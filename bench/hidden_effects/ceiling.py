@@ -194,8 +194,9 @@ def _fits(
         design = fit.word(word)
         values, _, rank, _ = np.linalg.lstsq(design, rest, rcond=1e-6)
         explained = design @ values
-        gains.append((chi2.logsf(float(explained @ explained), max(int(rank), 1)), word.name))
-    likeliest = [name for _, name in sorted(gains)[:PLACES]]
+        # The tail of chi-squared would be zero for every large effect, and all places alike.
+        gains.append((float(explained @ explained) - int(rank) * np.log(len(rest)), word.name))
+    likeliest = [name for _, name in sorted(gains, reverse=True)[:PLACES]]
     found = []
     for name in likeliest:
         effect, component = name.split("@")
