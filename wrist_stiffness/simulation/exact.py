@@ -23,7 +23,7 @@ from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Bending, Law
 
 GROUND = -1
 FRAMES = (
@@ -113,9 +113,7 @@ class ExactWrist:
         self._parts, self._gravity = table.components, table.geometry.gravity
         for law in laws:
             self._parts, self._gravity = law.parts(self._parts), law.gravity(self._gravity)
-        self._drags = {
-            law.rubs: _Drag(law) for law in laws if isinstance(law, JointFriction) and law.rubs
-        }
+        self._drags = {law.rubs: _Drag(law) for law in laws if isinstance(law, JointFriction)}
 
     def solve(self, theta: Array, load: Array, kelvin: Array | None = None) -> ExactState:
         """Find the equilibrium of the next pose.
@@ -215,7 +213,9 @@ class _System:
         self._load = block.load[0] + sum((law.wrench(block)[0] for law in laws), np.zeros(6))
         self._screws = sum((law.screws(block)[0] for law in laws), np.zeros((len(ELASTIC), 6)))
         self._bends = [
-            (ELASTIC.index(law.bends), partial(law.bend, block)) for law in laws if law.bends
+            (ELASTIC.index(law.bends), partial(law.bend, block))
+            for law in laws
+            if isinstance(law, Bending)
         ]
 
     def solve(self) -> ExactState:

@@ -15,7 +15,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
 from wrist_stiffness.simulation.heat import HeatNetwork
-from wrist_stiffness.simulation.laws.law import Law, no_screws
+from wrist_stiffness.simulation.laws.law import Bending, Flowing, Law, Rubbing, no_screws
 
 MAX_SWEEPS = 20
 """Passes in which histories (creep, friction) and equilibrium find each other."""
@@ -131,7 +131,7 @@ class TrueWrist:
     def _equilibrium(self, block: Block, pose: Pose) -> Equilibrium:
         load = block.load + sum((law.wrench(block) for law in self._laws), np.zeros(6))
         screws = no_screws(block) + sum(law.screws(block) for law in self._laws)
-        rubbing = any(law.rubs is not None for law in self._laws)
+        rubbing = any(isinstance(law, Rubbing) for law in self._laws)
         size = RUBBING_BLOCK if rubbing else len(block.time_s)
         parts: list[Equilibrium] = []
         for first in range(0, len(block.time_s), size):
@@ -163,11 +163,11 @@ class TrueWrist:
         bends = [
             (ELASTIC.index(law.bends), partial(law.bend, block))
             for law in self._laws
-            if law.bends is not None
+            if isinstance(law, Bending)
         ]
         state = pose.solve(load, screws, bends)
-        rubbing = [law for law in self._laws if law.rubs is not None]
-        if not rubbing and all(law.flows is None for law in self._laws):
+        rubbing = [law for law in self._laws if isinstance(law, Rubbing)]
+        if not rubbing and not any(isinstance(law, Flowing) for law in self._laws):
             return state
         moved, acting = screws, np.zeros((len(rubbing), len(block.time_s), 2))
         along, across = _Steps(moved), _Steps(acting)
@@ -178,7 +178,7 @@ class TrueWrist:
             moved, acting = along.towards(moved, new_moved), across.towards(acting, new_acting)
             friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
             for law, force in zip(rubbing, acting, strict=True):
-                friction[:, PASSIVE_JOINTS.index(law.rubs or "")] += force
+                friction[:, PASSIVE_JOINTS.index(law.rubs)] += force
             state = pose.solve(load, moved, bends, pose.friction_wrench(friction), state)
             # What whole steps would have changed.
             share = np.minimum(
@@ -206,10 +206,10 @@ class TrueWrist:
         moved = screws.copy()
         rubbed: list[Array] = []
         for law in self._laws:
-            if law.flows is not None:
+            if isinstance(law, Flowing):
                 k = ELASTIC.index(law.flows)
                 moved[:, k] += law.flow(block, state.through[:, k], remember)
-            if law.rubs is not None:
+            if isinstance(law, Rubbing):
                 rubbed.append(law.rub(block, give, state, acting[len(rubbed)], remember))
         return moved, np.reshape(rubbed, acting.shape)
 

@@ -10,7 +10,7 @@ from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponen
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Law
+from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Bending, Law
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class MountSpring(Law):
 
 
 @dataclass(frozen=True)
-class StiffeningDrive(Law):
+class StiffeningDrive(Bending):
     """Gears whose teeth touch more fully under torque: soft at first, then stiff.
 
     Parameters

@@ -8,11 +8,11 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Bending
 
 
 @dataclass(frozen=True)
-class BushingHardening(Law):
+class BushingHardening(Bending):
     """Stiffening with load: the complementary energy grows slower than the square of the load.
 
     Parameters
@@ -56,7 +56,7 @@ class BushingHardening(Law):
 
 
 @dataclass(frozen=True)
-class ThermalSoftening(Law):
+class ThermalSoftening(Bending):
     """The modulus falls with the temperature of the bodies that the bushing joins.
 
     Parameters

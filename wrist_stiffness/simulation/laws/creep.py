@@ -7,10 +7,10 @@ import numpy as np
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Flowing
 
 
-class Creep(Law):
+class Creep(Flowing):
     """Kelvin-Voigt elements in series with the bushing, in its own axes (a Prony series).
 
         dx_i/dt = (share_i C w - x_i) / tau_i        screw = sum_i x_i

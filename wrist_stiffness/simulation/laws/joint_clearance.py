@@ -8,12 +8,12 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Bending
 from wrist_stiffness.simulation.seat import Seat
 
 
 @dataclass(frozen=True)
-class JointClearance(Law):
+class JointClearance(Bending):
     """Play of a pin in its bore: contact equilibrium of the two ends, each on its own.
 
     An end at which the reaction F pushes lies at the radial distance (c/2) g(|F|/F0): it has

@@ -11,7 +11,7 @@ from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Rubbing
 from wrist_stiffness.simulation.seat import Seat
 
 BODIES_JOINED = {
@@ -29,7 +29,7 @@ Pair = tuple[float, float]
 """Along the slide and round it [m] or [N]."""
 
 
-class JointFriction(Law):
+class JointFriction(Rubbing):
     """Elasto-plastic friction of a cylindrical joint with one budget for slide and turn.
 
     Bristles of the stiffness sigma carry the friction force p = -sigma z on (slide, radius x turn)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,23 +18,9 @@ class Law:
     """One departure of the true wrist from its base.
 
     Hooks are called once for each block, in the order of time and in the order in which they stand
-    here.  A law with a history advances it in the hook that ends with "and remember".
+    here.  A law with a history advances it in the hook that ends with "and remember".  What hangs
+    on the forces inside the wrist is found together with them: `Bending`, `Flowing`, `Rubbing`.
     """
-
-    @property
-    def bends(self) -> str | None:
-        """Component with a law of its own between wrench and screw (`bend`)."""
-        return None
-
-    @property
-    def flows(self) -> str | None:
-        """Component whose screw follows the history of its wrench (`flow`)."""
-        return None
-
-    @property
-    def rubs(self) -> str | None:
-        """Passive joint with friction (`rub`)."""
-        return None
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Return other elastic parts, once before the start."""
@@ -55,24 +42,6 @@ class Law:
         """Return screws at the components, (n, 8, 6) at O in F [m, rad]; remember."""
         return no_screws(block)
 
-    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
-        """Return screw (n, 6) and tangent (n, 6, 6) of `bends` under its wrench (n, 6)."""
-        raise NotImplementedError
-
-    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
-        """Return the screw (n, 6) of `flows` after the history of its wrench (n, 6)."""
-        raise NotImplementedError
-
-    def rub(
-        self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
-    ) -> Array:
-        """Return force and torque of friction along the axis of `rubs`, (n, 2) [N, N m].
-
-        `state` was found with the friction `acting` (n, 2) in this joint; `give` (n, 3, 2, 2) is
-        what a little more of it moves there.
-        """
-        raise NotImplementedError
-
     def twist(self, block: Block, state: Equilibrium) -> Array:
         """Return a twist of the whole platform, (n, 6) at O in F [m, rad]; remember."""
         return np.zeros_like(block.load)
@@ -88,6 +57,51 @@ class Law:
     def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
         """Return what the pose sensor sees instead of (n, 3, 3) and (n, 3); remember."""
         return rotation, shift
+
+
+class Bending(Law, ABC):
+    """A component with a law of its own between wrench and screw."""
+
+    @property
+    @abstractmethod
+    def bends(self) -> str:
+        """The component."""
+
+    @abstractmethod
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Return the screw (n, 6) and its tangent (n, 6, 6) under the wrench (n, 6) through it."""
+
+
+class Flowing(Law, ABC):
+    """A component whose screw follows the history of its wrench."""
+
+    @property
+    @abstractmethod
+    def flows(self) -> str:
+        """The component."""
+
+    @abstractmethod
+    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+        """Return the screw (n, 6) after the history of the wrench (n, 6) through it."""
+
+
+class Rubbing(Law, ABC):
+    """A passive joint with friction."""
+
+    @property
+    @abstractmethod
+    def rubs(self) -> str:
+        """The joint."""
+
+    @abstractmethod
+    def rub(
+        self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
+    ) -> Array:
+        """Return force and torque of friction along the joint's axis, (n, 2) [N, N m].
+
+        `state` was found with the friction `acting` (n, 2) in this joint; `give` (n, 3, 2, 2) is
+        what a little more of it moves there.
+        """
 
 
 def no_screws(block: Block) -> Array:

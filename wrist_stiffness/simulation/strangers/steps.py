@@ -9,7 +9,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.law import Law
+from wrist_stiffness.simulation.laws.law import Flowing, Law
 
 
 class _Switch:
@@ -53,7 +53,7 @@ class LooseSeat(Law):
         return thrown[:, None] * (block_diagonal(platform) @ self._jump)
 
 
-class PlasticSet(Law):
+class PlasticSet(Flowing):
     """A part yields a little whenever a load is larger than all before, and stays bent.
 
     Parameters
