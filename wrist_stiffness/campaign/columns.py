@@ -16,9 +16,6 @@ from wrist_stiffness.model.evaluation import evaluate
 
 Effects = tuple[Effect, ...]
 
-WITHIN_A_UNIT = ("transmission_error",)
-"""Laws that a unit in motion may see more than a wave of: no mean angle stands for it."""
-
 AT_A_TIME = 40
 """Trials evaluated together: they share the work of the base, and their results are in memory."""
 
@@ -42,7 +39,7 @@ class SessionModel:
     effects: Effects
 
     def remembers(self, effects: Effects) -> bool:
-        """Tell whether any of the effects needs the path and not the moment alone."""
+        """Tell whether any of the effects needs the path and not the mean moment alone."""
         return any(self._has_memory(effect) for effect in effects)
 
     def _has_memory(self, effect: Effect) -> bool:
@@ -51,8 +48,7 @@ class SessionModel:
             first = self.session.block.take(slice(0, 1))
             usual = Effect(*asked)
             memory = evaluate(self.model.with_effects(usual), first, None).memory
-            alike = effect.law.id not in WITHIN_A_UNIT
-            known[asked] = not alike or memory.states[0] is not None
+            known[asked] = effect.law.many_waves or memory.states[0] is not None
         return known[asked]
 
     def along(self, trials: Sequence[Effects]) -> list[Array]:

@@ -48,6 +48,9 @@ class Law(ABC):
     constant : bool
         Whether it adds the same at every moment: a screw fixed in the body of its place, a wrench
         in F, gaps, X in F or Y in U.  Such effects are put together once for all samples.
+    many_waves : bool
+        Whether half a second of motion may go through more than one of its waves, so that no mean
+        angle stands for what it did.
     file : path or None
         The Python file of a user's own law.
     """
@@ -60,6 +63,7 @@ class Law(ABC):
     signals: tuple[str, ...] = ()
     excited_by: str
     constant: bool = False
+    many_waves: bool = False
     file: Path | None = None
 
     @property

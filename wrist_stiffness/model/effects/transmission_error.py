@@ -36,6 +36,7 @@ class TransmissionError(Law):
     sentence = "the gear of {place} runs unevenly: a wave many times per turn"
     check = "count the teeth: does the order fit a tooth mesh or a strain-wave generator?"
     excited_by = "slow sweeps of the motor, several samples within a wave"
+    many_waves = True
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the amplitudes, the order, and how far they vary once per turn."""
