@@ -106,6 +106,16 @@ class Block:
         """Return the mapping at a key."""
         return Block(self.take(key), f"{self.place}.{key}", self._error, self._sources)
 
+    def blocks(self, key: str) -> list[Block]:
+        """Return the mappings of a list at a key."""
+        values = self.take(key)
+        if not isinstance(values, list):
+            raise self._error(f"{self.place}.{key}: {_short(values)} is not a list")
+        return [
+            Block(value, f"{self.place}.{key}[{number}]", self._error, self._sources)
+            for number, value in enumerate(values)
+        ]
+
     def text(self, key: str, allowed: tuple[str, ...] | None = None) -> str:
         """Return a text, if given one of the allowed words."""
         value = self.take(key)

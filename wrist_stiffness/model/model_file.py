@@ -56,7 +56,7 @@ def load_model(path: str | Path) -> ErrorModel:
     if schema != SCHEMA:
         raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
     name = root.text("name")
-    effects = tuple(_effect(block, path.parent) for block in _blocks(root, "effects"))
+    effects = tuple(_effect(block, path.parent) for block in root.blocks("effects"))
     entry = root.block("table")
     table_file = path.parent / entry.text("path")
     table = load_table(table_file)
@@ -69,7 +69,7 @@ def load_model(path: str | Path) -> ErrorModel:
     evaluation: Evaluation = table.header.evaluation
     if "evaluation" in root.values:
         evaluation = root.text("evaluation", EVALUATIONS)  # type: ignore[assignment]
-    lineage = _blocks(root, "lineage") if "lineage" in root.values else []
+    lineage = root.blocks("lineage") if "lineage" in root.values else []
     steps = tuple(_step(block) for block in lineage)
     joint = _joint(root.block("joint_uncertainty")) if "joint_uncertainty" in root.values else None
     root.no_more_keys()
@@ -138,16 +138,6 @@ def file_sha256(path: str | Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-
-
-def _blocks(root: Block, key: str) -> list[Block]:
-    values = root.take(key)
-    if not isinstance(values, list):
-        raise InputError(f"{root.place}.{key}: {values!r} is not a list")
-    return [
-        Block(value, f"{root.place}.{key}[{number}]", InputError, sources=())
-        for number, value in enumerate(values)
-    ]
 
 
 def _effect(block: Block, folder: Path) -> Effect:

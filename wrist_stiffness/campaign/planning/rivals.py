@@ -84,23 +84,13 @@ def read_rivals(path: str | Path) -> Rivals:
         floor.number("s_um", 1e-6, above=0.0),
         floor.number("phi_mdeg", np.pi / 180e3, above=0.0),
     )
-    classes = tuple(_members(block) for block in _blocks(root, "findings"))
-    silent = (_effect(block) for block in _blocks(root, "not_excited"))
+    classes = tuple(_members(block) for block in root.blocks("findings"))
+    silent = (_effect(block) for block in root.blocks("not_excited"))
     return Rivals(classes, tuple({effect.name: effect for effect in silent}.values()), sizes)
 
 
-def _blocks(root: Block, key: str) -> list[Block]:
-    values = root.take(key)
-    if not isinstance(values, list):
-        raise InputError(f"{root.place}.{key}: {values!r} is not a list")
-    return [
-        Block(value, f"{root.place}.{key}[{number}]", InputError, sources=())
-        for number, value in enumerate(values)
-    ]
-
-
 def _members(finding: Block) -> tuple[Effect, ...]:
-    effects = [_effect(block) for block in _blocks(finding, "class")]
+    effects = [_effect(block) for block in finding.blocks("class")]
     if not effects:
         raise InputError(f"{finding.place}.class: is empty")
     parameters = finding.block("parameters")
