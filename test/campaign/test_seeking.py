@@ -7,7 +7,7 @@ from wrist_stiffness.campaign.fitting.recipes import effect_at
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching import seeking
 from wrist_stiffness.campaign.searching.base_fit import fit_base
-from wrist_stiffness.campaign.searching.candidates import wrist_candidates
+from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.seeking import Reached, point_of
 from wrist_stiffness.model.model_file import load_model
@@ -126,3 +126,28 @@ def test_what_the_data_do_not_show_of_an_effect_stays_at_its_usual_size(model, u
     sizes = np.array([abs(e.value) / scale[key] for key, e in own.estimates.items()])
     assert sizes.max() < 5.0
     assert np.median(sizes) < 1.0
+
+
+def test_motors_can_turn_back_what_points_the_platform_elsewhere():
+    normal = np.tile([0.0, 0.6, 0.8], (3, 1))
+    shift = np.zeros((3, 6, 1))
+    shift[:, :3, 0] = 1e-5
+    assert not turns_normal(shift, normal)
+    spin = shift.copy()
+    spin[:, 3:, 0] = 1e-3 * normal
+    assert not turns_normal(spin, normal)
+    tilt = shift.copy()
+    tilt[:, 3, 0] = 1e-3
+    assert turns_normal(tilt, normal)
+    # One of several is enough.
+    assert turns_normal(np.concatenate([shift, tilt], axis=2), normal)
+
+
+@pytest.mark.slow
+def test_what_only_shifts_the_platform_is_not_compensable(candidates):
+    said = {each.name: each.candidate().compensable for each in candidates}
+    assert said["thermal_expansion@platform"] == "no"
+    assert said["thermal_expansion@link_2"] == "needs_signal"
+    assert said["drift@pose_sensor"] == "no"
+    assert said["gravity@platform"] == said["backlash@motor_1"] == "yes"
+    assert said["transmission_error@motor_2"] == "yes"

@@ -75,7 +75,7 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "To be sure: rock it by hand",
         "12.1 ± 0.4",
         "3.2 ± 0.3 µm",
-        "only with a signal that the recordings lack",
+        "the nodes can correct it where they get its signal",
         "another session",
         "registration: 700 µm of s",
         "3 units were left out",
@@ -99,7 +99,7 @@ def test_unknown_tells_on_what_it_depends(observations):
     rest = Unexplained(("humidity", "T_link_1"), 0.31, "the conditions predict it")
     page = page_of(replace(RESULT, verdict="unknown", unexplained=rest), observations)
     assert "check it on the machine before you add it" in page
-    assert "31 % of the structure above the noise is explained by no known effect." in page
+    assert "Not explained by any known effect: 31 % of the structure above the noise." in page
     assert "It depends on humidity, T_link_1." in page
     assert "Missing in the model" in page
 

@@ -235,7 +235,7 @@ def _unexplained(
         )
     if flexible.energy > 0:
         sentences.append(
-            f"the conditions foretell a part of it where they were not fitted (chance "
+            f"the conditions foretell a part of what is left where they were not fitted (chance "
             f"{flexible.p_value:.1g})"
         )
     sentences += [f"{name} fitted here makes the sealed part worse" for name in broken]

@@ -25,7 +25,12 @@ from wrist_stiffness.workflows.read_sessions import (
     recording_sha256,
     was_fitted_to,
 )
-from wrist_stiffness.workflows.verdict import class_of, verdict_lines
+from wrist_stiffness.workflows.verdict import (
+    class_of,
+    correction_of,
+    unexplained_share,
+    verdict_lines,
+)
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.report.page import Page
@@ -37,12 +42,6 @@ SEED = 0
 
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""
-
-COMPENSABLE = {
-    "yes": "the nodes can correct it",
-    "needs_signal": "the nodes can correct it where they get its signal",
-    "no": "it is in the instrument, so nothing is to be corrected",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +78,7 @@ class Diagnosed:
             out += ["", *_finding_lines(place, finding)]
         out += suspect_lines(self.answer.contributions)
         if result.unexplained.evidence:
-            share = 100.0 * result.unexplained.energy_share
-            out += ["", f"not explained: {share:.0f} % of the structure above the noise"]
+            out += ["", f"not explained: {unexplained_share(result)}"]
             out.append(f"  {result.unexplained.evidence}")
             if result.unexplained.depends_on:
                 out.append(f"  it depends on {', '.join(result.unexplained.depends_on)}")
@@ -195,7 +193,7 @@ def _finding_lines(place: int, finding: Finding) -> list[str]:
         f"{key.rpartition('_')[0]} {gain:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
         for key, (gain, error) in finding.buys.items()
     )
-    out.append(f"   brings {bought}; {COMPENSABLE[finding.compensable]}")
+    out.append(f"   brings {bought}; {correction_of(finding)}")
     out.append(
         f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
         f"BIC falls by {finding.delta_bic:.3g}"

@@ -1,8 +1,9 @@
-"""The verdict of a diagnosis in words, the same on the terminal and on the page."""
+"""A diagnosis in words, the same on the terminal and on the page."""
 
 from __future__ import annotations
 
 from wrist_stiffness.diagnosis import Diagnosis, Finding
+from wrist_stiffness.model.registry import find_law
 
 
 def verdict_lines(result: Diagnosis) -> list[str]:
@@ -21,7 +22,29 @@ def verdict_lines(result: Diagnosis) -> list[str]:
     return ["Something is missing that no known effect explains."]
 
 
+def unexplained_share(result: Diagnosis) -> str:
+    """Return how much no known effect explains, so that a small rest does not read as nothing."""
+    share = 100.0 * result.unexplained.energy_share
+    if share == 0.0:
+        return "nothing of the structure above the noise"
+    amount = f"{share:.0f}" if share >= 1.0 else f"{share:.1g}"
+    small = "" if result.verdict == "unknown" else ", too little to look for another effect"
+    return f"{amount} % of the structure above the noise{small}"
+
+
 def class_of(finding: Finding) -> str:
     """Return the best effect of a class, and those that the data cannot tell from it."""
     names = finding.names
     return names[0] if len(names) == 1 else f"{names[0]} (or {', '.join(names[1:])})"
+
+
+def correction_of(finding: Finding) -> str:
+    """Return what the nodes can do about a finding."""
+    if finding.compensable == "yes":
+        return "the nodes can correct it"
+    if finding.compensable == "needs_signal":
+        return "the nodes can correct it where they get its signal"
+    law, place = finding.members[0]
+    if find_law(law).of_measurement(place):
+        return "it is in the instrument, so nothing is to be corrected"
+    return "it shifts the platform and does not turn it, so only the manipulator can correct it"

@@ -27,6 +27,10 @@ LARGE = 5.0
 FAR = 10.0
 """What an estimate may be against the bounds of its law; at zero they stay."""
 
+LEVER, SHIFTS_ALONE = 0.03, 0.01
+"""A change shifts the platform alone if turns of its normal, at the distance of the bearings [m],
+are less than this share of the shifts: below a millimetre they are within an encoder step."""
+
 SET_UP_ANEW = {law for law, _ in SET_UP}
 """Laws refitted in every session before any search; there is nothing to find."""
 
@@ -51,6 +55,8 @@ class WristCandidate:
         shape -> columns, where they are known between the points of the grid.
     seen : bool
         Whether a fit has found it before, whatever its size.
+    points : bool
+        Whether it turns the platform's normal, which is all that two motors can turn back.
     """
 
     law: Law
@@ -59,6 +65,7 @@ class WristCandidate:
     known: Mapping[Shape, Array]
     exact: Callable[[Shape], Array] | None = None
     seen: bool = False
+    points: bool = True
 
     @property
     def name(self) -> str:
@@ -122,7 +129,7 @@ class WristCandidate:
             needs=law.excited_by,
             evidence=law.sentence.format(place=self.place),
             check=law.check,
-            compensable=compensable(law, self.place),
+            compensable=compensable(law, self.place, self.points),
         )
 
     def _testable(self, factor: Factor) -> Factor:
@@ -136,11 +143,36 @@ class WristCandidate:
         return Factor(factor.name, *far, size, plausible)
 
 
-def compensable(law: Law, place: str) -> str:
-    """Tell whether the nodes can correct for an effect: `yes`, `needs_signal` or `no`."""
-    if law.of_measurement(place):
+def compensable(law: Law, place: str, points: bool = True) -> str:
+    """Tell whether the motors can correct for an effect: `yes`, `needs_signal` or `no`.
+
+    Parameters
+    ----------
+    law : Law
+        The physics.
+    place : str
+        Component.
+    points : bool
+        Whether it turns the platform's normal.
+    """
+    if law.of_measurement(place) or not points:
         return "no"
     return "needs_signal" if law.signals else "yes"
+
+
+def turns_normal(columns: Array, normal: Array) -> bool:
+    """Tell whether any of the columns turns the platform's normal.
+
+    Parameters
+    ----------
+    columns : (u, 6, k) float
+        Twists at O in F [m, rad].
+    normal : (u, 3) float
+        Of the platform, unit vectors in F.
+    """
+    turned = np.cross(columns[:, 3:], normal[:, :, None], axis=1)
+    lengths = [np.linalg.norm(each, axis=(0, 1)) for each in (turned, columns[:, :3])]
+    return bool((LEVER * lengths[0] > SHIFTS_ALONE * lengths[1]).any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +214,15 @@ class Point:
             blocks.append(np.nan_to_num(found[:, rows]))
             progress(number + 1, len(self.models))
         return np.concatenate(blocks, axis=1)
+
+    @property
+    def normal(self) -> Array:
+        """Normals of the platform, (u, 3) unit vectors in F."""
+        mechanism = self.models[0].model.table.mechanism
+        theta = [
+            m.session.still.theta[rows] for m, rows in zip(self.models, self.used, strict=True)
+        ]
+        return mechanism.normal(mechanism.forward(np.concatenate(theta)))
 
     def mean(self, signal: Callable[[SessionModel], Array]) -> Array:
         """Return a signal of each unit of the table, (u, ...)."""
@@ -232,7 +273,7 @@ def wrist_candidates(
                 index(law, place, column.trial)
                 if column.origin:
                     index(law, place, column.origin)
-    changes = point.changes(listed, progress)
+    changes, normal = point.changes(listed, progress), point.normal
     found = []
     for law, place, own in plans:
         if law.id == WAVE:
@@ -248,7 +289,9 @@ def wrist_candidates(
                     change = change - changes[index(law, place, column.origin)]
                 stack.append(change / column.size)
             known[shape] = np.stack(stack, axis=-1)
-        found.append(WristCandidate(law, place, own, known, seen=f"{law.id}@{place}" in near))
+        points = any(turns_normal(columns, normal) for columns in known.values())
+        seen = f"{law.id}@{place}" in near
+        found.append(WristCandidate(law, place, own, known, seen=seen, points=points))
     return tuple(found)
 
 

@@ -31,16 +31,15 @@ from wrist_stiffness.workflows.report.parts import (
     typeset,
     unit_of,
 )
-from wrist_stiffness.workflows.verdict import class_of, verdict_lines
+from wrist_stiffness.workflows.verdict import (
+    class_of,
+    correction_of,
+    unexplained_share,
+    verdict_lines,
+)
 
 MOST_PICTURED = 4
 """Conditions that are drawn."""
-
-COMPENSABLE = {
-    "yes": "yes, from what the recordings hold",
-    "needs_signal": "only with a signal that the recordings lack",
-    "no": "no",
-}
 
 PROVEN = {"finding": "found", "suspect": "suspect, not proven"}
 
@@ -149,10 +148,7 @@ def _verdict(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, 
         ]
         lines.append(f"Adding it changes {' and '.join(falls)}, RMS on the part put aside.")
     if result.verdict == "unknown":
-        share = 100.0 * result.unexplained.energy_share
-        lines.append(
-            f"{share:.0f} % of the structure above the noise is explained by no known effect."
-        )
+        lines.append(f"Not explained by any known effect: {unexplained_share(result)}.")
         if result.unexplained.depends_on:
             lines.append(f"It depends on {', '.join(result.unexplained.depends_on)}.")
     return tuple(lines)
@@ -188,7 +184,7 @@ def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
         ("information criterion (BIC) falls by", number(finding.delta_bic)),
         ("p", f"{finding.p_value:.2g}"),
         ("stability", f"{100.0 * finding.stability:.0f} %"),
-        ("can be compensated", COMPENSABLE.get(finding.compensable, finding.compensable)),
+        ("correction", correction_of(finding)),
     ]
     return Table(f"Numbers of {finding.name}.", ("", "value"), tuple(rows))
 
@@ -252,8 +248,8 @@ def _remains(result: Diagnosis) -> tuple[Part, ...]:
     rest = result.unexplained
     if not rest.evidence:
         return (Text("Nothing beyond the noise."),)
-    text = f"{100.0 * rest.energy_share:.0f} % of the structure above the noise: {rest.evidence}."
-    parts: list[Part] = [Text(typeset(text))]
+    text = f"{unexplained_share(result)}: {rest.evidence}."
+    parts: list[Part] = [Text(typeset(text[0].upper() + text[1:]))]
     if rest.depends_on:
         parts.append(
             Text(f"Conditions that predict it, strongest first: {', '.join(rest.depends_on)}.")
