@@ -273,9 +273,22 @@ def test_an_earlier_result_is_replaced(tmp_path):
         assert main(["predict", "--angles", "0", "0", "--json", str(path)]) == 0
 
 
-@pytest.mark.parametrize(("seed", "lines"), [("8", 2), ("3", 1)])
+def test_a_size_without_an_effect_to_have_it_is_refused(refused):
+    for others in (["--blind", "7"], ["--reveal", "7"], []):
+        assert "--size belongs to --effect" in refused("simulate", "--size", "30", *others)
+
+
+def test_a_secret_tells_in_which_recordings_it_is(capsys):
+    assert main(["simulate", "--reveal", "3", "--seconds", "20", "--base", "wrong"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("in recordings of: simulate --blind 3 --seconds 20.0 ")
+    assert last.endswith("--base wrong")
+    assert "--instrument interferometer" in last
+
+
+@pytest.mark.parametrize(("seed", "lines"), [("8", 3), ("3", 2)])
 def test_what_every_session_sets_up_anew_is_nothing_to_find(seed, lines, capsys):
     assert main(["simulate", "--reveal", seed, "--seconds", "20"]) == 0
     told = capsys.readouterr().out.splitlines()
     assert len(told) == lines
-    assert "nothing is missing" in told[-1] or lines == 1
+    assert ("nothing is missing" in told[1]) == (seed == "8")

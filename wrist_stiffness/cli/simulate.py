@@ -23,6 +23,21 @@ examples:
   wrist-stiffness simulate -o judge --blind 7 --seconds 120 --day 2   # the same wrist tomorrow
   wrist-stiffness simulate --reveal 7 --seconds 120            # the same options open it"""
 
+USUAL_SIZE = 3.0
+"""Of an effect that is named without one."""
+
+DRAWN_FOR = (
+    "seconds",
+    "rate",
+    "seed",
+    "experiment",
+    "instrument",
+    "sees",
+    "lost_beams",
+    "base",
+)
+"""Options with which a secret is drawn; with others it is another one, in size or altogether."""
+
 
 def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     """Add the parser of `simulate`."""
@@ -78,7 +93,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     secret.add_argument("--blind", type=int, metavar="SEED", help="hide what the seed draws")
     secret.add_argument("--reveal", type=int, metavar="SEED", help="tell what the seed hid")
-    parser.add_argument("--size", type=float, default=3.0, help="of --effect (default: 3)")
+    parser.add_argument(
+        "--size", type=float, help=f"of --effect (default: {USUAL_SIZE:g}); --blind draws its own"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing recording")
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
     parser.set_defaults(run=_run)
@@ -102,6 +119,11 @@ def _run(arguments: argparse.Namespace) -> int:
 
     if arguments.reveal is not None and arguments.output is not None:
         raise InputError("--reveal tells a secret and writes no recording: leave out -o")
+    if arguments.size is not None and arguments.effect is None:
+        raise InputError(
+            "--size belongs to --effect: --blind draws its own, and without either "
+            "nothing is hidden"
+        )
     check_bounds(arguments.seconds, arguments.rate)
     table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
     settings = CellSettings(
@@ -122,7 +144,8 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.blind is not None:
         settings = hide_blind(arguments.blind, table, settings, arguments.seconds)
     elif arguments.effect is not None:
-        settings = hide(arguments.effect, arguments.size, table, settings, arguments.seconds)
+        size = USUAL_SIZE if arguments.size is None else arguments.size
+        settings = hide(arguments.effect, size, table, settings, arguments.seconds)
     written = simulate_recording(
         arguments.output,
         table,
@@ -163,4 +186,6 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     )
     if hidden.effect in {law for law, _ in SET_UP}:
         print("every session sets this up anew: the right diagnosis is that nothing is missing")
+    options = (f"--{name.replace('_', '-')} {getattr(arguments, name)}" for name in DRAWN_FOR)
+    print(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(options)}")
     return EXIT_DONE
