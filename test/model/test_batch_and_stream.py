@@ -14,6 +14,7 @@ from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.contacts import solve_contacts
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
+from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import catalogue
 
@@ -298,3 +299,20 @@ def test_beside_itself_with_another_past(model, make):
     wanted = evaluate(loaded, block, past)
     assert np.allclose(found.twist, wanted.twist, rtol=1e-12)
     assert not np.allclose(found.twist, first.twist, rtol=1e-6)
+
+
+def test_a_formula_without_a_value_says_where_why_and_when(free_model, make):
+    law = FormulaLaw("own", "joint_3", np.eye(6)[0], "k * sqrt(time - 17002.5)", [], ["k"])
+    model = free_model.with_effects(Effect(law, "joint_3", {"k": Estimate(1e-6)}))
+    started = make.block(100)
+    backwards = replace(started, time=17000.0 + started.time - started.time[0])
+    with pytest.raises(
+        InputError, match=r"own: sqrt\(time - 17002\.5\) .* time = 17000.000, 0\.000 s"
+    ):
+        model.batch(backwards)
+    falling = FormulaLaw("own", "joint_3", np.eye(6)[0], "k * log(17001 - time)", [], ["k"])
+    model = free_model.with_effects(Effect(falling, "joint_3", {"k": Estimate(1e-6)}))
+    stamp = backwards.time[backwards.time >= 17001.0][0]
+    told = f"for time = {stamp:.3f}, {stamp - 17000.0:.3f} s after the start"
+    with pytest.raises(InputError, match=told):
+        model.batch(backwards)

@@ -84,6 +84,20 @@ def test_endless_formulas_are_refused():
         Formula("(" * 300 + "fx" + ")" * 300, NAMES)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("k * (1 + sqrt(fx - 3 * theta_1))", "sqrt(fx - 3 * theta_1) has no finite value for fx"),
+        ("sin(theta_1) / (fx + k) ** 2", "sin(theta_1) / (fx + k) ** 2 has no finite value for"),
+        ("max(log(fx + k), 1)", "log(fx + k) has no finite value for fx = -0.5, k = 0.5"),
+        ("fx * 1e308 ** 2", "1e308 ** 2 has no finite value"),
+    ],
+)
+def test_the_term_that_is_undefined_is_named_with_its_signals(text, words):
+    values = {"fx": -0.5, "theta_1": 0.25, "k": 0.5}
+    assert Formula(text, NAMES).undefined(values).startswith(words)
+
+
 def test_undefined_values_are_not_finite_and_not_loud():
     assert not np.isfinite(Formula("log(fx)", NAMES)({"fx": -1.0}))
     assert not np.isfinite(Formula("1 / fx", NAMES)({"fx": 0.0}))

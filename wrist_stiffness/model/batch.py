@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside, seen_by
+from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
 from wrist_stiffness.model.stages import Evaluable, Memory
 
@@ -37,7 +39,22 @@ def predicted(
     -------
     list of BlockPrediction
         One for each model.
+
+    Raises
+    ------
+    InputError
+        If a user's formula has no finite value; the message says how long after the first sample.
     """
+    try:
+        return _predicted(models, block, accepted)
+    except UndefinedFormulaError as error:
+        after = error.time_s - float(block.time[0])
+        raise InputError(f"{error}, {after:.3f} s after the start") from error
+
+
+def _predicted(
+    models: Sequence[Evaluable], block: Block, accepted: NDArray[np.bool_]
+) -> list[BlockPrediction]:
     usable, rows = block.take(accepted), np.flatnonzero(accepted)
     twists, measured = np.full((2, len(models), len(block), 6), np.nan)
     memories: list[Memory | None] = [None] * len(models)

@@ -13,6 +13,23 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
+
+class UndefinedFormulaError(InputError):
+    """A formula has no finite value at a sample.
+
+    Parameters
+    ----------
+    message : str
+        Which term, and for what.
+    time_s : float
+        Stamp of the sample [s].
+    """
+
+    def __init__(self, message: str, time_s: float) -> None:
+        super().__init__(message)
+        self.time_s = time_s
+
+
 Value = Any
 """A number or an array (n,)."""
 
@@ -119,6 +136,36 @@ class Formula:
         """
         with np.errstate(all="ignore"):
             return np.asarray(_value(self._tree, values), dtype=float)
+
+    def undefined(self, values: Mapping[str, float]) -> str:
+        """Return the term that makes the formula undefined for one sample, and its variables.
+
+        Parameters
+        ----------
+        values : dict of str to float
+            At least the `names`.
+
+        Returns
+        -------
+        str
+            The innermost term without a finite value, as it was typed.
+        """
+        with np.errstate(all="ignore"):
+            terms = [
+                node
+                for node in ast.walk(self._tree)
+                if isinstance(node, ast.expr)
+                and not (isinstance(node, ast.Name) and node.id in FUNCTIONS)
+                and not np.isfinite(_value(node, values))
+            ]
+        # A walk goes from the whole to its parts.
+        term = terms[-1]
+        used = sorted({node.id for node in ast.walk(term) if isinstance(node, ast.Name)})
+        # Stamps count from 1970: six digits of them say nothing.
+        digits = {"time": ".3f"}
+        told = [f"{n} = {values[n]:{digits.get(n, '.6g')}}" for n in used if n in values]
+        text = ast.get_source_segment(self.text, term) or self.text
+        return f"{text} has no finite value" + (f" for {', '.join(told)}" if told else "")
 
     @cached_property
     def _tree(self) -> ast.expr:

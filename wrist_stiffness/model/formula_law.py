@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.formula import FUNCTIONS, Formula
+from wrist_stiffness.model.formula import FUNCTIONS, Formula, UndefinedFormulaError
 from wrist_stiffness.model.law import Contribution, Law, require_id
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.places import LIMB
@@ -107,8 +107,12 @@ class FormulaLaw(Law):
         variables = {name: self._signal(at, place, name, values) for name in self.formula.names}
         size = np.broadcast_to(self.formula(variables), len(at.block))
         if not np.isfinite(size).all():
-            moment = at.block.time[np.argmin(np.isfinite(size))]
-            raise InputError(f"{self.id}: the formula has no finite value at time {moment:.6f} s")
+            row = int(np.argmin(np.isfinite(size)))
+            there = {
+                name: float(np.broadcast_to(v, len(size))[row]) for name, v in variables.items()
+            }
+            told = f"{self.id}: {self.formula.undefined(there)}"
+            raise UndefinedFormulaError(told, float(at.block.time[row]))
         return at.screw(place, np.outer(size, self.direction)), None
 
     def _signal(
