@@ -8,7 +8,7 @@ from wrist_stiffness.diagnosis.candidates import Candidate, remembered
 from wrist_stiffness.diagnosis.discrepancy import Discrepancy, find_discrepancy
 from wrist_stiffness.diagnosis.errors_in_variables import without_attenuation
 from wrist_stiffness.diagnosis.estimates import joint_fit
-from wrist_stiffness.diagnosis.findings import Model, describe, members_of, with_values
+from wrist_stiffness.diagnosis.findings import Model, describe, with_values
 from wrist_stiffness.diagnosis.fitted import fit_to
 from wrist_stiffness.diagnosis.hypotheses import (
     Evidence,
@@ -25,7 +25,7 @@ from wrist_stiffness.diagnosis.outliers import lost_units
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.ranking import evidence_of
 from wrist_stiffness.diagnosis.resampling import time_blocks
-from wrist_stiffness.diagnosis.result import Diagnosis, NotExcited, Unexplained
+from wrist_stiffness.diagnosis.result import Diagnosis, Finding, NotExcited, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut, held_out, refuted, sealed_units
 from wrist_stiffness.diagnosis.selection import (
     Entered,
@@ -100,18 +100,20 @@ def diagnose(
     kept, stages, broken = _opened(evidence, chosen.entered, sealed, nuisances)
     blocks = time_blocks(training.sessions, settings.blocks)
     model = Model(evidence, testable, kept, tuple(stages), blocks, dimension, settings)
-    crowd = [which for which in range(len(kept)) if _crowded(model, which)]
-    if crowd:
-        named = tuple(each for which, each in enumerate(kept) if which not in crowd)
-        kept, stages, _ = _opened(evidence, named, sealed, nuisances)
+    findings = tuple(describe(model, which, rng) for which in range(len(kept)))
+    doubts = []
+    while doubt := _first_doubt(findings, settings):
+        which, sentence = doubt
+        doubts.append(sentence)
+        kept, stages, _ = _opened(evidence, kept[:which] + kept[which + 1 :], sealed, nuisances)
         model = replace(model, effects=kept, stages=tuple(stages))
+        findings = tuple(describe(model, which, rng) for which in range(len(kept)))
     base = base_with(evidence.base, kept)
     excess = lack_of_fit(base.energy, base.freedom, evidence.noise.dof)
     flexible = find_discrepancy(
         evidence, base, blocks, settings.permutations, CHANCE_OF_STRUCTURE, rng
     )
-    unexplained = _unexplained(evidence, base.energy, excess, flexible, broken)
-    findings = tuple(describe(model, which, rng) for which in range(len(kept)))
+    unexplained = _unexplained(evidence, base.energy, excess, flexible, broken, doubts)
     if observations.covariate_std and kept:
         effects = [(original[each.name], each.hypothesis.shape) for each in kept]
         exact = without_attenuation(evidence, effects, nuisances, rng)
@@ -119,7 +121,7 @@ def diagnose(
             with_values(finding, values) for finding, values in zip(findings, exact, strict=True)
         )
     verdict = "effect" if findings else "none"
-    if unexplained.energy_share >= settings.unexplained_share or broken:
+    if unexplained.energy_share >= settings.unexplained_share or broken or doubts:
         verdict = "unknown"
     return Diagnosis(
         verdict,
@@ -136,9 +138,17 @@ def diagnose(
     )
 
 
-def _crowded(model: Model, which: int) -> bool:
-    """Tell whether so many effects could stand in one's place that none of them is named."""
-    return len(members_of(model, which)) > model.settings.most_members
+def _first_doubt(findings: tuple[Finding, ...], settings: Settings) -> tuple[int, str] | None:
+    """Return which finding cannot be named, the least stable first, and why; None if all can."""
+    for which in sorted(range(len(findings)), key=lambda each: findings[each].stability):
+        finding = findings[which]
+        if len(finding.names) > settings.most_members:
+            others = len(finding.names) - 1
+            return which, f"{others} others explain it about as well as {finding.name}"
+        if finding.stability < settings.least_stability:
+            share = f"{100 * finding.stability:.0f} % of the resamples"
+            return which, f"{finding.name} explains it best, but only {share} choose it again"
+    return None
 
 
 def _refuse_unusable(observations: Observations, candidates: tuple[Candidate, ...]) -> None:
@@ -223,6 +233,7 @@ def _unexplained(
     excess: Excess,
     flexible: Discrepancy,
     broken: list[str],
+    doubts: list[str],
 ) -> Unexplained:
     remaining = max(excess.energy, flexible.energy)
     explained = evidence.base.energy - energy
@@ -239,6 +250,7 @@ def _unexplained(
             f"{flexible.p_value:.1g})"
         )
     sentences += [f"{name} fitted here makes the sealed part worse" for name in broken]
+    sentences += doubts
     return Unexplained(flexible.depends_on, float(share), "; ".join(sentences))
 
 

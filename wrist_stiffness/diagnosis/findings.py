@@ -87,13 +87,6 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
     )
 
 
-def members_of(model: Model, which: int) -> tuple[str, ...]:
-    """Return the names of all effects that could stand in one's place."""
-    others, ranked = _in_its_place(model, which)
-    found = indistinguishable(others, ranked, model.dimension, model.settings)
-    return tuple(each.name for each in found)
-
-
 def _in_its_place(model: Model, which: int) -> tuple[Base, list[Ranked]]:
     """Return the rest of the model, and the effect ahead of all that could stand in its place."""
     entered = model.effects[which]

@@ -29,6 +29,9 @@ class Settings:
     most_members : int
         A class of more effects than these names nothing: they are not told from each other, nor
         from what nobody thought of.
+    least_stability : float
+        Share of the resamples that must choose an effect again, or one of its class, before it is
+        named (stability selection, Meinshausen and Buehlmann 2010, who take 0.6 to 0.9).
     outlier_limit : float
         Distance from the rich model, in robust standard deviations, of a lost beam.
 
@@ -46,6 +49,7 @@ class Settings:
     permutations: int = 999
     most_findings: int = 8
     most_members: int = 8
+    least_stability: float = 0.7
     outlier_limit: float = 7.0
 
     def __post_init__(self) -> None:

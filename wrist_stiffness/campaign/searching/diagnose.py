@@ -29,6 +29,10 @@ from wrist_stiffness.model.error_model import ErrorModel
 WANDER_SHARES = (0.7, 0.5, 0.35)
 """Root mean square of slope, curvature and third order of a wander, against its own."""
 
+LEAST_WANDER = 0.5
+"""Of the scatter of one sample: what repeated rests of a few minutes show of a wander is uncertain,
+and a drift below it is not told from one."""
+
 
 @dataclass(frozen=True, eq=False)
 class WristDiagnosis:
@@ -173,7 +177,7 @@ def _wander(base: BaseFit) -> Nuisance:
         time = session.mean(session.block.time)[session.measured]
         span = max(float(np.ptp(time)), 1e-9)
         wave = legvander(2.0 * (time - time.min()) / span - 1.0, len(WANDER_SHARES))[:, 1:]
-        size = np.where(session.wander > 0.0, session.wander, 0.5 * np.nan_to_num(session.white))
+        size = np.maximum(session.wander, LEAST_WANDER * np.nan_to_num(session.white))
         rise = np.sqrt(2.0 * np.arange(1, len(WANDER_SHARES) + 1) + 1.0) * WANDER_SHARES
         each = (wave * rise)[:, None, :, None] * np.diag(size)[None, :, None, :]
         columns.append(each.reshape(len(time), 6, -1))
