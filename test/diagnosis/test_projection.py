@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.diagnosis.projection import make_base, orthonormal
+from wrist_stiffness.diagnosis.projection import leading_directions, make_base, orthonormal
 
 
 def test_a_prior_row_shrinks_like_bayes(rng):
@@ -34,3 +34,12 @@ def test_extending_equals_fitting_at_once(rng):
     once = make_base(columns, np.full(5, np.inf), values, 30)
     np.testing.assert_allclose(step.residual, once.residual, atol=1e-12)
     assert step.freedom == once.freedom == 25
+
+
+@pytest.mark.parametrize("shape", [(40, 15), (15, 40)], ids=["tall", "wide"])
+def test_leading_directions_are_the_singular_ones(rng, shape):
+    columns = rng.normal(size=shape) * 10.0 ** -np.arange(shape[1])[::-1].clip(max=4)
+    unit = columns / np.linalg.norm(columns, axis=0)
+    wanted = np.linalg.svd(unit, full_matrices=False)[0][:, :6]
+    found = leading_directions(columns, 6)
+    np.testing.assert_allclose(found @ found.T, wanted @ wanted.T, atol=1e-9)

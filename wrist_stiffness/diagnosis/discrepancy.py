@@ -95,9 +95,11 @@ def predicted_energy(
         rows = blocks == block
         own = white_features[rows]
         system = gram - own.T @ own + np.eye(gram.shape[0]) / signal
-        weights = np.linalg.solve(system, moment - own.T @ flat[rows])
         seen = flat[rows]
-        total += np.sum(seen**2 - (seen - own @ weights) ** 2, axis=0)
+        # A block has fewer rows than there are residuals: the inverse is applied to these.
+        weight = np.linalg.solve(system, own.T).T
+        predicted = weight @ moment - (weight @ own.T) @ seen
+        total += np.sum(seen**2 - (seen - predicted) ** 2, axis=0)
     return total.reshape(m, repeats).sum(axis=0)
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array
-from wrist_stiffness.diagnosis.projection import ABSORBED, Base
+from wrist_stiffness.diagnosis.projection import Base, least_squares
 
 SHAPE_STEP = 0.02
 """Step of the difference quotient, as a share of the range of a shape parameter."""
@@ -45,37 +45,16 @@ def estimate(
     inflation : float, optional
         Factor of the variances where structure remains.
     """
-    reference = np.linalg.norm(hypothesis.columns, axis=0)
-    columns = base.beyond(hypothesis.columns)
-    linear = _solve(columns, base.residual, reference)[0]
+    added = addition(base, hypothesis)
+    reference, columns = added.norm, added.beyond
+    linear = added.fitted[0]
     slopes = [_slope(evidence, hypothesis, axis, linear) for axis in range(len(hypothesis.shape))]
     if slopes:
         slope = np.column_stack(slopes)
         reference = np.concatenate([reference, np.linalg.norm(slope, axis=0)])
         columns = np.hstack([columns, base.beyond(slope)])
-    variance = inflation * np.diag(_solve(columns, base.residual, reference)[1])
+    variance = inflation * np.diag(least_squares(columns, base.residual, reference)[1])
     return Estimate(np.concatenate([linear, hypothesis.shape]), np.sqrt(np.maximum(variance, 0)))
-
-
-def _solve(columns: Array, target: Array, reference: Array) -> tuple[Array, Array]:
-    """Least squares and covariance; a column inside the base has value 0 and no end of scatter.
-
-    Parameters
-    ----------
-    columns : (N, k) array
-        Columns beyond the base.
-    target : (N,) array
-        What they should explain.
-    reference : (k,) array
-        Norms of the columns before the base was taken out.
-    """
-    norm = np.linalg.norm(columns, axis=0)
-    seen = (norm > ABSORBED * reference) & (norm > 0)
-    inverse = np.linalg.pinv(columns[:, seen] / norm[seen], rcond=1e-10)
-    values, covariance = np.zeros(len(norm)), np.diag(np.where(seen, 0.0, np.inf))
-    values[seen] = inverse @ target / norm[seen]
-    covariance[np.ix_(seen, seen)] = inverse @ inverse.T / np.outer(norm[seen], norm[seen])
-    return values, covariance
 
 
 def _slope(evidence: Evidence, hypothesis: Hypothesis, axis: int, linear: Array) -> Array:
@@ -94,9 +73,7 @@ def _slope(evidence: Evidence, hypothesis: Hypothesis, axis: int, linear: Array)
 
 def possible(base: Base, hypothesis: Hypothesis, inflation: float) -> bool:
     """Whether the linear estimates respect their bounds within their uncertainty."""
-    columns = base.beyond(hypothesis.columns)
-    reference = np.linalg.norm(hypothesis.columns, axis=0)
-    values, covariance = _solve(columns, base.residual, reference)
+    values, covariance = addition(base, hypothesis).fitted
     margin = BOUND_MARGIN * np.sqrt(inflation * np.maximum(np.diag(covariance), 0))
     lower = np.array([p.lower for p in hypothesis.candidate.parameters])
     upper = np.array([p.upper for p in hypothesis.candidate.parameters])
@@ -130,6 +107,6 @@ def joint_fit(evidence: Evidence, hypotheses: list[Hypothesis]) -> tuple[Array, 
     priors = np.diag(1 / nuisance.prior_std)[proper]
     columns = np.hstack([np.vstack([raw[:, :-1], priors]), *(h.columns for h in hypotheses)])
     target = np.concatenate([raw[:, -1], np.zeros(len(priors))])
-    parameters = _solve(columns, target, np.linalg.norm(columns, axis=0))[0]
+    parameters = least_squares(columns, target, np.linalg.norm(columns, axis=0))[0]
     ends = np.cumsum([p] + [h.columns.shape[1] for h in hypotheses])
     return parameters[:p], [parameters[a:b] for a, b in zip(ends, ends[1:], strict=False)]

@@ -1,6 +1,7 @@
 """Candidates at definite shapes, whitened and ready to be asked about."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -8,8 +9,15 @@ from scipy.optimize import minimize_scalar
 from wrist_stiffness.diagnosis.candidates import Candidate
 from wrist_stiffness.diagnosis.nuisance import NuisanceColumns
 from wrist_stiffness.diagnosis.observations import Array, Observations
-from wrist_stiffness.diagnosis.projection import Base, make_base
+from wrist_stiffness.diagnosis.projection import (
+    ABSORBED,
+    Base,
+    least_squares,
+    make_base,
+    orthonormal,
+)
 from wrist_stiffness.diagnosis.whitening import NoiseModel
+from wrist_stiffness.diagnosis.worth import directions_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +80,65 @@ class Evidence:
         return unit
 
 
+class Addition:
+    """What a hypothesis adds to a base, worked out when first asked for.
+
+    Parameters
+    ----------
+    base : Base
+        What is refitted first.
+    hypothesis : Hypothesis
+        The effect, not in the base.
+    """
+
+    def __init__(self, base: Base, hypothesis: Hypothesis) -> None:
+        self.hypothesis = hypothesis
+        self.norm = np.linalg.norm(hypothesis.columns, axis=0)
+        self.beyond = base.beyond(hypothesis.columns)
+        self._residual = base.residual
+
+    @cached_property
+    def directions(self) -> Array:
+        """Orthonormal basis of what the columns add to the base, (N, r)."""
+        return orthonormal(self.beyond, self.norm)
+
+    @cached_property
+    def gain(self) -> float:
+        """Sum of squares that the hypothesis explains beyond the base."""
+        return float(np.sum((self.directions.T @ self._residual) ** 2))
+
+    @cached_property
+    def sized(self) -> tuple[Array, Array] | None:
+        """Independent directions (N, k) of the columns at their usual sizes, and their squares.
+
+        None where a parameter has no usual size.
+        """
+        scales = [p.scale for p in self.hypothesis.candidate.parameters if p.scale is not None]
+        if len(scales) < len(self.norm):
+            return None
+        seen = np.linalg.norm(self.beyond, axis=0) > ABSORBED * self.norm
+        return directions_of(self.beyond[:, seen], np.array(scales)[seen])
+
+    @cached_property
+    def moment(self) -> Array:
+        """Product of each of these directions with what the base leaves, (k,)."""
+        return np.empty(0) if self.sized is None else self.sized[0].T @ self._residual
+
+    @cached_property
+    def fitted(self) -> tuple[Array, Array]:
+        """Linear parameters (k,) and their covariance (k, k), all of the base refitted along."""
+        return least_squares(self.beyond, self._residual, self.norm)
+
+
+def addition(base: Base, hypothesis: Hypothesis) -> Addition:
+    """Return what a hypothesis adds to a base; the search asks of both again and again."""
+    found = base.known.get(id(hypothesis))
+    if found is None:
+        # It holds the hypothesis, so that no other one can get its identity.
+        found = base.known[id(hypothesis)] = Addition(base, hypothesis)
+    return found
+
+
 def make_evidence(
     observations: Observations, noise: NoiseModel, nuisance: NuisanceColumns
 ) -> Evidence:
@@ -87,11 +154,15 @@ def make_evidence(
 
 def all_hypotheses(evidence: Evidence, candidates: tuple[Candidate, ...]) -> list[Hypothesis]:
     """Every candidate at every point of its grid."""
-    return [
-        evidence.hypothesis(candidate, shape)
-        for candidate in candidates
-        for shape in candidate.shapes
-    ]
+    points = [(candidate, shape) for candidate in candidates for shape in candidate.shapes]
+    columns = [candidate.evaluate(evidence.observations, shape) for candidate, shape in points]
+    if not points:
+        return []
+    # Together: the filter of the wander goes from unit to unit, whatever stands beside.
+    white = evidence.whiten(np.concatenate(columns, axis=2))
+    ends = np.cumsum([each.shape[2] for each in columns])
+    own = (np.ascontiguousarray(each) for each in np.split(white, ends[:-1], axis=1))
+    return [Hypothesis(*point, each) for point, each in zip(points, own, strict=True)]
 
 
 def refined(evidence: Evidence, hypothesis: Hypothesis, base: Base) -> Hypothesis:
@@ -135,5 +206,4 @@ SEARCH_STEPS = 8
 
 def gain(base: Base, hypothesis: Hypothesis) -> float:
     """Sum of squares that the hypothesis explains beyond the base."""
-    directions = base.directions(hypothesis.columns)
-    return float(np.sum((directions.T @ base.residual) ** 2))
+    return addition(base, hypothesis).gain

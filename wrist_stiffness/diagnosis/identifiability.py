@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.hypotheses import Hypothesis
+from wrist_stiffness.diagnosis.hypotheses import Hypothesis, addition
 from wrist_stiffness.diagnosis.projection import Base
 
 DETECTABLE = 3.0
@@ -15,11 +15,12 @@ def strength(base: Base, hypothesis: Hypothesis) -> float:
     Zero if the base imitates it entirely; infinite if it does not and no size is plausible.
     """
     sizes = [p.plausible for p in hypothesis.candidate.parameters]
-    if base.directions(hypothesis.columns).shape[1] == 0:
+    added = addition(base, hypothesis)
+    if added.directions.shape[1] == 0:
         return 0.0
     if any(size is None for size in sizes):
         return np.inf
-    scaled = base.beyond(hypothesis.columns) * np.array(sizes, dtype=np.float64)
+    scaled = added.beyond * np.array(sizes, dtype=np.float64)
     return float(np.linalg.norm(scaled, 2))
 
 

@@ -4,7 +4,8 @@ Everything is whitened, so sums of squares are chi-square.  A Gaussian prior on 
 row of its own (augmented least squares); projections then honour priors without special cases.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -43,8 +44,9 @@ def orthonormal(columns: Array, original_norm: Array | None = None) -> Array:
 def leading_directions(columns: Array, most: int, least: float = SQUARED_ROUNDING) -> Array:
     """Orthonormal basis of the strongest directions of many columns, (N, r), blind to their scales.
 
-    By the Gram matrix: its cost grows with the rows only once, and directions far below the
-    strongest are lost in rounding, which is no loss where only the strong ones are wanted.
+    By the Gram matrix of the shorter side: its cost grows with the longer one only once, and
+    directions far below the strongest are lost in rounding, which is no loss where only the strong
+    ones are wanted.
 
     Parameters
     ----------
@@ -59,8 +61,11 @@ def leading_directions(columns: Array, most: int, least: float = SQUARED_ROUNDIN
     if not (norm > 0).any() or most == 0:
         return np.empty((len(columns), 0))
     scaled = columns[:, norm > 0] / norm[norm > 0]
-    size, vectors = np.linalg.eigh(scaled.T @ scaled)
+    wide = scaled.shape[1] > len(scaled)
+    size, vectors = np.linalg.eigh(scaled @ scaled.T if wide else scaled.T @ scaled)
     strong = np.flatnonzero(size > max(least, SQUARED_ROUNDING) ** 2 * size[-1])[::-1][:most]
+    if wide:
+        return np.asarray(vectors[:, strong])
     directions: Array = np.linalg.qr(scaled @ (vectors[:, strong] / np.sqrt(size[strong])))[0]
     return directions
 
@@ -77,11 +82,14 @@ class Base:
         What the base leaves of the observations.
     n_rows : int
         Measured numbers plus proper priors.
+    known : dict
+        What was worked out about hypotheses against it: the same questions come back.
     """
 
     basis: Array
     residual: Array
     n_rows: int
+    known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def energy(self) -> float:
@@ -134,3 +142,24 @@ def make_base(columns: Array, prior_std: Array, values: Array, n_measured: int) 
 def with_prior_rows(columns: Array, rows: Array) -> Array:
     """Columns of data above rows of priors."""
     return np.vstack([columns, rows])
+
+
+def least_squares(columns: Array, target: Array, reference: Array) -> tuple[Array, Array]:
+    """Least squares and covariance; a column inside the base has value 0 and no end of scatter.
+
+    Parameters
+    ----------
+    columns : (N, k) array
+        Columns beyond the base.
+    target : (N,) array
+        What they should explain.
+    reference : (k,) array
+        Norms of the columns before the base was taken out.
+    """
+    norm = np.linalg.norm(columns, axis=0)
+    seen = (norm > ABSORBED * reference) & (norm > 0)
+    inverse = np.linalg.pinv(columns[:, seen] / norm[seen], rcond=1e-10)
+    values, covariance = np.zeros(len(norm)), np.diag(np.where(seen, 0.0, np.inf))
+    values[seen] = inverse @ target / norm[seen]
+    covariance[np.ix_(seen, seen)] = inverse @ inverse.T / np.outer(norm[seen], norm[seen])
+    return values, covariance

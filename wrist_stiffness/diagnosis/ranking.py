@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.diagnosis.estimates import possible
-from wrist_stiffness.diagnosis.hypotheses import Hypothesis
+from wrist_stiffness.diagnosis.hypotheses import Addition, Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array, Labels
 from wrist_stiffness.diagnosis.permutation import rearranged
-from wrist_stiffness.diagnosis.projection import ABSORBED, Base
+from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.structure import background, lack_of_fit
-from wrist_stiffness.diagnosis.worth import directions_of, worth, worth_along
+from wrist_stiffness.diagnosis.worth import worth_along
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +67,9 @@ def scored(
     """
     found = []
     for hypothesis in hypotheses:
-        directions = base.directions(hypothesis.columns)
+        added = addition(base, hypothesis)
+        directions, gain = added.directions, added.gain
         if directions.shape[1]:
-            gain = float(np.sum((directions.T @ base.residual) ** 2))
             freedom = base.freedom - directions.shape[1]
             remaining = lack_of_fit(base.energy - gain, freedom, noise_dof).energy
             found.append((hypothesis, directions, gain, remaining))
@@ -99,23 +99,11 @@ def evidence_of(base: Base, hypothesis: Hypothesis, gain: float, scale: float = 
         Variance of the background.
     """
     price = float(np.log(base.freedom))
-    found = _with_scales(base, hypothesis)
-    if found is None:
+    added = addition(base, hypothesis)
+    if added.sized is None:
         return gain / scale - hypothesis.candidate.freedom * price
-    columns, scales = found
-    own = worth(columns, base.residual, scales, scale)
+    own = float(worth_along(added.moment, added.sized[1], scale))
     return own - len(hypothesis.candidate.shape) * price
-
-
-def _with_scales(base: Base, hypothesis: Hypothesis) -> tuple[Array, Array] | None:
-    """Return the columns that the base leaves and their usual sizes; None where one has none."""
-    scales = [p.scale for p in hypothesis.candidate.parameters if p.scale is not None]
-    if len(scales) < len(hypothesis.candidate.parameters):
-        return None
-    columns = base.beyond(hypothesis.columns)
-    norm = np.linalg.norm(hypothesis.columns, axis=0)
-    seen = np.linalg.norm(columns, axis=0) > ABSORBED * norm
-    return columns[:, seen], np.array(scales)[seen]
 
 
 def rank(
@@ -152,25 +140,44 @@ def chance_of_best(
     moved -= base.basis @ (base.basis.T @ moved)
     everything = np.column_stack([base.residual, moved])
     energy = np.sum(everything**2, axis=0)
-    own = _scores(base, ranked[0], everything[:, :1], energy[:1])[0]
-    by_chance = np.full(moved.shape[1], -np.inf)
-    for each in ranked:
-        by_chance = np.maximum(by_chance, _scores(base, each, moved, energy[1:]))
+    added = [addition(base, each.hypothesis) for each in ranked]
+    # All columns at once: each hypothesis by itself has too few to keep the processor busy.
+    parts = [[each.directions, *(each.sized or ())[:1]] for each in added]
+    moments = np.hstack([columns for part in parts for columns in part]).T @ everything
+    own, by_chance = 0.0, np.full(moved.shape[1], -np.inf)
+    start = 0
+    for number, (each, part) in enumerate(zip(added, parts, strict=True)):
+        found = []
+        for columns in part:
+            found.append(moments[start : start + columns.shape[1]])
+            start += columns.shape[1]
+        scores = _scores(base, each, found[0], found[-1], energy)
+        own = scores[0] if number == 0 else own
+        by_chance = np.maximum(by_chance, scores[1:])
     return float((1 + np.sum(by_chance >= own)) / (1 + len(by_chance)))
 
 
-def _scores(base: Base, each: Ranked, residuals: Array, energy: Array) -> Array:
-    """Score one hypothesis as the ranking does, on many residuals (N, q), (q,).
+def _scores(base: Base, added: Addition, along: Array, moment: Array, energy: Array) -> Array:
+    """Score one hypothesis as the ranking does, on many residuals, (q,).
 
     The variance is what it leaves of each: with a large effect in it, chance is large as well.
+
+    Parameters
+    ----------
+    base : Base
+        What is refitted first.
+    added : Addition
+        The hypothesis against it.
+    along, moment : (r, q) and (k, q) arrays
+        Product of its directions, and of those at usual sizes, with each residual.
+    energy : (q,) array
+        Sum of squares of each residual.
     """
-    gain = np.sum((each.directions.T @ residuals) ** 2, axis=0)
-    left = base.freedom - each.directions.shape[1]
+    gain = np.sum(along**2, axis=0)
+    left = base.freedom - len(along)
     variance = np.maximum(energy - gain, 1e-12 * energy) / max(left, 1)
     price = float(np.log(base.freedom))
-    found = _with_scales(base, each.hypothesis)
-    if found is None:
-        return np.asarray(gain / variance - each.hypothesis.candidate.freedom * price)
-    directions, size = directions_of(*found)
-    shapes = len(each.hypothesis.candidate.shape)
-    return worth_along(directions.T @ residuals, size, variance) - shapes * price
+    candidate = added.hypothesis.candidate
+    if added.sized is None:
+        return np.asarray(gain / variance - candidate.freedom * price)
+    return worth_along(moment, added.sized[1], variance) - len(candidate.shape) * price

@@ -6,7 +6,7 @@ again costs nothing in the number of units.
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array, Labels, Mask
 from wrist_stiffness.diagnosis.projection import Base
 
@@ -46,7 +46,7 @@ class BlockGrams:
     def __init__(
         self, evidence: Evidence, base: Base, hypotheses: list[Hypothesis], blocks: Labels
     ) -> None:
-        beyond = [base.beyond(each.columns) for each in hypotheses]
+        beyond = [addition(base, each).beyond for each in hypotheses]
         stacked = np.hstack([base.basis, *beyond, base.residual[:, None]])
         norm = np.linalg.norm(stacked, axis=0)
         stacked = stacked / np.where(norm > 0, norm, 1.0)
@@ -60,9 +60,9 @@ class BlockGrams:
         )
         self._priors = stacked[unit < 0].T @ stacked[unit < 0]
         sizes = [each.shape[1] for each in beyond]
-        starts = base.basis.shape[1] + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(int)
-        self._members = [np.arange(a, a + k) for a, k in zip(starts, sizes, strict=True)]
-        self._base = np.arange(base.basis.shape[1])
+        starts = np.cumsum([0, *sizes])[:-1]
+        self._members = [slice(a, a + k) for a, k in zip(starts, sizes, strict=True)]
+        self._n_base = base.basis.shape[1]
         self._scale = float(norm[-1] ** 2)
 
     @property
@@ -79,22 +79,13 @@ class BlockGrams:
             How often each block was drawn.
         """
         gram = np.tensordot(weights, self._grams, axes=1) + self._priors
-        return np.array(
-            [
-                self._energy(gram, self._base) - self._energy(gram, self._with(member))
-                for member in self._members
-            ]
-        )
-
-    def _with(self, member: Labels) -> Labels:
-        return np.concatenate([self._base, member])
-
-    def _weights(self, gram: Array, columns: Labels) -> Array:
-        system = gram[np.ix_(columns, columns)] + RIDGE * np.eye(len(columns))
-        return np.linalg.solve(system, gram[columns, -1])
-
-    def _energy(self, gram: Array, columns: Labels) -> float:
-        return self._scale * float(gram[-1, -1] - gram[columns, -1] @ self._weights(gram, columns))
+        gram[np.diag_indices(len(gram) - 1)] += RIDGE
+        p = self._n_base
+        # The base is eliminated once for all hypotheses (Schur complement).
+        beyond = gram[p:, p:] - gram[p:, :p] @ np.linalg.solve(gram[:p, :p], gram[:p, p:])
+        moment = beyond[:-1, -1]
+        own = (moment[m] @ np.linalg.solve(beyond[m, m], moment[m]) for m in self._members)
+        return self._scale * np.fromiter(own, float, len(self._members))
 
 
 def stability(grams: BlockGrams, inside: Mask, prices: Array, rng: np.random.Generator) -> float:

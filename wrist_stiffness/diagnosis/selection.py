@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f
 
-from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, refined
+from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition, refined
 from wrist_stiffness.diagnosis.permutation import rearrangements
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.ranking import Ranked, chance_of_best, rank
@@ -184,8 +184,8 @@ def marginal_gains(base: Base, entered: tuple[Entered, ...]) -> list[tuple[float
     gains = []
     for which in range(len(entered)):
         others = base_with(base, entered[:which] + entered[which + 1 :])
-        directions = others.directions(entered[which].hypothesis.columns)
-        gains.append((float(np.sum((directions.T @ others.residual) ** 2)), directions.shape[1]))
+        added = addition(others, entered[which].hypothesis)
+        gains.append((added.gain, added.directions.shape[1]))
     return gains
 
 

@@ -9,9 +9,9 @@ it, a right one explains it down to the floor.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, f
+from scipy.special import chdtrc, fdtrc
 
-from wrist_stiffness.diagnosis.hypotheses import Hypothesis
+from wrist_stiffness.diagnosis.hypotheses import Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array
 from wrist_stiffness.diagnosis.projection import Base
 
@@ -22,7 +22,7 @@ def effective_dimension(base: Base, hypotheses: list[Hypothesis]) -> float:
     Exponential of the entropy of the eigenvalue shares of the Gram matrix of unit columns
     (Roy and Vetterli 2007).
     """
-    columns = np.hstack([base.directions(each.columns) for each in hypotheses])
+    columns = np.hstack([addition(base, each).directions for each in hypotheses])
     if columns.shape[1] == 0:
         return 1.0
     size = np.linalg.eigvalsh(columns.T @ columns)
@@ -63,9 +63,9 @@ def lack_of_fit(energy: float, freedom: int, noise_dof: float) -> Excess:
         Degrees of freedom of the floor itself; infinite = known.
     """
     if np.isinf(noise_dof):
-        p_value = float(chi2.sf(energy, freedom))
+        p_value = float(chdtrc(freedom, energy))
     else:
-        p_value = float(f.sf(energy / freedom, freedom, noise_dof))
+        p_value = float(fdtrc(freedom, noise_dof, energy / freedom))
     significant = p_value < CHANCE_OF_STRUCTURE
     return Excess(max(0.0, energy - freedom) if significant else 0.0, p_value)
 

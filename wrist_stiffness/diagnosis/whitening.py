@@ -161,19 +161,21 @@ def innovations(
     gap = np.diff(times, prepend=times[0])
     fresh = np.diff(sessions, prepend=sessions[0] - 1) != 0
     memory = np.where(fresh, 0.0, np.exp(-gap / time_constant))
-    n, m, k = columns.shape
-    slow, white = np.sqrt(share), 1 - share
-    state, variance = np.zeros((m, k)), np.zeros(m)
-    result, log_sum = np.zeros((n, m, k)), 0.0
+    slow = np.where(measured, np.sqrt(share), 0.0)
+    total, gain = np.empty_like(slow), np.empty_like(slow)
+    variance = np.zeros(columns.shape[1])
     for i, a in enumerate(memory):
-        seen = measured[i]
-        state = a * state
         variance = a**2 * variance + (1 - a**2)
-        total = slow[i] ** 2 * variance + white[i]
-        surprise = np.where(seen[:, None], columns[i] - slow[i, :, None] * state, 0.0)
-        result[i] = surprise / np.sqrt(total)[:, None]
-        log_sum += float(np.log(total) @ seen)
-        gain = np.where(seen, slow[i] * variance / total, 0.0)
-        state = state + gain[:, None] * surprise
-        variance = variance * (1 - gain * slow[i])
-    return result, log_sum
+        total[i] = slow[i] ** 2 * variance + (1 - share[i])
+        gain[i] = slow[i] * variance / total[i]
+        variance = variance * (1 - gain[i] * slow[i])
+    # The gains do not depend on what is filtered: the long rows are left with three sums.
+    result = np.where(measured[:, :, None], columns, 0.0)
+    state = np.zeros(columns.shape[1:])
+    for i, a in enumerate(memory):
+        state *= a
+        surprise = result[i]
+        surprise -= slow[i, :, None] * state
+        state += gain[i, :, None] * surprise
+    result /= np.sqrt(total)[:, :, None]
+    return result, float(np.sum(np.log(total), where=measured))

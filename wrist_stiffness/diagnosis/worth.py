@@ -54,7 +54,7 @@ def worth_along(moment: Array, size: Array, variance: Array | float) -> Array:
     """
     own = size.reshape(-1, *(1,) * (moment.ndim - 1)) / variance
     square = (moment / variance) ** 2
-    trials = [
-        np.sum(w**2 * square / (1 + w**2 * own) - np.log1p(w**2 * own), axis=0) for w in WIDTHS
-    ]
-    return np.asarray(np.max(trials, axis=0))
+    width = np.square(WIDTHS).reshape(-1, *(1,) * moment.ndim)
+    shown = width * own
+    trials = np.sum(width * square / (1.0 + shown) - np.log1p(shown), axis=1)
+    return np.asarray(trials.max(axis=0))
