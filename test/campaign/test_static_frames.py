@@ -97,3 +97,25 @@ def test_a_frame_that_is_missing_for_its_transform_is_none_says_so(tmp_path, tra
     path = tracked.written(tmp_path / "bag")
     with pytest.raises(FrameError, match="bag: .*'tracker'.*static transform wrist_base -> track"):
         read_session(path, table)
+
+
+def test_frames_are_known_with_a_leading_slash_too(tmp_path, tracked, table):
+    """As what was written for ROS 1 names them."""
+    tracked.add(
+        "/tf_static",
+        tracked.joint_ns[0],
+        TFMessage((placed("/wrist_base", "/tracker", ORIGIN, TURN),)),
+    )
+    session = read_session(tracked.written(tmp_path / "bag"), table)
+    np.testing.assert_allclose(session.shift, tracked.shift, atol=1e-15)
+
+
+def test_a_chain_that_ends_elsewhere_says_so(tmp_path, tracked, table):
+    for step in (("world", "stand"), ("stand", "tracker"), ("wrist_platform", "ft")):
+        tracked.add("/tf_static", tracked.joint_ns[0], TFMessage((placed(*step, ORIGIN, TURN),)))
+    path = tracked.written(tmp_path / "bag")
+    told = "'tracker' is neither .* not to wrist_base or wrist_platform: stand, tracker, world$"
+    with pytest.raises(FrameError, match=told):
+        read_session(path, table)
+    with pytest.raises(FrameError, match=told):
+        export_csv(path, tmp_path / "poses.csv", table)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.static_transforms import sensor_frames, static_transform
@@ -86,3 +87,14 @@ def test_a_stream_knows_the_frames_and_the_parameter_goes_first():
     stream.on_static_transforms([transform("tool", "ft2", 1)])
     stream.loads.add(3, "ft2", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     assert np.allclose(stream.loads.at(3)[1].wrench[:3], (T[3] @ T[1])[:3, 2])
+
+
+def test_a_slash_before_a_name_does_not_count():
+    found = sensor_frames([transform("/wrist_platform", "/ft", 1)])
+    assert found.keys() == {"ft"}
+    mapped = Frames({"ft": SensorFrame("wrist_platform", position=np.array([0.0, 0.0, 0.1]))})
+    heavy = mapped.load("/ft", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert np.allclose(heavy.wrench, [1.0, 0.0, 0.0, 0.0, 0.1, 0.0])
+    assert Frames().load("/wrist_base", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)).wrench[0] == 1.0
+    assert np.allclose(Frames().in_base("/wrist_base", "pose")[1], 0.0)
+    assert frames_from_yaml("{/ft: {parent: wrist_platform}}").sensors.keys() == {"ft"}

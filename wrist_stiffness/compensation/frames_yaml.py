@@ -13,6 +13,7 @@ from wrist_stiffness.compensation.intake import (
     PLATFORM_FRAME,
     Frames,
     SensorFrame,
+    frame_name,
 )
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -49,7 +50,8 @@ def frames_from_yaml(text: str) -> Frames:
         return Frames()
     if not isinstance(values, dict):
         raise InputError(f"frames: {text!r} is no mapping by frame_id")
-    return Frames({str(name): _frame(str(name), entry) for name, entry in values.items()})
+    named = {frame_name(str(key)): entry for key, entry in values.items()}
+    return Frames({name: _frame(name, entry) for name, entry in named.items()})
 
 
 def _frame(name: str, entry: Any) -> SensorFrame:

@@ -117,6 +117,11 @@ def _places(motors: MotorNames, names: tuple[str, ...], what: str) -> tuple[int,
     return found[0], found[1]
 
 
+def frame_name(frame_id: str) -> str:
+    """Return the name of a frame: ROS 1 and what was written for it begin it with a slash."""
+    return frame_id.removeprefix("/")
+
+
 @dataclass(frozen=True)
 class SensorFrame:
     """A fixed transform from a sensor's frame to `wrist_base` or `wrist_platform`.
@@ -150,7 +155,7 @@ class Frames:
     Parameters
     ----------
     sensors : mapping of str to SensorFrame
-        By frame_id, beside `wrist_base` and `wrist_platform`.
+        By `frame_name`, beside `wrist_base` and `wrist_platform`.
     """
 
     sensors: Mapping[str, SensorFrame] = field(default_factory=dict)
@@ -178,7 +183,8 @@ class Frames:
             If a component is not finite.
         """
         known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: ON_PLATFORM}
-        frame = self.sensors.get(frame_id) or known.get(frame_id)
+        name = frame_name(frame_id)
+        frame = self.sensors.get(name) or known.get(name)
         if frame is None:
             names = ", ".join([*known, *self.sensors])
             raise FrameError(f"load: frame '{frame_id}' is not known (known: {names})")
@@ -216,11 +222,12 @@ class Frames:
             If the frame is neither `wrist_base` nor mapped to it.
         """
         known = {BASE_FRAME: IN_BASE} | {
-            name: frame for name, frame in self.sensors.items() if frame.parent == BASE_FRAME
+            own: frame for own, frame in self.sensors.items() if frame.parent == BASE_FRAME
         }
-        if frame_id not in known:
+        name = frame_name(frame_id)
+        if name not in known:
             raise FrameError(
                 f"{what}: frame '{frame_id}' is neither {BASE_FRAME} nor mapped to it "
                 f"(known: {', '.join(known)})"
             )
-        return known[frame_id].rotation, known[frame_id].position
+        return known[name].rotation, known[name].position

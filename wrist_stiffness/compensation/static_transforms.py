@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import BASE_FRAME, PLATFORM_FRAME, SensorFrame
+from wrist_stiffness.compensation.intake import (
+    BASE_FRAME,
+    PLATFORM_FRAME,
+    SensorFrame,
+    frame_name,
+)
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
@@ -62,7 +67,8 @@ def static_transform(
     norm = float(np.linalg.norm(numbers[3:]))
     if not np.all(np.isfinite(numbers)) or abs(norm - 1.0) > UNIT_TOLERANCE:
         raise InputError(f"static transform {parent} -> {child}: {numbers.tolist()} is none")
-    return StaticTransform(parent, child, Rotation.from_quat(numbers[3:]).as_matrix(), numbers[:3])
+    names = frame_name(parent), frame_name(child)
+    return StaticTransform(*names, Rotation.from_quat(numbers[3:]).as_matrix(), numbers[:3])
 
 
 def sensor_frames(transforms: Iterable[StaticTransform]) -> dict[str, SensorFrame]:

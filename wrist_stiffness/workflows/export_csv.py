@@ -36,7 +36,7 @@ from wrist_stiffness.campaign.reading.static_frames import frames_of
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
@@ -119,11 +119,14 @@ def export_csv(
     samples = read_samples(source, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(source, samples, remaps or {})
     notes, _ = notes_of(samples)
-    frames, unusable = frames_of(source, remaps or {}, settings.frames)
-    machine = machine_signals(samples, frames)
-    time_ns, measured, names, markers = _measured(samples, frames)
+    known = frames_of(source, remaps or {}, settings.frames)
+    try:
+        machine = machine_signals(samples, known.frames)
+        time_ns, measured, names, markers = _measured(samples, known.frames)
+    except FrameError as error:
+        raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error
     usable, unknown = machine.usable(time_ns, settings.load_age_limit_s)
-    remarks = (*unusable, *unknown)
+    remarks = (*known.remarks, *unknown)
     if not usable.any():
         raise InputError(f"{source.path}: no measured pose can be used: {'; '.join(remarks)}")
     time_ns, measured = time_ns[usable], measured[usable]

@@ -133,19 +133,19 @@ def read_session(
     samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(recording, samples, remaps or {})
     notes, unread = notes_of(samples)
-    known, unusable = frames_of(recording, remaps or {}, frames or Frames())
+    known = frames_of(recording, remaps or {}, frames or Frames())
     try:
-        machine = machine_signals(samples, known)
+        machine = machine_signals(samples, known.frames)
         markers = table.geometry.platform.readout_points
-        track = pose_track(samples, markers, known)
+        track = pose_track(samples, markers, known.frames)
         session = _session(recording.path.name, machine, track, table, load_age_limit_s)
     except (FrameError, InputError, RecordingError) as error:
-        hints = unusable if isinstance(error, FrameError) else [str(f) for f in samples.faults]
+        hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
     damage = [f"the recording is damaged: {recording.damage}"] if recording.damage else []
     faults = [str(fault) for fault in samples.faults]
     other = _another_geometry(notes, table)
-    said = (*damage, *unread, *other, *unusable, *faults, *session.remarks)
+    said = (*damage, *unread, *other, *known.remarks, *faults, *session.remarks)
     return replace(session, notes=notes, remarks=said)
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.intake import BASE_FRAME, PLATFORM_FRAME, Frames
 from wrist_stiffness.compensation.static_transforms import (
     StaticTransform,
     sensor_frames,
@@ -17,13 +18,46 @@ from wrist_stiffness.recording.messages import TFMessage, TransformStamped
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.topics import TF_STATIC
 
+MOST_NAMED = 6
+"""Frames that one hint lists."""
+
 SAME = 1e-6
 """Largest difference of two transforms that are the same [m, rad]."""
 
 
-def frames_of(
-    recording: Recording, remaps: Mapping[str, str], mapped: Frames
-) -> tuple[Frames, list[str]]:
+@dataclass(frozen=True)
+class KnownFrames:
+    """The frames in which the sensors of a recording may speak.
+
+    Parameters
+    ----------
+    frames : Frames
+        All of them.
+    remarks : tuple of str
+        Transforms that cannot be used, or that contradict an earlier one.
+    elsewhere : tuple of str
+        Frames on `/tf_static` that nothing ties to `wrist_base` or `wrist_platform`.
+    """
+
+    frames: Frames
+    remarks: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
+
+    @property
+    def hints(self) -> tuple[str, ...]:
+        """What may be the reason where a frame is not known."""
+        if not self.elsewhere:
+            return self.remarks
+        names = ", ".join(self.elsewhere[:MOST_NAMED])
+        more = ", ..." if len(self.elsewhere) > MOST_NAMED else ""
+        return (
+            *self.remarks,
+            f"{TF_STATIC} ties these to one another but not to {BASE_FRAME} or {PLATFORM_FRAME}: "
+            f"{names}{more}",
+        )
+
+
+def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -> KnownFrames:
     """Return the frames in which sensors may speak, as the nodes learn them.
 
     Parameters
@@ -37,14 +71,12 @@ def frames_of(
 
     Returns
     -------
-    Frames
-        All of them.
-    list of str
-        Transforms that cannot be used, or that contradict an earlier one.
+    KnownFrames
+        And what is wrong with others.
     """
     topic = remaps.get(TF_STATIC, TF_STATIC)
     if topic not in {info.name for info in recording.topics}:
-        return mapped, []
+        return KnownFrames(mapped)
     found: dict[str, StaticTransform] = {}
     remarks: dict[str, None] = {}
     for _, _, message in recording.messages([topic]):
@@ -61,7 +93,10 @@ def frames_of(
                     f"then in {step.parent!r}: the later one is used all along"
                 ] = None
             found[step.child] = step
-    return Frames({**sensor_frames(found.values()), **mapped.sensors}), list(remarks)
+    sensors = {**sensor_frames(found.values()), **mapped.sensors}
+    named = {name for step in found.values() for name in (step.parent, step.child)}
+    elsewhere = sorted(named - {BASE_FRAME, PLATFORM_FRAME, *sensors})
+    return KnownFrames(Frames(sensors), tuple(remarks), tuple(elsewhere))
 
 
 def _same(one: StaticTransform, other: StaticTransform) -> bool:
