@@ -1,6 +1,7 @@
 """Bad recordings: a clear error, or a result that says what it could not use."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -232,6 +233,23 @@ def test_dropouts_are_counted(tmp_path, campaign, complete, table):
     session = read_session(campaign.written(tmp_path / "bag"), table)
     assert session.measured.all(axis=1).sum() == 769
     assert "measured pose: 30 of 799 lost by the instrument" in session.remarks
+
+
+def test_positions_stay_where_only_the_orientation_is_not_a_number(tmp_path, campaign, table):
+    shift = 5e-6 * np.random.default_rng(5).standard_normal((799, 3))
+    campaign.with_joints().with_loads().with_poses(shift)
+    poses = [i for i, entry in enumerate(campaign.entries) if isinstance(entry[2], PoseStamped)]
+    for i in poses[::5]:
+        topic, stamp, message = campaign.entries[i]
+        blind = type(message.pose.orientation)(*[float("nan")] * 4)
+        pose = replace(message.pose, orientation=blind)
+        campaign.entries[i] = (topic, stamp, PoseStamped(message.header, pose))
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert session.measured[:, :3].all()
+    np.testing.assert_allclose(session.shift, shift, atol=1e-15)
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(session.rotation[:, 0, 0])) % 5, 0)
+    told = "measured pose: 160 of 799 orientations are not finite: of these the position"
+    assert any(remark.startswith(told) for remark in session.remarks)
 
 
 def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign, table):

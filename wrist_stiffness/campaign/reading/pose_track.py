@@ -149,9 +149,8 @@ def measured_components(poses: PoseSamples) -> tuple[Array, Array]:
     """
     huge = np.diagonal(poses.covariance, axis1=1, axis2=2) >= NOT_MEASURED
     position, quaternion = poses.position.copy(), poses.quaternion.copy()
-    unturned = huge[:, 3:].any(axis=1)
-    # NaN has no norm near one either.
-    broken = ~(np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= UNIT_TOLERANCE) & ~unturned
+    unturned = huge[:, 3:].any(axis=1) | ~np.isfinite(quaternion).all(axis=1)
+    broken = (np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) > UNIT_TOLERANCE) & ~unturned
     position[huge[:, :3] | ~np.isfinite(position) | broken[:, None]] = np.nan
     quaternion[unturned | broken] = np.nan
     return position, quaternion
@@ -175,6 +174,12 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
         remarks.append(
             f"{what}: {partly} of {len(shift)} orientations are measured in part only (a huge "
             "variance for some turn): all three turns of these are left out"
+        )
+    blind = ~huge[:, 3:].any(axis=1) & ~np.isfinite(poses.quaternion).all(axis=1)
+    if alone := int((blind & np.isfinite(shift).any(axis=1)).sum()):
+        remarks.append(
+            f"{what}: {alone} of {len(shift)} orientations are not finite: of these the position "
+            "alone is used"
         )
     lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
     return _in_time_order(poses.time_ns, shift + origin, rotation, covariance, what, lost, remarks)
