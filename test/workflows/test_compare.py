@@ -69,6 +69,17 @@ def test_the_error_falls_to_the_noise_with_the_right_model(compared):
     assert "no more than the noise" in printed
 
 
+def test_a_model_as_drawn_that_fails_is_to_be_calibrated_first(compared, tmp_path):
+    told = "was never fitted to a wrist"
+    printed, values, _ = compared
+    assert not any(told in note for note in values["notes"])  # The last one does not fail.
+    out = tmp_path / "drawn.json"
+    assert main(["compare", str(DATA / "wrist_b.mcap"), "--json", str(out)]) == 0
+    (note,) = (n for n in json.loads(out.read_text())["notes"] if told in n)
+    assert note.startswith("palmieri2015_model ")
+    assert note.endswith("calibrate first, then compare again")
+
+
 def test_terminal_file_and_page_say_the_same(compared):
     printed, values, page = compared
     for line in values["verdict"]:

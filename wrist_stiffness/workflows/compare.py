@@ -13,6 +13,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import compare_models
 from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, Size
+from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING
 from wrist_stiffness.campaign.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import SOURCES
@@ -42,6 +43,8 @@ class Compared:
         What could not be used of the recordings.
     fitted_here : tuple of str
         Models that were fitted to one of these very recordings.
+    as_drawn : bool
+        Whether the last model was never fitted to any recording.
     provenance : Provenance
         Files and versions.
     """
@@ -50,6 +53,7 @@ class Compared:
     border: Array
     remarks: tuple[str, ...]
     fitted_here: tuple[str, ...]
+    as_drawn: bool
     provenance: Provenance
 
     def worst(self, model: ComparedModel) -> tuple[WorstPose, ...]:
@@ -64,7 +68,14 @@ class Compared:
             f"{name} was fitted to one of these recordings: its error here flatters it"
             for name in self.fitted_here
         )
-        return (*self.remarks, *fitted)
+        last, found = self.comparison.models[-1], self.comparison
+        if not self.as_drawn or found.over_floor(last) < WORTH_ASKING:
+            return (*self.remarks, *fitted)
+        drawn = (
+            f"{last.name} was never fitted to a wrist, and each is built a little off its drawing: "
+            "calibrate first, then compare again"
+        )
+        return (*self.remarks, *fitted, drawn)
 
     def lines(self) -> list[str]:
         """Return the answer for a terminal."""
@@ -184,6 +195,7 @@ def compare(
         table.workspace.operative_border,
         remarks_of(sessions.values()),
         fitted_here,
+        not loaded[-1][1].lineage,
         Provenance(run.command, run.date, files, hashes),
     )
 
