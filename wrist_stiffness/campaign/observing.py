@@ -111,24 +111,29 @@ class UnitSession:
         sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
         return np.asarray(np.stack(sums, axis=1).reshape(units, *values.shape[1:]), dtype=float)
 
+    @cached_property
+    def _turned(self) -> tuple[Mask, Array]:
+        """Which units have a measured rotation, (u,), and the rotations (u, 3, 3)."""
+        known = np.asarray(np.isfinite(self.turn).all(axis=1))
+        return known, Rotation.from_rotvec(np.where(known[:, None], self.turn, 0.0)).as_matrix()
+
     def residual(self, twist: Array) -> Array:
-        """Return log(T_measured T_predicted^-1) at O in F, (u, 6) [m, rad].
+        """Return log(T_measured T_predicted^-1) at O in F, (..., u, 6) [m, rad].
 
         Parameters
         ----------
-        twist : (u, 6) float
+        twist : (..., u, 6) float
             Predicted pose error of each unit [m, rad].
         """
         rotation, shift = exp_twist(twist)
-        known = np.asarray(np.isfinite(self.turn).all(axis=1))
-        measured = Rotation.from_rotvec(np.where(known[:, None], self.turn, 0.0)).as_matrix()
+        known, measured = self._turned
         # Without a measured rotation the predicted one stands in: then s is compared with s.
         measured = np.where(known[:, None, None], measured, rotation)
         left = measured @ np.swapaxes(rotation, -1, -2)
         moved = self.shift - (left @ shift[..., None])[..., 0]
         out = log_motion(left, np.nan_to_num(moved))
-        out[:, :3][~np.isfinite(self.shift)] = np.nan
-        out[~known, 3:] = np.nan
+        out[..., :3][..., ~np.isfinite(self.shift)] = np.nan
+        out[..., ~known, 3:] = np.nan
         return out
 
 

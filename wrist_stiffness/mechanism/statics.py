@@ -104,22 +104,31 @@ def weight_response(
     WeightResponse
         Wrenches through the components, their screws and the platform's twist.
     """
-    return _weight_response(
-        configuration,
-        components,
-        gravity,
-        influence(configuration),
-        turned_flexibilities(configuration, components),
-    )
+    projectors = influence(configuration)
+    wrench = weight_wrench(configuration, components, gravity, projectors)
+    screw = (turned_flexibilities(configuration, components) @ wrench[..., None])[..., 0]
+    return WeightResponse(wrench, screw, platform_twist(projectors, screw))
 
 
-def _weight_response(
+def weight_wrench(
     configuration: Configuration,
     components: ElasticComponents,
     gravity: Array,
     projectors: Influence,
-    flexibility: Array,
-) -> WeightResponse:
+) -> Array:
+    """Return the wrench of own weight through the elastic components, (..., 8, 6) [N, N m].
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of shape (...).
+    components : ElasticComponents
+        Condensed parts with their weights.
+    gravity : (3,) float
+        Acceleration of gravity in F [m/s^2].
+    projectors : Influence
+        Of the configuration.
+    """
     r = component_rotations(configuration)
     field = _to_body(r, gravity)
     motor_side, platform_side = (
@@ -130,9 +139,7 @@ def _weight_response(
         np.swapaxes(projectors.of_components(), -1, -2),
         platform_weight(configuration, components, gravity)[..., None, :],
     )
-    wrench = carried + projectors.through_components(motor_side, platform_side)
-    screw = (flexibility @ wrench[..., None])[..., 0]
-    return WeightResponse(wrench, screw, platform_twist(projectors, screw))
+    return np.asarray(carried + projectors.through_components(motor_side, platform_side))
 
 
 def platform_weight(
@@ -226,9 +233,42 @@ def contact_operators(
         Of the same leading shape; m = 0 sectors if no joint has a flange.
     """
     projectors = influence(configuration)
-    flexibility = turned_flexibilities(configuration, components)
-    weight = _weight_response(configuration, components, gravity, projectors, flexibility)
-    sums = _summed(configuration, projectors, components, flexibility, gravity, weight.wrench)
+    return assembled_operators(
+        configuration,
+        projectors,
+        components,
+        turned_flexibilities(configuration, components),
+        gravity,
+        weight_wrench(configuration, components, gravity, projectors),
+    )
+
+
+def assembled_operators(
+    configuration: Configuration,
+    projectors: Influence,
+    components: ElasticComponents,
+    flexibility: Array,
+    gravity: Array,
+    wrench: Array,
+) -> ContactOperators:
+    """Do the same where what it rests on is known.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of shape (...).
+    projectors : Influence
+        Of the configuration.
+    components : ElasticComponents
+        Condensed parts.
+    flexibility : (..., 8, 6, 6) float
+        Of the components at O in F at the pose [m/N, rad/N, rad/(N m)].
+    gravity : (3,) float
+        Acceleration of gravity in F [m/s^2].
+    wrench : (..., 8, 6) float
+        Of own weight through the components [N, N m].
+    """
+    sums = _summed(configuration, projectors, components, flexibility, gravity, wrench)
     return ContactOperators(
         **vars(sums), slide=components.sectors.slide, slides=projectors.slides()
     )
@@ -316,36 +356,55 @@ def _summed(
         own = np.searchsorted(which, own[mine])
     g, rows = projectors.of_components()[..., part, :, :], projectors.slides()[..., part, :, :]
     r = component_rotations(configuration)[..., part, :, :]
-    carry = block_diagonal(g)
     through = wrench[..., part, :]
-    sagged = (flexibility @ through[..., None])[..., 0]
+    sagged = flexibility @ through[..., None]
+    # Sums over the components by one product each: side by side, then below each other.
+    carry, slid = _beside(block_diagonal(g)), _beside(rows)
 
     # A unit slide force of each passive joint: by virtual work it pulls at the components with the
     # rows that map their translations to the slides.
     bent = flexibility[..., :3] @ np.swapaxes(rows, -1, -2)
-    slide_flexibility = (rows @ bent[..., :3, :]).sum(axis=-3)
-    slide_twist = (carry @ bent).sum(axis=-3)
+    slide_flexibility = slid @ _below(bent[..., :3, :])
+    slide_twist = carry @ _below(bent)
 
     # What a unit force of each sector does through its own bushing.
-    screw = _turned(r.take(own, axis=-3), sectors.screw[mine])
-    screw_slide = rows.take(own, axis=-3) @ screw[..., :3, None]
-    coupling = sectors.slide @ np.swapaxes(screw_slide[..., 0], -1, -2)
-    # In place: the largest arrays here, and new memory costs more than the sums.
-    approach = sectors.slide @ slide_flexibility @ sectors.slide.T
+    screw, screw_slide, screw_twist = (np.empty((*r.shape[:-3], len(own), k)) for k in (6, 3, 6))
+    for component in np.unique(own):
+        beside = own == component
+        turned = _turned(r[..., component, None, :, :], sectors.screw[mine][beside])
+        screw[..., beside, :] = turned
+        screw_slide[..., beside, :] = turned[..., :3] @ np.swapaxes(
+            rows[..., component, :, :], -1, -2
+        )
+        screw_twist[..., beside, :] = _turned(g[..., component, None, :, :], turned)
+    # Half of a symmetric sum.
+    half = 0.5 * slide_flexibility @ sectors.slide.T
+    half[..., mine] += np.swapaxes(screw_slide, -1, -2)
+    approach = sectors.slide @ half
+    approach = approach + np.swapaxes(approach, -1, -2)
     approach += sectors.approach
-    approach[..., mine] += coupling
-    approach[..., mine, :] += np.swapaxes(coupling, -1, -2)
     force_twist = slide_twist @ sectors.slide.T
-    force_twist[..., mine] += np.swapaxes(_turned(g.take(own, axis=-3), screw), -1, -2)
+    force_twist[..., mine] += np.swapaxes(screw_twist, -1, -2)
 
-    gap = sectors.gap + np.einsum("...kij,...kj->...i", rows, sagged[..., :3]) @ sectors.slide.T
+    gap = sectors.gap + (slid @ _below(sagged[..., :3, :]))[..., 0] @ sectors.slide.T
     field = _to_body(r, gravity).take(own, axis=-3)
     gap[..., mine] += (sectors.weight_approach[mine, None, :] @ field)[..., 0, 0]
     gap[..., mine] += (screw * through.take(own, axis=-2)).sum(axis=-1)
     return _Sums(
-        compliance=(carry @ flexibility @ np.swapaxes(carry, -1, -2)).sum(axis=-3),
+        compliance=carry @ _below(flexibility @ np.swapaxes(block_diagonal(g), -1, -2)),
         force_twist=force_twist,
         approach=approach,
         gap=gap,
-        weight_twist=_turned(g, sagged).sum(axis=-2),
+        weight_twist=(carry @ _below(sagged))[..., 0],
     )
+
+
+def _beside(matrices: Array) -> Array:
+    """Put the c matrices (..., c, i, j) of each pose side by side, (..., i, c j)."""
+    moved = np.swapaxes(matrices, -3, -2)
+    return moved.reshape(*moved.shape[:-2], -1)
+
+
+def _below(matrices: Array) -> Array:
+    """Put the c matrices (..., c, i, j) of each pose below each other, (..., c i, j)."""
+    return matrices.reshape(*matrices.shape[:-3], -1, matrices.shape[-1])

@@ -13,10 +13,10 @@ from wrist_stiffness.mechanism.influence import Influence, influence
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import (
     ContactOperators,
+    assembled_operators,
     changed_operators,
-    contact_operators,
     turned_flexibilities,
-    weight_response,
+    weight_wrench,
 )
 from wrist_stiffness.model.block import Block
 
@@ -79,7 +79,14 @@ class BlockStatics:
         """Elastic operators of shape (n,)."""
         if self.evaluation == "spline":
             return self.table.operators_at(self.configuration, "spline")
-        return contact_operators(self.configuration, self.parts, self.table.geometry.gravity)
+        return assembled_operators(
+            self.configuration,
+            self.influence,
+            self.parts,
+            self.turned_flexibility,
+            self.table.geometry.gravity,
+            self.own_weight,
+        )
 
     @cached_property
     def influence(self) -> Influence:
@@ -99,7 +106,9 @@ class BlockStatics:
     @cached_property
     def own_weight(self) -> Array:
         """Wrench of own weight through the elastic components, (n, 8, 6) [N, N m]."""
-        return weight_response(self.configuration, self.parts, self.table.geometry.gravity).wrench
+        return weight_wrench(
+            self.configuration, self.parts, self.table.geometry.gravity, self.influence
+        )
 
     @cached_property
     def told(self) -> tuple[Array, Array]:

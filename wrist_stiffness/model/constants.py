@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,9 @@ from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 SEATS = tuple((LIMB[names[0]], BODIES.index(BODY[names[0]])) for names in GROUPS)
 """Limb and body of each row of screws."""
+
+_BODIES = np.array([body for _, body in SEATS])
+_LIMBS = {limb: [n for n, seat in enumerate(SEATS) if seat[0] == limb] for limb, _ in SEATS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,21 +46,29 @@ class Constants:
     sensor_right: Array | None = None
     warnings: tuple[str, ...] = ()
 
-    def with_home(self, place: str, added: Contribution, warnings: Sequence[str]) -> Constants:
-        """Return the sum with what a place adds at home, a contribution of one sample."""
-        screws = self.screws
+    @classmethod
+    def of_home(cls, place: str, added: Contribution, warnings: tuple[str, ...]) -> Constants:
+        """Return what a place adds at home, a contribution of one sample."""
         screw = added.limb_1 if added.limb_2 is None else added.limb_2
+        screws = None
         if screw is not None:
             joint = MOTOR_JOINT.get(place, place)
-            here = np.array([joint in names for names in GROUPS])[:, None] * screw[0]
-            screws = here if screws is None else screws + here
+            screws = np.array([joint in names for names in GROUPS])[:, None] * screw[0]
+        wrench, gap, left, right = (
+            None if value is None else value[0]
+            for value in (added.wrench, added.gap, added.sensor_left, added.sensor_right)
+        )
+        return cls(screws, wrench, gap, left, right, warnings)
+
+    def __add__(self, other: Constants) -> Constants:
+        """Return both together."""
         return Constants(
-            screws,
-            _sum(self.wrench, added.wrench),
-            _sum(self.gap, added.gap),
-            _sum(self.sensor_left, added.sensor_left),
-            _sum(self.sensor_right, added.sensor_right),
-            (*self.warnings, *warnings),
+            _sum(self.screws, other.screws),
+            _sum(self.wrench, other.wrench),
+            _sum(self.gap, other.gap),
+            _sum(self.sensor_left, other.sensor_left),
+            _sum(self.sensor_right, other.sensor_right),
+            self.warnings + other.warnings,
         )
 
     def sensor(self, configuration: Configuration) -> tuple[Array | None, Array | None]:
@@ -71,9 +81,8 @@ class Constants:
         n = len(configuration.theta)
         limbs: dict[str, Array] = {}
         if self.screws is not None:
-            for (limb, body), screw in zip(SEATS, self.screws, strict=True):
-                turned = _turned(configuration.bodies[..., body, :, :], screw)
-                limbs[limb] = limbs[limb] + turned if limb in limbs else turned
+            turned = _turned(configuration.bodies.take(_BODIES, axis=-3), self.screws)
+            limbs = {limb: turned[..., rows, :].sum(axis=-2) for limb, rows in _LIMBS.items()}
         return Contribution(
             **limbs,
             wrench=_each(self.wrench, n),
@@ -82,9 +91,9 @@ class Constants:
 
 
 def _sum(known: Array | None, added: Array | None) -> Array | None:
-    if added is None:
-        return known
-    return added[0] if known is None else known + added[0]
+    if known is None or added is None:
+        return added if known is None else known
+    return known + added
 
 
 def _each(value: Array | None, n: int) -> Array | None:
@@ -92,6 +101,6 @@ def _each(value: Array | None, n: int) -> Array | None:
 
 
 def _turned(rotation: Array, six: Array) -> Array:
-    """Turn a 6-vector (6,) by rotations (..., 3, 3), (..., 6)."""
-    halves = six.reshape(2, 3) @ np.swapaxes(rotation, -1, -2)
+    """Turn 6-vectors (6,) or (k, 6) by rotations (..., 3, 3) or (..., k, 3, 3), (..., 6)."""
+    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(rotation, -1, -2)
     return halves.reshape(*rotation.shape[:-2], 6)

@@ -25,7 +25,7 @@ from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.situation import lengths
-from wrist_stiffness.model.stages import Memory, constants_of, share
+from wrist_stiffness.model.stages import AtHome, Memory, constants_of, share
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class ErrorModel:
     @cached_property
     def constants(self) -> Constants:
         """What the constant effects add together."""
-        return constants_of(self.effects, self.table, self.parts)
+        return constants_of(self.effects, self.parts, AtHome(self.table))
 
     @cached_property
     def changing(self) -> tuple[Effect, ...]:

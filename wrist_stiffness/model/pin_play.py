@@ -97,29 +97,29 @@ class Play:
     def _newton(self, x: Array, wall: float, tolerance: float) -> tuple[Array, bool]:
         """Return where the steps end, (n, 4), and whether all pins rest there."""
         x, rows, left = x.copy(), np.arange(len(x)), self
-        active = None
+        energy, gradient, active = self._state(x, wall, None)
         for _ in range(MAX_STEPS):
-            energy, gradient, active = left._state(x[rows], wall, active)
             bound = tolerance * (1.0 + np.abs(left.force).max(axis=1))
             moving = np.abs(gradient).max(axis=1) > bound
             if not moving.any():
                 return x, True
-            rows, left = rows[moving], left.take(moving)
-            energy, gradient, active = energy[moving], gradient[moving], active[moving]
+            if not moving.all():
+                rows, left = rows[moving], left.take(moving)
+                energy, gradient, active = energy[moving], gradient[moving], active[moving]
             hessian = left._hessian(x[rows], wall, active)
             step = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
             slope = np.einsum("ni,ni->n", gradient, step)
-            size = np.ones(len(rows))
-            far = np.arange(len(rows))
-            for _ in range(MAX_HALVINGS):
+            start, size, far = energy.copy(), np.ones(len(rows)), np.arange(len(rows))
+            for halved in range(MAX_HALVINGS):
+                size[far] *= 0.5 if halved else 1.0
                 tried = x[rows[far]] + size[far, None] * step[far]
-                reached = left.take(far)._state(tried, wall, active[far])[0]
+                part = left if len(far) == len(rows) else left.take(far)
+                energy[far], gradient[far], active[far] = part._state(tried, wall, active[far])
                 # Rounding of the energy is no reason to stay.
-                enough = energy[far] + ARMIJO * size[far] * slope[far] + 1e-14 * np.abs(energy[far])
-                far = far[reached > enough]
+                enough = start + ARMIJO * size * slope + 1e-14 * np.abs(start)
+                far = far[energy[far] > enough[far]]
                 if len(far) == 0:
                     break
-                size[far] *= 0.5
             x[rows] += size[:, None] * step
         return x, False
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,7 +39,7 @@ class Situation:
         Sum of what the model's constant effects add.
     given : Contribution
         Sum of what its other effects added in earlier stages.
-    guess : (m,) bool or Held or None
+    guess : (m,) or (n, m) bool or Held or None
         First guess of the contact state.
     """
 
@@ -156,9 +156,21 @@ class Situation:
         return twist + added[0], gap + added[1]
 
     @cached_property
+    def contact(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Forces (n, m) [N] and state (n, m) of the flanges under all that was added so far."""
+        return solve_contacts(self.operators.approach, self.free[1], self.guess)
+
+    @property
     def contact_force(self) -> Array:
         """Force of the flange sectors under all that earlier stages added, (n, m) [N]."""
-        return solve_contacts(self.operators.approach, self.free[1], self.guess)[0]
+        return self.contact[0]
+
+    def with_more(self, given: Contribution) -> Situation:
+        """Return the situation after a further stage, with all that was given so far."""
+        known, guess = self.__dict__.get("contact"), self.guess
+        if known is not None and not isinstance(guess, Held):
+            guess = known[1]
+        return replace(self, given=given, guess=guess)
 
     @cached_property
     def through(self) -> Array:

@@ -201,57 +201,72 @@ def _after(
         other = like.added(SAMPLE_STAGES[number])
         if len(other) == len(added) and all(map(_same, other, added)):
             return like.situations[number + 1]
-    return replace(at, given=sum(added, at.given))
+    return at.with_more(sum(added, at.given))
 
 
 def _same(one: object, other: object) -> bool:
     return one is other
 
 
-def constants_of(
-    effects: Sequence[Effect],
-    table: Table,
-    parts: ElasticComponents,
-    known: dict[int, Contribution] | None = None,
-) -> Constants:
+class AtHome:
+    """What constant effects add at home; models of one table share it.
+
+    Parameters
+    ----------
+    table : Table
+        Geometry and mechanism.
+    """
+
+    def __init__(self, table: Table) -> None:
+        self.table = table
+        self._known: dict[int, tuple[Effect, Constants]] = {}
+
+    @cached_property
+    def _situation(self) -> Situation:
+        return _home(self.table, self.table.components)
+
+    def of(self, effect: Effect, parts: ElasticComponents) -> Constants:
+        """Return what an effect adds in a model with these elastic parts."""
+        if effect.law.foreign:
+            # Only a user's own law may look at the parts.
+            return self._added(effect, _home(self.table, parts))
+        if id(effect) not in self._known:
+            # With the effect itself, so that no other one can get its identity.
+            self._known[id(effect)] = effect, self._added(effect, self._situation)
+        return self._known[id(effect)][1]
+
+    @staticmethod
+    def _added(effect: Effect, home: Situation) -> Constants:
+        added, _ = _advanced_by(effect, home, None)
+        return Constants.of_home(effect.component, added, _first_order(effect, added))
+
+
+def constants_of(effects: Sequence[Effect], parts: ElasticComponents, at_home: AtHome) -> Constants:
     """Put the constant ones of some effects together, as they are at home.
 
     Parameters
     ----------
     effects : sequence of Effect
         Of a model.
-    table : Table
-        Geometry and mechanism.
     parts : ElasticComponents
         Elastic parts as they are with the model's effects.
-    known : dict of int to Contribution, optional
-        What effects add at home, by their identities, for models that share them; filled.
+    at_home : AtHome
+        Of the model's table.
     """
-    constants = Constants()
-    known = {} if known is None else known
-    home: Situation | None = None
-    for effect in effects:
-        if not effect.law.constant:
-            continue
-        # Only a user's own law may look at the parts.
-        if effect.law.foreign or id(effect) not in known:
-            home = home or _home(table, parts)
-            known[id(effect)], _ = _advanced_by(effect, home, None)
-        added = known[id(effect)]
-        constants = constants.with_home(effect.component, added, _first_order(effect, added))
-    return constants
+    found = (at_home.of(effect, parts) for effect in effects if effect.law.constant)
+    return sum(found, Constants())
 
 
 def share(models: Sequence[Evaluable]) -> None:
     """Let models of one table share what follows from effects that they share with the first."""
-    home: dict[int, Contribution] = {}
+    at_home = AtHome(models[0].table)
+    wanted = {"parts": _of_parts(models[0]), "constants": _of_constants(models[0])}
     for model in models:
         for name, chosen in (("parts", _of_parts), ("constants", _of_constants)):
-            if chosen(model) == chosen(models[0]):
+            if chosen(model) == wanted[name]:
                 model.__dict__[name] = getattr(models[0], name)
         if "constants" not in model.__dict__:
-            own = constants_of(model.effects, model.table, model.parts, home)
-            model.__dict__["constants"] = own
+            model.__dict__["constants"] = constants_of(model.effects, model.parts, at_home)
 
 
 def _of_parts(model: Evaluable) -> list[Effect]:
