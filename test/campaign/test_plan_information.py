@@ -166,7 +166,7 @@ def test_visits_add_up_and_rivals_without_data_are_equally_large(known):
 
 
 def test_a_rival_is_what_fits_the_data_that_the_best_member_explains(model, timeline, evaluated):
-    """Against one least squares over all measurements, the rival's prior and the nuisances' in."""
+    """As the rival stands, and what that leaves by one least squares over all measurements."""
     nuisances, effects = evaluated
     best, rival = effects[0], effects[2]
     known = information(timeline, nuisances, NUISANCES[:1], effects, model.table, NOISE)
@@ -174,7 +174,12 @@ def test_a_rival_is_what_fits_the_data_that_the_best_member_explains(model, time
         known.total, known.layout, [[best.name, rival.name]], np.random.default_rng(0)
     )
     stacked = np.concatenate(
-        [*(each.columns for each in nuisances), rival.columns, best.truths], axis=2
+        [
+            *(each.columns for each in nuisances),
+            rival.columns,
+            best.truths - rival.truths[..., :1],
+        ],
+        axis=2,
     )
     white = np.vstack(whitened(timeline, stacked, model.table, NOISE))
     count = rival.columns.shape[2]
@@ -187,6 +192,8 @@ def test_a_rival_is_what_fits_the_data_that_the_best_member_explains(model, time
     assert truths.combined[p + known.layout.columns[rival.name], place] == pytest.approx(
         fitted, rel=1e-6
     )
+    whole = p + known.layout.truths[rival.name]
+    assert truths.combined[whole, place] == pytest.approx([1.0, 0.0])
 
 
 def test_draws_are_as_wide_as_the_data_leave_the_values(known):

@@ -42,7 +42,10 @@ def summary(plan: Plan, question: Question) -> str:
     if question.goals is not None:
         lines += _listed("will settle:", map(_line, settled))
     longer = [a for a in (*seen, *pairs) if not a.settled and a.reachable]
-    lines += _listed("needs more time than this plan has:", map(_line, _weakest(longer)))
+    lines += _listed(
+        "may stay open; diagnose the new recordings too and plan again, or give it more time:",
+        map(_line, _weakest(longer)),
+    )
     never = [a for a in (*seen, *pairs) if not a.reachable]
     lines += _listed(
         f"no experiment of this kind with these loads settles, even {LONGER:g} times as long as "

@@ -266,9 +266,18 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
     (..., g) float
         d in standard deviations; over several truths, what errs as often as they do on average.
     """
+    squares = np.zeros((*gram.shape[:-2], len(goals)))
+    for number, own in enumerate(by_truth(gram, layout, goals)):
+        wrong = logsumexp(-0.125 * own**2, axis=-1) - np.log(own.shape[-1])
+        squares[..., number] = np.maximum(-8.0 * wrong, 0.0)
+    return np.sqrt(squares)
+
+
+def by_truth(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
+    """Return the discriminations (..., t) of each goal at each of its t truths."""
     left = beyond_nuisances(gram, layout)
-    squares = np.zeros((*left.shape[:-2], len(goals)))
-    for number, goal in enumerate(goals):
+    found = []
+    for goal in goals:
         truth = layout.truths[goal.truth]
         own = left[..., truth, truth]
         if goal.rival:
@@ -278,9 +287,8 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
             apart = own - np.sum(cross * np.linalg.solve(inner, cross), axis=-2)
             charge = CHARGE * (len(rival) - len(layout.columns[goal.truth]))
             own = np.minimum(apart + charge, own)
-        wrong = logsumexp(-0.125 * np.maximum(own, 0.0), axis=-1) - np.log(own.shape[-1])
-        squares[..., number] = np.maximum(-8.0 * wrong, 0.0)
-    return np.sqrt(squares)
+        found.append(np.sqrt(np.maximum(own, 0.0)))
+    return found
 
 
 def chance_right(discriminations: Array | float) -> Array:

@@ -100,15 +100,15 @@ def after_data(
     at = q - p
     for members in alike:
         shown = [name for name in members if name in layout.truths]
-        for number, name in enumerate(shown):
+        for name in shown:
             measured, own = layout.truths[shown[0]][0], layout.columns[name]
             inner = left[np.ix_(own, own)] + np.eye(len(own))
             spread = np.linalg.inv(np.linalg.cholesky(inner)).T
             new = np.zeros((q, DRAWS + 1))
-            if number == 0:
-                new[p + measured] = 1.0
-            else:
-                new[p + own] = np.linalg.solve(inner, left[own, measured])[:, None]
+            whole = layout.truths[name][0]
+            new[p + whole] = 1.0
+            missing = left[own, measured] - left[own, whole]
+            new[p + own] = np.linalg.solve(inner, missing)[:, None]
             new[p + own, 1:] += spread @ rng.standard_normal((len(own), DRAWS))
             blocks.append(new)
             truths[name] = np.arange(at, at + DRAWS + 1)
