@@ -162,6 +162,7 @@ def test_errors_of_the_diagnosis_name_their_place(tmp_path, capsys, change, word
     ("options", "words"),
     [
         (["--minutes", "-1"], "minutes = -1 is not a positive number"),
+        (["--minutes", "1e9"], "1e+09 minutes are more than 120"),
         (["--speed", "0"], "speed_deg_per_s = 0 is not a positive number"),
         (["--seed", "-3"], "seed -3 is below 0"),
     ],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 import subprocess
@@ -38,8 +37,8 @@ CELL_PARAMETERS: dict[str, dict[str, ParameterValue]] = {
 }
 """The virtual cell's loads are weights: they do not depend on the motion, so there is no loop."""
 
-SHORTEST_S = 2.0
-"""Two motions of a second each."""
+SHORTEST_S, LONGEST_S = 2.0, 172800.0
+"""Two motions of a second each, or of a day."""
 
 DOMAINS = 90
 """ROS domains 1 to 90; those above 101 clash with ports that Linux hands out."""
@@ -83,8 +82,8 @@ def run_cell(
     """
     if find_spec("rclpy") is None:
         raise InputError("cell: ROS 2 (rclpy) is not installed; pip install 'wrist_stiffness[ros]'")
-    if seconds is not None and not SHORTEST_S <= seconds < math.inf:
-        raise InputError(f"seconds: {seconds:g} is not {SHORTEST_S:g} or more")
+    if seconds is not None and not SHORTEST_S <= seconds <= LONGEST_S:
+        raise InputError(f"seconds: {seconds:g} is not {SHORTEST_S:g} to {LONGEST_S:g}")
     chosen: dict[str, ParameterValue] = {}
     if model is not None:
         load_model(model)

@@ -48,6 +48,9 @@ COLUMNS = (
 
 Progress = Callable[[int, int], None]
 
+LONGEST_MIN = 120.0
+"""Minutes of one experiment; planning takes 2 GB and minutes for so many."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -71,7 +74,7 @@ class Options:
     Raises
     ------
     InputError
-        If a number is not positive.
+        If a number is not positive or the experiment longer than `LONGEST_MIN`.
     """
 
     minutes: float | None
@@ -88,6 +91,11 @@ class Options:
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"plan: {name} = {value:g} is not a positive number")
+        if self.minutes is not None and self.minutes > LONGEST_MIN:
+            raise InputError(
+                f"plan: {self.minutes:g} minutes are more than {LONGEST_MIN:g}: plan a shorter "
+                "experiment, and the next one after its diagnosis"
+            )
         if self.seed < 0:
             raise InputError(f"plan: seed {self.seed} is below 0")
 
