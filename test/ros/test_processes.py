@@ -207,6 +207,14 @@ def test_the_cell_refuses_wrong_input(tmp_path, capsys):
     assert "none.yaml" in capsys.readouterr().err
 
 
+def test_a_negative_seed_is_refused_in_one_line(capfd):
+    with pytest.raises(InputError, match="cell_simulator ended with code 2"):
+        run_cell(seconds=2.0, seed=-1)
+    told = capfd.readouterr().err
+    assert "seed out of range" in told
+    assert "Traceback" not in told
+
+
 @pytest.mark.parametrize("seconds", [0.0, 1.0, 1e9, float("nan"), float("inf")])
 def test_a_run_too_short_or_too_long_is_refused_before_it_starts(seconds):
     with pytest.raises(InputError, match="is not 2 to 172800"):

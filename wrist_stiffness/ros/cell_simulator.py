@@ -30,6 +30,8 @@ from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 
+LARGEST_SEED = 2**31 - 1
+
 PARAMETERS = (
     ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),
     ParameterEntry("rate_hz", 100.0, "samples per second", lower=1.0, upper=2000.0),
@@ -41,8 +43,16 @@ PARAMETERS = (
         lower=0,
         upper=1e9,
     ),
-    ParameterEntry("seed", 0, "of the program and of the sensors' noise"),
-    ParameterEntry("listeners", 0, "subscriptions of /joint_states to wait for before moving"),
+    ParameterEntry(
+        "seed", 0, "of the program and of the sensors' noise", lower=0, upper=LARGEST_SEED
+    ),
+    ParameterEntry(
+        "listeners",
+        0,
+        "subscriptions of /joint_states to wait for before moving",
+        lower=0,
+        upper=100,
+    ),
     ParameterEntry(
         "enable_at_repeat", False, "switch the angle corrector on when the motion repeats"
     ),
