@@ -29,8 +29,11 @@ from wrist_stiffness.campaign.planning.signatures import signatures
 from wrist_stiffness.campaign.planning.timeline import Visit
 from wrist_stiffness.model.effect import Effect
 
-EXTRA = 40
-"""Extra poses at most."""
+EXTRA = 100
+"""Extra poses at most: as many settings as a pool has."""
+
+FEW = 40
+"""Random poses that are enough for most cases."""
 
 PLANS = 5
 
@@ -84,14 +87,15 @@ class Arms:
     def random(self) -> dict[str, Needed]:
         """Return what random poses need, measured like planned ones, and under load only."""
         rng = np.random.default_rng([self.case.seed, 1])
-        settings = draw_settings(WORKSPACE, LOADS, TABLE.geometry.gravity, rng)[:EXTRA]
+        settings = draw_settings(WORKSPACE, LOADS, TABLE.geometry.gravity, rng)
         visits = [setting.visits(PACE.dwell_s)[rng.integers(2)] for setting in settings]
-        extra = self.performed(visits)
+        for count in (FEW, EXTRA):
+            extra = self.performed(visits[:count])
+            needed = self.needed(extra, [count])
+            if np.isfinite(needed.poses):
+                break
         once = replace(extra, experiment=once_each(extra.experiment))
-        return {
-            "random": self.needed(extra, [EXTRA]),
-            "random_once": self.needed(once, [EXTRA]),
-        }
+        return {"random": needed, "random_once": self.needed(once, [count])}
 
     def performed(self, visits: list[Visit]) -> Measured:
         """Return what the virtual cell measures at visits."""

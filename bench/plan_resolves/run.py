@@ -17,7 +17,7 @@ side: each number is the median over 200 random orders (of planned poses, within
 Reference poses and long holds, which a plan has besides, are left out.
 
 A draw whose class random poses resolve at once (a median of one) is no case, as nothing can be half
-of one; nor is one that neither resolves within 40 poses.
+of one; nor is one that neither resolves within 100 poses.
 
     python bench/plan_resolves/run.py FIRST_SEED END_SEED [OUT.jsonl]
 
