@@ -26,7 +26,7 @@ def test_stated_uncertainty_is_the_scatter_over_repetitions():
     found = []
     for _ in range(12):
         noise = Rotation.from_rotvec(NOISE * rng.standard_normal((len(seen), 3)))
-        found.append(clock_offset(stamps, (noise * turned(seen)).as_quat(), rigid))
+        found.append(clock_offset(stamps, (noise * turned(seen)).as_matrix(), rigid))
     scatter = np.std([each.seconds for each in found], ddof=1)
     stated = np.sqrt(np.mean([each.sigma**2 for each in found]))
     # Twelve repetitions tell the scatter to a fifth.

@@ -173,12 +173,12 @@ class Mechanism:
         """Cosines of alpha_2 and alpha_3."""
         return float(self.b0 @ self.c0), float(self.c0 @ self.d0)
 
-    def _turned(self, theta: Array) -> Array:
+    def _turned(self, theta: Array, columns: slice = slice(None)) -> Array:
         """Turn x, y, z, b0 with motor 1 and x, y, z, d0 with motor 2: columns, (..., 2, 3, 4)."""
         if not np.isfinite(theta).all():
             bad = first_where(theta, ~np.isfinite(theta).all(axis=-1))
             raise InputError(f"motor angles {angles_text(bad)}: not finite")
-        constant, cosine, sine = self._turn_parts
+        constant, cosine, sine = (part[..., columns] for part in self._turn_parts)
         angle = theta[..., None, None]
         return constant + np.cos(angle) * cosine + np.sin(angle) * sine
 
@@ -200,7 +200,7 @@ class Mechanism:
         InputError
             If an angle is not finite.
         """
-        driven = self._turned(np.asarray(theta, dtype=float))[..., 3]
+        driven = self._turned(np.asarray(theta, dtype=float), slice(3, 4))[..., 0]
         return gram_determinant(dot(driven[..., 0, :], driven[..., 1, :]), *self._cosines)
 
     def reachable(self, theta: Array) -> NDArray[np.bool_]:

@@ -8,7 +8,6 @@ column.  Payloads that differ in more form groups of their own, down to a group 
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +23,7 @@ from wrist_stiffness.recording.cdr import (
     decode,
     padding,
 )
+from wrist_stiffness.recording.mcap_chunk import Payloads
 from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.schema import SECONDS_NANOSECONDS, fields_of
 
@@ -53,7 +53,7 @@ class Batch:
 
 
 def decode_batches(
-    message_type: type[Message], payloads: Sequence[bytes]
+    message_type: type[Message], payloads: Payloads
 ) -> tuple[list[Batch], list[int]]:
     """Decode payloads column by column.
 
@@ -61,7 +61,7 @@ def decode_batches(
     ----------
     message_type : type[Message]
         Class of all of them.
-    payloads : Sequence[bytes]
+    payloads : Sequence[bytes] or (n, size) uint8 array
         CDR of either byte order.
 
     Returns
@@ -73,10 +73,13 @@ def decode_batches(
     """
     batches: list[Batch] = []
     undecodable: list[int] = []
-    lengths = np.array([len(payload) for payload in payloads], dtype=np.intp)
+    if isinstance(payloads, np.ndarray):
+        lengths = np.full(len(payloads), payloads.shape[1], dtype=np.intp)
+    else:
+        lengths = np.array([len(payload) for payload in payloads], dtype=np.intp)
     remaining = np.arange(len(payloads))
     while remaining.size:
-        template = payloads[remaining[0]]
+        template = bytes(payloads[remaining[0]])
         try:
             first = decode(message_type, template)
         except RecordingError:
@@ -87,11 +90,18 @@ def decode_batches(
         same_length = remaining[lengths[remaining] == len(template)]
         if len(batches) >= _MAX_LAYOUTS:
             same_length = remaining[:1]
-        joined = b"".join([payloads[index] for index in same_length])
-        rows = np.frombuffer(joined, np.uint8).reshape(same_length.size, len(template))
+        if isinstance(payloads, np.ndarray):
+            rows = payloads if same_length.size == len(payloads) else payloads[same_length]
+        else:
+            joined = b"".join([payloads[index] for index in same_length])
+            rows = np.frombuffer(joined, np.uint8).reshape(same_length.size, len(template))
         matches = (rows[:, layout.fixed] == rows[0, layout.fixed]).all(axis=1)
-        members = same_length[matches]
-        batches.append(Batch(members, first, layout.columns(rows[matches])))
+        members = same_length
+        if not matches.all():
+            members, rows = same_length[matches], rows[matches]
+        batches.append(Batch(members, first, layout.columns(rows)))
+        if members.size == len(payloads):
+            break
         remaining = (
             remaining[1:]
             if members.size == 1
@@ -155,7 +165,7 @@ class Layout:
         begin = ENCAPSULATION_SIZE + offset
         stored = np.ascontiguousarray(rows[:, begin : begin + size * count])
         numbers = stored.view(np.dtype(code).newbyteorder(self.byte_order))
-        return numbers.astype(numbers.dtype.newbyteorder("="))
+        return numbers.astype(numbers.dtype.newbyteorder("="), copy=False)
 
 
 def layout_of(message_type: type[Message], payload: bytes) -> Layout:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.mcap_chunk import Payloads
 from wrist_stiffness.recording.messages import (
     JointState,
     Message,
@@ -169,9 +170,8 @@ class Collector:
     blocks: list[Rows] = field(default_factory=list)
     counts: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
 
-    def add(self, log_times: list[int], payloads: list[bytes]) -> None:
+    def add(self, times: TimeArray, payloads: Payloads) -> None:
         """Append payloads with their log times [ns]."""
-        times = np.array(log_times, dtype=np.int64)
         batches, undecodable = decode_batches(self.message_type, payloads)
         self._count("payload cannot be decoded", times[undecodable])
         parts: list[Rows] = []

@@ -4,21 +4,34 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
 import lz4.frame  # type: ignore[import-untyped]
+import numpy as np
 import zstandard
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
 from wrist_stiffness.errors import RecordingError
 
 RECORD_HEAD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 MESSAGE_RECORD = struct.Struct("<BQHIQQ")
+_MESSAGE = np.dtype(
+    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
+    + [("log_time", "<u8"), ("publish_time", "<u8")]
+)
+"""The same as `MESSAGE_RECORD`."""
+
+Places = NDArray[np.int64]
+Times = NDArray[np.int64]
+Payloads = Sequence[bytes] | NDArray[np.uint8]
+"""Payloads one by one, or (m, size) where all have one size."""
+
 # Recorders write about 1 MiB; a size beyond this one is damage, not a reason to take memory.
 _LARGEST_CHUNK = 1 << 30
 
@@ -39,6 +52,8 @@ class Chunk:
         Size and CRC-32 after decompression; CRC 0 = not stated.
     start_ns, end_ns : int
         First and last log time.
+    indexed : dict[int, (m,) int array]
+        Where the file says that the messages of each channel begin in the chunk; empty = not said.
     """
 
     path: Path
@@ -49,6 +64,7 @@ class Chunk:
     crc: int
     start_ns: int
     end_ns: int
+    indexed: dict[int, Places] = field(default_factory=dict)
 
 
 class StoredMessage(NamedTuple):
@@ -184,10 +200,10 @@ def messages_in(chunk: Chunk, left_out: Collection[int] = ()) -> list[StoredMess
     return messages
 
 
-def payloads_in(chunk: Chunk, wanted: Collection[int]) -> dict[int, tuple[list[int], list[bytes]]]:
+def payloads_in(chunk: Chunk, wanted: Collection[int]) -> dict[int, tuple[Times, Payloads]]:
     """Return log times and payloads of some channels of a chunk, in the order of the file.
 
-    Twice as fast as `messages_in`, for readers that need no order between channels.
+    Far faster than `messages_in`, for readers that need no order between channels.
 
     Parameters
     ----------
@@ -198,7 +214,7 @@ def payloads_in(chunk: Chunk, wanted: Collection[int]) -> dict[int, tuple[list[i
 
     Returns
     -------
-    dict[int, tuple[list[int], list[bytes]]]
+    dict[int, tuple[array, Payloads]]
         Log times [ns] and payloads by channel.
 
     Raises
@@ -206,9 +222,12 @@ def payloads_in(chunk: Chunk, wanted: Collection[int]) -> dict[int, tuple[list[i
     RecordingError
         If the chunk is damaged.
     """
-    found: dict[int, tuple[list[int], list[bytes]]] = {number: ([], []) for number in wanted}
     buffer = chunk_bytes(chunk)
     place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
+    indexed = _all_messages(buffer, chunk.indexed)
+    if indexed is not None:
+        return _taken(buffer, *indexed, wanted)
+    found: dict[int, tuple[list[int], list[bytes]]] = {number: ([], []) for number in wanted}
     position, last = 0, len(buffer) - MESSAGE_RECORD.size
     unpack, skip = MESSAGE_RECORD.unpack_from, RECORD_HEAD.size
     while position <= last:
@@ -224,4 +243,61 @@ def payloads_in(chunk: Chunk, wanted: Collection[int]) -> dict[int, tuple[list[i
     # What remains is shorter than a message, or damage that names itself.
     for _ in records_in(buffer[position:], place):
         pass
+    return {
+        number: (np.array(times, dtype=np.int64), payloads)
+        for number, (times, payloads) in found.items()
+    }
+
+
+def _all_messages(
+    buffer: bytes, indexed: dict[int, Places]
+) -> tuple[Places, NDArray[np.void]] | None:
+    """Return where the messages of a chunk begin, as its index says, and their heads.
+
+    None where a walk from record to record would not find just these.
+    """
+    begins = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *indexed.values()]))
+    if not begins.size or begins[0] < 0 or begins[-1] + MESSAGE_RECORD.size > len(buffer):
+        return None
+    heads = _from_each_byte(buffer, _MESSAGE)[begins]
+    too_short = heads["length"] < MESSAGE_HEAD.size
+    if (heads["opcode"] != Opcode.MESSAGE).any() or too_short.any():
+        return None
+    if (heads["length"] > len(buffer)).any():
+        return None
+    ends = begins + RECORD_HEAD.size + heads["length"].astype(np.int64)
+    before, after = np.append(0, ends), np.append(begins, len(buffer))
+    for start, end in zip(before[before != after], after[before != after], strict=True):
+        try:
+            if start > end or any(
+                opcode == Opcode.MESSAGE for opcode, _, _ in records_in(buffer[start:end], "")
+            ):
+                return None
+        except RecordingError:
+            return None
+    return begins, heads
+
+
+def _taken(
+    buffer: bytes, begins: Places, heads: NDArray[np.void], wanted: Collection[int]
+) -> dict[int, tuple[Times, Payloads]]:
+    """Return log times and payloads of channels from where messages begin, and their heads."""
+    found: dict[int, tuple[Times, Payloads]] = {}
+    for number in wanted:
+        own = heads["channel"] == number
+        sizes = heads["length"][own].astype(np.int64) - MESSAGE_HEAD.size
+        times, starts = heads["log_time"][own].astype(np.int64), begins[own] + MESSAGE_RECORD.size
+        if sizes.size and sizes[0] and (sizes == sizes[0]).all():
+            size = int(sizes[0])
+            rows = _from_each_byte(buffer, np.dtype(f"V{size}"))[starts]
+            found[number] = times, rows.view(np.uint8).reshape(-1, size)
+        else:
+            ends = (starts + sizes).tolist()
+            found[number] = times, [buffer[a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
     return found
+
+
+def _from_each_byte(buffer: bytes, kind: np.dtype[np.void]) -> NDArray[np.void]:
+    """Return what a buffer holds from each of its bytes on, as far as there are enough of them."""
+    count = len(buffer) - kind.itemsize + 1
+    return np.ndarray((count,), kind, buffer, strides=(1,))

@@ -206,6 +206,8 @@ class _Walk:
         channel_id, size = _INDEX_HEAD.unpack_from(data)
         entries = np.frombuffer(data, "<u8", size // 8, _INDEX_HEAD.size)
         times = entries[::2]
+        if self.chunks:
+            self.chunks[-1].indexed[channel_id] = entries[1::2].astype(np.int64)
         if times.size and self.chunk_spans:
             span = Span(times.size, int(times.min()), int(times.max()))
             self.chunk_spans[-1][channel_id] = span

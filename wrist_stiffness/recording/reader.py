@@ -17,7 +17,9 @@ from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.channel import Channel
 from wrist_stiffness.recording.mcap_chunk import (
     Chunk,
+    Payloads,
     StoredMessage,
+    Times,
     messages_in,
     payloads_in,
 )
@@ -145,7 +147,7 @@ class Recording:
             else:
                 heapq.heappop(opened)
 
-    def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, list[int], list[bytes]]]:
+    def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
         """Iterate over the payloads of topics, many of one topic at a time.
 
         Parameters
@@ -155,7 +157,7 @@ class Recording:
 
         Yields
         ------
-        tuple[str, list[int], list[bytes]]
+        tuple[str, array, Payloads]
             Topic, log times [ns] and payloads, in the order of the file.
 
         Raises
@@ -176,7 +178,7 @@ class Recording:
                     self._report(f"{error}, its messages are left out")
                     continue
                 for number, (log_times, payloads) in found.items():
-                    if payloads:
+                    if len(payloads):
                         yield wanted[number], log_times, payloads
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:

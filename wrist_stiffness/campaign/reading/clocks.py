@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps
 from wrist_stiffness.compensation.load_history import NANOSECONDS
@@ -64,8 +65,8 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
     ----------
     time_ns : (n,) int64
         Stamps of the measured rotations [ns].
-    measured : (n, 4) float
-        Quaternions U -> F.
+    measured : (n, 3, 3) float
+        Rotations U -> F.
     rigid : Signal
         Quaternions (m, 4) of the rigid wrist by the stamps of the joint states.
 
@@ -74,13 +75,17 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
     ClockOffset or None
         None where nothing moves, or too few stamps overlap.
     """
+    if len(rigid) < 2 or len(time_ns) == 0:
+        return None
     first = np.unique(np.linspace(0, len(time_ns) - 1, STAMPS_USED).astype(int))
     second = np.searchsorted(time_ns, time_ns[first] + round(SPAN_S * NANOSECONDS))
     first, second = first[second < len(time_ns)], second[second < len(time_ns)]
     pairs = [1e-9 * (time_ns[rows] - rigid.time_ns[0]) for rows in (first, second)]
     own = 1e-9 * (rigid.time_ns - rigid.time_ns[0])
     continuous = _continuous(rigid.values)
-    turned = _angle(_nearest_sign(measured[first], measured[second]), measured[second])
+    slope = np.diff(continuous, axis=0) / np.diff(own)[:, None]
+    began, ended = (Rotation.from_matrix(measured[rows]).as_quat() for rows in (first, second))
+    turned = _angle(_nearest_sign(began, ended), ended)
     if len(first) < BLOCKS * LEAST_IN_BLOCK or np.sqrt(np.mean(turned**2)) < LEAST_MOTION:
         return None
 
@@ -89,10 +94,11 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
         inside = (start >= 0.0) & (end <= own[-1])
         if inside.sum() < LEAST_OVERLAP * len(start):
             return np.inf
-        at = [
-            np.stack([np.interp(each[inside], own, part) for part in continuous.T], axis=1)
-            for each in (start, end)
-        ]
+        # The four numbers share their neighbours in time; `numpy.interp` would look for each anew.
+        at = []
+        for each in (start[inside], end[inside]):
+            before = np.minimum(np.searchsorted(own, each, side="right"), len(slope)) - 1
+            at.append(continuous[before] + (each - own[before])[:, None] * slope[before])
         return float(np.mean((turned[rows][inside] - _angle(*at)) ** 2))
 
     tried = np.linspace(-SEARCHED_S, SEARCHED_S, 2 * STEPS + 1)

@@ -174,7 +174,7 @@ def _session(
         raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
     block = machine.at(time_ns)
     rigid = rigid_rotation(table, block.theta)
-    _require_same_wrist(rotation, block.theta, table)
+    _require_same_wrist(rotation, rigid, block.theta, table)
     _require_near(shift)
     remarks += beyond_range(table, block)
     lost = _spikes(block.time, shift, rotation, rigid, table.geometry.limits.encoder_step)
@@ -264,12 +264,13 @@ def _require_overlap(angles_ns: Stamps, poses_ns: Stamps) -> None:
         )
 
 
-def _require_same_wrist(rotation: Array, theta: Array, table: Table) -> None:
+def _require_same_wrist(rotation: Array, rigid: Array, theta: Array, table: Table) -> None:
     known = np.isfinite(rotation).all(axis=(1, 2))
     if known.sum() < LEAST_POSES:
         return
-    rotation, theta = rotation[known], theta[known]
-    found = agreement(rotation, rigid_rotation(table, theta))
+    if not known.all():
+        rotation, rigid, theta = rotation[known], rigid[known], theta[known]
+    found = agreement(rotation, rigid)
     if found.misfit <= OTHER_GEOMETRY:
         return
     limit = f"limit {np.degrees(OTHER_GEOMETRY):g} deg"
@@ -318,8 +319,8 @@ def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOff
     if not known.any() or not reachable.any():
         return None
     rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_quat()
-    measured = Rotation.from_matrix(track.rotation[known]).as_quat()
-    return clock_offset(track.time_ns[known], measured, Signal(time_ns[reachable], rigid))
+    turned = Signal(time_ns[reachable], rigid)
+    return clock_offset(track.time_ns[known], track.rotation[known], turned)
 
 
 def _another_clock(offset: ClockOffset, machine: MachineSignals, track: PoseTrack) -> bool:
