@@ -235,11 +235,14 @@ class FitProblem:
             trials.append(trial if by_path[-1] else memoryless(trial))
             moved.append(place)
         path, quick, *changed = model.predicted([whole, memoryless(whole), *trials])
-        first = session.residual(path)
+        twists = [
+            path + twist - (path if on_path else quick)
+            for on_path, twist in zip(by_path, changed, strict=True)
+        ]
+        first, *others = session.residual(np.stack([path, *twists]))
         block = np.zeros((*first.shape, len(z)))
-        for place, on_path, twist in zip(moved, by_path, changed, strict=True):
-            change = session.residual(path + twist - (path if on_path else quick)) - first
-            block[:, :, place] = np.nan_to_num(change / step[place])
+        for place, other in zip(moved, others, strict=True):
+            block[:, :, place] = np.nan_to_num((other - first) / step[place])
         return block[:, :, asked]
 
     @cached_property
