@@ -27,19 +27,37 @@ SIZE = 3.0
 SHAPE_SEED = 3
 COLUMNS = 5
 
+SHOWN = {
+    "m": ((1e6, "µm"), (1e3, "mm")),
+    "s": ((1e3, "ms"),),
+    "rad": ((180e3 / np.pi, "mdeg"), (180.0 / np.pi, "deg")),
+    "m/N": ((1e6, "µm/N"),),
+    "rad/(N m)": ((180.0 / np.pi, "mdeg/(N mm)"),),
+    "m/K^2": ((1e6, "µm/K²"), (1e3, "mm/K²")),
+    "-": ((1.0, ""),),
+}
+"""Factors from SI to the units that are shown; the first that gives less than a thousand."""
+
 
 def sized_or_largest(scale: Scale, start: HiddenEffect) -> tuple[HiddenEffect, str]:
     """Return the effect at `SIZE`, or at its plausible magnitude, and what the panel says."""
     try:
         return scale.sized(start, SIZE), f"size {SIZE:g}"
     except InputError:
-        return start, f"size {scale.size(start):.2g}, {SIZE:g} is out of reach"
+        return start, f"the most that is plausible, size {scale.size(start):.2g}"
+
+
+def amount(magnitude: float, unit: str) -> str:
+    """Return a magnitude in a unit that people use."""
+    units = SHOWN.get(unit, ((1.0, unit),))
+    factor, shown = next((u for u in units if u[0] * magnitude < 1000.0), units[-1])
+    return f"{factor * magnitude:.3g} {shown}".strip()
 
 
 def draw_page(scale: Scale, entries: dict[str, Entry], path: Path) -> None:
     """Draw one panel for each effect at its first place."""
     rows = -(-len(entries) // COLUMNS)
-    figure = new_figure(3.6 * COLUMNS, 2.1 * rows)
+    figure = new_figure(3.4 * COLUMNS, 2.1 * rows)
     panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
     progress = Progress(path.stem)
     for number, (effect, entry) in enumerate(entries.items()):
@@ -51,26 +69,30 @@ def draw_page(scale: Scale, entries: dict[str, Entry], path: Path) -> None:
         change = scale.signature(hidden)
         for axis, name in enumerate("xyz"):
             panel.plot(scale.time_s, 1e6 * change[:, axis], linewidth=0.9, label=f"s_{name}")
-        panel.set_ylabel("shift [µm]", fontsize=7)
+        panel.set_ylabel("shift [µm]", fontsize=8)
         turned = panel.twinx()
         turn = np.degrees(np.linalg.norm(change[:, 3:], axis=1)) * 1e3
         turned.plot(scale.time_s, turn, color="0.6", linewidth=0.7, label="φ")
         # From zero: a constant turn would show its rounding else.
         turned.set_ylim(0.0, 1.1 * float(turn.max()) + 1e-3)
-        turned.set_ylabel("φ [mdeg]", fontsize=7, color="0.5")
+        turned.set_ylabel("φ [mdeg]", fontsize=8, color="0.5")
         for side in (panel, turned):
-            side.tick_params(labelsize=6)
+            side.tick_params(labelsize=7)
             side.ticklabel_format(useOffset=False)
         panel.set_title(
-            f"{effect}@{hidden.component}\n{hidden.magnitude:.3g} {entry.unit}, {note}",
-            fontsize=7,
+            f"{effect}@{hidden.component}\n{amount(hidden.magnitude, entry.unit)}, {note}",
+            fontsize=8,
         )
         progress(number + 1, len(entries))
     for panel in panels[len(entries) :]:
         panel.set_visible(False)
-    for panel in panels[-COLUMNS:]:
-        panel.set_xlabel("time [s]", fontsize=7)
-    panels[0].legend(fontsize=6, loc="upper left")
+    for panel in panels[max(0, len(entries) - COLUMNS) : len(entries)]:
+        panel.set_xlabel("time [s]", fontsize=8)
+        panel.tick_params(labelbottom=True)
+    lines = [*panels[0].get_lines(), *turned.get_lines()]
+    figure.legend(
+        lines, [str(line.get_label()) for line in lines], ncols=4, loc="outside upper left"
+    )
     save_figure(figure, path)
 
 

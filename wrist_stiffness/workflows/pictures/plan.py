@@ -59,7 +59,8 @@ def draw_plan(table: Table, timeline: Timeline, path: Path) -> None:
         f"{timeline.dwells[0].time_s / 60.0:.1f}",
         fontsize=9,
     )
-    angles.legend(fontsize=7, loc="upper right", ncols=4)
+    # Motion is everywhere inside the axes.
+    figure.legend(*angles.get_legend_handles_labels(), fontsize=8, loc="lower right", ncols=4)
     loads.plot(minutes, force, linewidth=0.8, color="black")
     loads.set_ylim(bottom=0.0)
     loads.set_ylabel("force of the load [N]")
