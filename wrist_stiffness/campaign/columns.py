@@ -16,7 +16,7 @@ from wrist_stiffness.model.evaluation import evaluate
 
 Effects = tuple[Effect, ...]
 
-AT_A_TIME = 40
+AT_A_TIME = 256
 """Trials evaluated together: they share the work of the base, and their results are in memory."""
 
 
