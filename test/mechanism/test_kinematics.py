@@ -6,12 +6,6 @@ from acrod.jacobian import Jacobian
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wrist_stiffness.errors import (
-    GeometryError,
-    InputError,
-    SingularPoseError,
-    UnreachablePoseError,
-)
 from wrist_stiffness.mechanism.components import ELASTIC
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.kinematics import Mechanism
@@ -355,76 +349,3 @@ def test_both_limits_of_the_closure_are_met_by_some_wrist():
     angles = [driven_angle(mechanism, theta) for mechanism in MECHANISMS.values()]
     assert any(np.mean(angle < low) > 0.01 for angle, low, _ in angles)
     assert any(np.mean(angle > high) > 0.01 for angle, _, high in angles)
-
-
-def unreachable_pose(mechanism):
-    theta = np.random.default_rng(6).uniform(-np.pi, np.pi, (20_000, 2))
-    return theta[np.argmin(mechanism.closure_radicand(theta))]
-
-
-@pytest.mark.parametrize("stacked", [False, True])
-def test_unreachable_pose_is_named(stacked):
-    mechanism = SKEWED[0]
-    pose = unreachable_pose(mechanism)
-    assert not mechanism.reachable(pose)
-    theta = np.stack([np.zeros(2), pose, pose + 0.01]) if stacked else pose
-    with pytest.raises(UnreachablePoseError, match="does not close") as caught:
-        mechanism.forward(theta)
-    first, second = np.degrees(pose)
-    assert f"({first:.3f}, {second:.3f}) deg" in str(caught.value)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("function", ["forward", "reachable", "tilt", "closure_radicand"])
-def test_angle_that_is_not_finite_is_named(function, bad):
-    with pytest.raises(InputError, match=rf"\({bad:.3f}, 57\.296\) deg: not finite"):
-        getattr(C_HORIZONTAL, function)(np.array([[0.0, 0.0], [bad, 1.0]]))
-
-
-def test_parallel_axes_of_joint_2_and_joint_4_are_unreachable_without_a_warning():
-    """alpha_2 = alpha_3: the loop folds flat, D = 0 and the closure divides nought by nought."""
-    with pytest.raises(UnreachablePoseError, match=r"\(90\.000, 0\.000\) deg"):
-        C_HORIZONTAL.forward(np.array([np.pi / 2.0, 0.0]))
-
-
-def test_jacobian_refuses_the_singularity_and_names_the_pose():
-    # |D| = sqrt(1 - sin^2 theta_1) is just above rounding here.
-    theta = np.array([np.pi / 2.0 - 1e-7, 0.0])
-    with pytest.raises(SingularPoseError, match=r"\(90\.000, 0\.000\) deg.*\|D\|"):
-        C_HORIZONTAL.jacobian(C_HORIZONTAL.forward(theta))
-
-
-def test_inverse_names_a_normal_out_of_reach():
-    mechanism = SKEWED[1]
-    directions = np.random.default_rng(7).normal(size=(5000, 3))
-    nowhere = directions[np.all(np.isnan(mechanism.inverse(directions)[..., 0]), axis=-1)]
-    assert len(nowhere)
-    with pytest.raises(UnreachablePoseError, match="out of reach") as caught:
-        mechanism.inverse_near(nowhere[0], np.zeros(2))
-    assert str(np.round(nowhere[0], 6).tolist()) in str(caught.value)
-
-
-@pytest.mark.parametrize("normal", [[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [0.0, np.inf, 1.0]])
-def test_inverse_refuses_what_is_no_direction(normal):
-    with pytest.raises(InputError, match="is not a direction"):
-        C_HORIZONTAL.inverse(np.array([Z, normal]))
-
-
-def test_inverse_near_refuses_a_start_that_is_not_finite():
-    with pytest.raises(InputError, match="not finite"):
-        C_HORIZONTAL.inverse_near(Z, np.array([0.0, np.nan]))
-
-
-@pytest.mark.parametrize(
-    ("axes", "message"),
-    [
-        ((X, X, Y, Z, Y, Z), "joint_1 and joint_2 are parallel"),
-        ((X, Y, -Y, Z, Y, Z), "joint_2 and joint_3 are parallel"),
-        ((X, Y, X, Z, X, Z), "joint_1 and joint_5 are parallel"),
-        ((X, Y, X, Z, Y, Y), "joint_2 and the platform normal are parallel"),
-        ((X, Y, (X + Y) / np.sqrt(2.0), -X, Y, Z), "home pose is singular"),
-    ],
-)
-def test_home_pose_that_cannot_work_is_refused(axes, message):
-    with pytest.raises(GeometryError, match=message):
-        Mechanism(*axes)
