@@ -80,6 +80,8 @@ class Candidate:
         What a technician would see; what to do on the machine to be sure.
     compensable : str, optional
         ``yes``, ``needs_signal`` or ``no``.
+    fitted : int, optional
+        Numbers that were fitted to these observations before they became columns: they cost.
     """
 
     effect: str
@@ -91,6 +93,7 @@ class Candidate:
     evidence: str = ""
     check: str = ""
     compensable: str = "yes"
+    fitted: int = 0
 
     @property
     def name(self) -> str:
@@ -99,8 +102,8 @@ class Candidate:
 
     @property
     def freedom(self) -> int:
-        """Number of free numbers, linear and non-linear."""
-        return len(self.parameters) + len(self.shape)
+        """Number of free numbers, linear and non-linear, and of those that were free before."""
+        return len(self.parameters) + len(self.shape) + self.fitted
 
     @property
     def shapes(self) -> list[tuple[float, ...]]:

@@ -91,6 +91,15 @@ def _weight(free: FreeEffect, parameter: Parameter, scale: float) -> float:
     return 1.0 / free.widening if parameter.linear else 1.0
 
 
+def _together(one: Effect, other: Effect) -> Effect:
+    """Return the sum of two effects of one name, within the bounds of its parameters."""
+    total = {}
+    for each in one.parameters:
+        value = one.estimates[each.key].value + other.estimates[each.key].value
+        total[each.key] = min(max(value, each.lower), each.upper)
+    return one.with_values(total)
+
+
 @dataclass(frozen=True, eq=False)
 class FitProblem:
     """A model, sessions, and what may move.
@@ -102,7 +111,8 @@ class FitProblem:
     sessions : tuple of UnitSession
         In the order of time.
     free : tuple of FreeEffect
-        What may move; none of them is among the model's effects.
+        What may move; none of them is among the model's effects.  The second of one name is what
+        came on top of the first after the wrist was fitted: no shim follows it.
     """
 
     model: ErrorModel
@@ -161,9 +171,21 @@ class FitProblem:
                 value = unknown.mean + float(steps) * unknown.step
                 values[unknown.free][unknown.key] = min(max(value, unknown.lower), unknown.upper)
         found = [self._effect(place, tuple(own.items())) for place, own in enumerate(values)]
-        for place, gap in self._shims.gaps(self._starts, found).items():
+        built = [place for place in range(len(found)) if place not in self._on_top]
+        gaps = self._shims.gaps(self._as_built, [found[place] for place in built])
+        for number, gap in gaps.items():
+            place = built[number]
             found[place] = self._effect(place, (*values[place].items(), (GAP, gap)))
-        return tuple(found)
+        for place, first in self._on_top.items():
+            found[first] = _together(found[first], found[place])
+        return tuple(found[place] for place in built)
+
+    @cached_property
+    def _on_top(self) -> dict[int, int]:
+        """Place of what came on top of an effect, and of that effect."""
+        names = [each.effect.name for each in self.free]
+        firsts = [names.index(name) for name in names]
+        return {place: first for place, first in enumerate(firsts) if first != place}
 
     @cached_property
     def _effect(self) -> Callable[[int, Values], Effect]:
@@ -176,12 +198,13 @@ class FitProblem:
         return effect
 
     @cached_property
-    def _starts(self) -> tuple[Effect, ...]:
-        return tuple(free.effect for free in self.free)
+    def _as_built(self) -> tuple[Effect, ...]:
+        """Starts of the free effects but for what came on top of them later."""
+        return tuple(f.effect for place, f in enumerate(self.free) if place not in self._on_top)
 
     @cached_property
     def _shims(self) -> Shims:
-        return Shims.of(self.model, self._starts)
+        return Shims.of(self.model, self._as_built)
 
     def residual(self, z: Array) -> Array:
         """Return log(T_measured T_predicted^-1) of all units, (u, 6) at O in F [m, rad]."""

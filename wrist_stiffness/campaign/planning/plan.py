@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.campaign.planning.choice import LOOKED_AT, choose
+from wrist_stiffness.campaign.planning.goals import all_goals, nearest, needed, refuted
 from wrist_stiffness.campaign.planning.information import (
-    RESOLVED,
     Goal,
     Information,
     Layout,
@@ -51,9 +51,6 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 
-NEAREST = 2
-"""Rivals that a commissioning keeps apart from each effect: those that come nearest."""
-
 LONGER = 10.0
 """What so many times the whole pool cannot separate counts as out of reach."""
 
@@ -62,9 +59,6 @@ LONGEST_S = 3600.0
 
 LIKELY = 0.5
 """Share of a rival's possible values for which a plan settles it; the next one knows which hold."""
-
-SEEN = 3.0
-"""Discrimination from nothing at which an effect counts as excited."""
 
 Progress = Callable[[int, int], None]
 
@@ -143,11 +137,6 @@ class Plan:
     calibration: Mapping[str, float]
 
 
-def needed(goal: Goal) -> float:
-    """Return the discrimination that settles a question."""
-    return RESOLVED if goal.rival else SEEN
-
-
 def plan(
     model: ErrorModel,
     question: Question,
@@ -189,21 +178,22 @@ def plan(
     whole = question.goals is None
     order = rng.permutation(2 * len(settings))
     pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
-    stage = _Stages(progress, 2 + len(earlier) + bool(earlier))
-    if earlier:
+    agree = bool(earlier and question.alike)
+    stage = _Stages(progress, 2 + len(earlier) + agree)
+    if agree:
         question = rivals_alike(model, question, earlier, conditions.noise, stage.next())
     known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
     question = question.without(lacking)
     before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
     goals = question.goals
     if goals is None:
-        goals = _all_goals(known)
+        goals = all_goals(known)
     start = np.zeros_like(known.total)
     for each in before:
         start += carried_over(each, (*SESSION, TARE))
     if before:
         truths = after_data(start, known.layout, question.alike, rng)
-        refuted = _refuted(start, known.layout, question.alike)
+        refuted = refuted(start, known.layout, question.alike)
         goals = tuple(goal for goal in goals if goal.truth not in refuted)
     else:
         truths = as_asked(known, question.alike)
@@ -216,7 +206,7 @@ def plan(
         least = [Answer(goal, float(d), False) for goal, d in zip(goals, best, strict=True)]
         return Plan(None, (), tuple(least), lacking, {})
     if whole:
-        aimed = _nearest(aimed, discrimination(total, layout, aimed))
+        aimed = nearest(aimed, discrimination(total, layout, aimed))
 
     def utility(gram: Array) -> Array:
         right = 1.0 - wrong_bound(discrimination(gram, layout, aimed)).mean(axis=-1)
@@ -363,37 +353,3 @@ def evaluated(
     shown = [each for each in found[count:] if not each.lacks]
     known = information(experiment, found[:count], question.free, shown, model.table, noise)
     return known, lacking
-
-
-def _refuted(gram: Array, layout: Layout, alike: Sequence[Sequence[str]]) -> set[str]:
-    """Return the members of classes that cannot make up what the first one left in the data."""
-    pairs = [
-        Goal(members[0], rival)
-        for members in alike
-        for rival in members[1:]
-        if members[0] in layout.truths and rival in layout.truths
-    ]
-    reached = discrimination(gram, layout, pairs)
-    return {pair.rival for pair, d in zip(pairs, reached, strict=True) if d >= RESOLVED}
-
-
-def _all_goals(known: Information) -> tuple[Goal, ...]:
-    names = list(known.layout.truths)
-    return (
-        *(Goal(name, "") for name in names),
-        *(Goal(one, other) for one in names for other in names if one != other),
-    )
-
-
-def _nearest(goals: Sequence[Goal], discriminations: Array) -> list[Goal]:
-    """Return of each truth its own visibility and its nearest rivals."""
-    kept: list[Goal] = []
-    order = np.argsort(discriminations, kind="stable")
-    counts: dict[str, int] = {}
-    for i in order:
-        goal = goals[i]
-        if goal.rival:
-            counts[goal.truth] = counts.get(goal.truth, 0) + 1
-        if not goal.rival or counts[goal.truth] <= NEAREST:
-            kept.append(goal)
-    return kept

@@ -37,9 +37,6 @@ COOLING = 0.05
 ENOUGH = 3e-3
 """Relative fall of the sum of squares below which the fit has converged."""
 
-WIDE = 1e3
-"""Factor of the prior of what belongs to the base and is under suspicion."""
-
 SMALLEST_STEP = 1.0 / 16.0
 
 WANDER = np.repeat([0.5e-6, 5e-6], 3)
@@ -108,24 +105,55 @@ class BaseFit:
     @property
     def prior_std(self) -> Array:
         """Standard deviations of the priors of the base in steps, (p,); infinite for none."""
-        weight = self.problem.weights
-        names = [self.problem.free[u.free].effect.name for u in self.problem.unknowns]
-        widened = np.array([name in self.extras for name in names])
-        std = np.where(weight == 1.0, 1.0, np.inf)
-        return np.where(widened, np.where(self.of_base, 1.0 / WIDE, np.inf), std)
+        return np.where(self.of_base & (self.problem.weights == 1.0), 1.0, np.inf)
 
     @property
     def of_base(self) -> Array:
         """Which unknowns belong to the base, (p,) bool."""
-        usual = {each.effect.name for each in free_base(self.problem.whole)[0]}
+        usual = len(self._usual)
+        return np.array([unknown.free < usual for unknown in self.problem.unknowns])
+
+    @property
+    def on_base(self) -> Array:
+        """Which unknowns are extras on top of a tolerance of the base, (p,) bool."""
         free = self.problem.free
-        return np.array([free[u.free].effect.name in usual for u in self.problem.unknowns])
+        names = np.array([free[u.free].effect.name in self._usual for u in self.problem.unknowns])
+        return names & ~self.of_base
+
+    @property
+    def _usual(self) -> dict[str, FreeEffect]:
+        return {each.effect.name: each for each in free_base(self.problem.whole)[0]}
+
+    def beyond(self) -> dict[str, Effect]:
+        """Return the extras by their names, of those on top of the base only what is on top."""
+        usual, found = len(self._usual), {}
+        for place, free in enumerate(self.problem.free[usual:], usual):
+            own = [(u, z) for u, z in zip(self.problem.unknowns, self.z, strict=True) if u.free == place]
+            values = {u.key: u.mean + float(z) * u.step for u, z in own}
+            found[free.effect.name] = free.effect.with_values(values)
+        return found
+
+    def covariance(self) -> Array:
+        """Return the covariance of all unknowns in steps, to first order, (p, p)."""
+        white = self.whiten(self.columns)
+        known = white.T @ white + np.diag(self.problem.weights**2)
+        return np.asarray(np.linalg.pinv(known, hermitian=True))
+
+    def values_on_top(self, name: str) -> dict[str, tuple[float, float]]:
+        """Return the parameters of an extra and their standard uncertainties, in their units."""
+        sigma, free = np.sqrt(np.diag(self.covariance())), self.problem.free
+        return {
+            u.key: (u.mean + float(z) * u.step, float(s) * u.step)
+            for u, z, s, of_base in zip(
+                self.problem.unknowns, self.z, sigma, self.of_base, strict=True
+            )
+            if not of_base and free[u.free].effect.name == name
+        }
 
     def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
         """Return the fitted effects of one session, also those that were held."""
         own = self.problem.effects(self.z, session)
-        usual = {each.effect.name for each in free_base(self.problem.whole)[0]}
-        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in usual]
+        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in self._usual]
         return (*self.problem.model.effects, *kept)
 
     def model(self, session: int, with_extras: bool = True) -> SessionModel:
@@ -177,21 +205,19 @@ def fit_base(
     extras : sequence of Effect, optional
         Effects fitted along, from the values that they have, with priors about zero as wide as
         they are large, at least of the usual size: what the data do not show stays small.  One that
-        belongs to the base loses its prior.
+        belongs to the base comes on top of what the wrist was built with.
     start : BaseFit, optional
         Where the base begins.
     """
     free, held = free_base(model)
     added = {effect.name: effect for effect in extras}
     usual = {each.effect.name for each in free}
-    widened = [
-        replace(f, scale={k: WIDE * v for k, v in f.scale.items()}) if f.effect.name in added else f
-        for f in free
-    ]
-    more = [_about_zero(effect) for name, effect in added.items() if name not in usual]
+    ordered = sorted(added.values(), key=lambda each: each.name not in usual)
+    more = [_about_zero(each) for each in ordered]
+    on_base = sum(each.name in usual for each in ordered)
     whole = model.with_effects(*held)
-    bare = BaseProblem(whole, sessions, tuple(widened), model)
-    problem = BaseProblem(whole, sessions, (*widened, *more), model)
+    bare = BaseProblem(whole, sessions, (*free, *more[:on_base]), model)
+    problem = BaseProblem(whole, sessions, (*free, *more), model)
     z = _start(problem, start, added)
     lower, upper = problem.bounds
     weights = problem.weights
@@ -222,9 +248,9 @@ def fit_base(
 
 
 def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
-    """Return the columns of the base, as if no extras were there, and those of the extras.
+    """Return the columns of the base, as if no other effect were there, and those of the others.
 
-    What the extras do to the base's columns is of second order; play and friction would be solved
+    What these do to the base's columns is of second order; play and friction would be solved
     again for each of them.
     """
     of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
@@ -251,17 +277,19 @@ def _about_zero(effect: Effect) -> FreeEffect:
 
 def _start(problem: BaseProblem, start: BaseFit | None, added: Mapping[str, Effect]) -> Array:
     """Return where the unknowns begin: where another fit left them, and effects at their values."""
-    known: dict[tuple[str, str, int | None], float] = {}
+    usual = len(problem.free) - len(added)
+    known: dict[tuple[str, str, int | None, bool], float] = {}
     if start is not None:
         known = {
-            (start.problem.free[u.free].effect.name, u.key, u.session): u.mean + z * u.step
-            for u, z in zip(start.problem.unknowns, start.z, strict=True)
+            (start.problem.free[u.free].effect.name, u.key, u.session, bool(of_base)): u.mean
+            + z * u.step
+            for u, z, of_base in zip(start.problem.unknowns, start.z, start.of_base, strict=True)
         }
     found = []
     for u in problem.unknowns:
-        name = problem.free[u.free].effect.name
-        at = added[name].estimates[u.key].value if name in added else u.mean
-        found.append((known.get((name, u.key, u.session), at) - u.mean) / u.step)
+        name, of_base = problem.free[u.free].effect.name, u.free < usual
+        at = u.mean if of_base else added[name].estimates[u.key].value
+        found.append((known.get((name, u.key, u.session, of_base), at) - u.mean) / u.step)
     return np.array(found)
 
 

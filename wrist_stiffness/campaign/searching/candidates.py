@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -37,6 +37,10 @@ SET_UP_ANEW = {law for law, _ in SET_UP}
 Trial = tuple[Law, str, Values]
 
 
+SHARE = "share"
+"""Name of the one number of a candidate that stands for a whole fit: how much of it is kept."""
+
+
 @dataclass(frozen=True, eq=False)
 class WristCandidate:
     """A law at a place, its recipe, and its columns on all points of its grid.
@@ -65,6 +69,7 @@ class WristCandidate:
     known: Mapping[Shape, Array]
     exact: Callable[[Shape], Array] | None = None
     seen: bool = False
+    change: Array | None = None
     points: bool = True
 
     @property
@@ -115,8 +120,24 @@ class WristCandidate:
             total = total + float(np.prod(weight)) * self.known[corner]
         return total
 
+    def changed_by(self, change: Array) -> WristCandidate:
+        """Return it with what a whole fit changes, (u, 6), in place of its columns."""
+        return replace(self, change=change)
+
     def candidate(self) -> Candidate:
         """Return it as the statistics take it."""
+        if self.change is None:
+            return self._by_columns()
+        change, columns = self.change[:, :, None], self._by_columns()
+        return replace(
+            columns,
+            parameters=(Factor(SHARE, 0.0),),
+            columns=lambda units, shape: change[units.rows],
+            shape=(),
+            fitted=columns.freedom - 1,
+        )
+
+    def _by_columns(self) -> Candidate:
         first = self.recipe.columns(tuple(p.grid[0] for p in self.recipe.shape))
         law = self.law
         factors = [c.factor for c in first]

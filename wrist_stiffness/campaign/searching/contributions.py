@@ -134,7 +134,4 @@ class _Decomposed:
 
     @cached_property
     def _covariance(self) -> Array:
-        fitted = self._fitted
-        white = fitted.whiten(fitted.columns)
-        known = white.T @ white + np.diag(fitted.problem.weights**2)
-        return np.asarray(np.linalg.pinv(known, hermitian=True))
+        return self._fitted.covariance()

@@ -18,8 +18,8 @@ from wrist_stiffness.campaign.observing import Observed, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
-from wrist_stiffness.campaign.searching.refit import refit, sized, withdrawn
-from wrist_stiffness.campaign.searching.seeking import fitted_extras, seek_point
+from wrist_stiffness.campaign.searching.refit import refit, sized, valued, withdrawn
+from wrist_stiffness.campaign.searching.seeking import Place, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
@@ -91,31 +91,57 @@ def diagnose_sessions(
     if not sessions:
         raise InputError("no session to diagnose")
     units = tuple(as_units(model, session) for session in sessions)
-    base, candidates = seek_point(model, units, progress)
-    observed = base.without_extras()
-    result = diagnose(
-        _table(base, observed),
-        tuple(each.candidate() for each in candidates),
-        _nuisances(base),
-        rng,
-        settings,
-    )
-    known = {each.name: each for each in candidates}
-    found = fitted_extras(base)
-    named = [
-        found.get(each.name) or _started(known[each.name], each.parameters)
-        for each in result.findings
-    ]
+    search = Search(model, units, progress)
+    place = search.quick()
+    result = _asked(place, rng, settings)
+    if result.verdict == "unknown":
+        for other in search.thorough():
+            again = _asked(other, rng, settings)
+            if _says_more(again, result):
+                place, result = other, again
+                break
+    base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
     final = refit(model, base, named, share)
-    effects = fitted_extras(final)
+    effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
     result = withdrawn(result, len(effects))
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
     suspected = _with_all(model, base, named)
     ranked = contributions(suspected, {each.name for each in kept})
-    return WristDiagnosis(sized(result, kept), observed, kept, final, suspected, ranked, absorbed)
+    observed = base.without_extras()
+    result = sized(valued(result, final), kept)
+    return WristDiagnosis(result, observed, kept, final, suspected, ranked, absorbed)
+
+
+def _asked(place: Place, rng: np.random.Generator, settings: Settings | None) -> Diagnosis:
+    """Return what the statistics say at a place."""
+    table = _table(place.base, place.base.without_extras())
+    known = tuple(each.candidate() for each in place.candidates)
+    return diagnose(table, known, _nuisances(place.base), rng, settings)
+
+
+def _begun(place: Place, result: Diagnosis) -> tuple[BaseFit, list[Effect]]:
+    """Return the base and the effects from which the fit of what was named begins."""
+    names = [each.name for each in result.findings]
+    whole = [place.fits[name] for name in names if name in place.fits]
+    base = whole[0] if whole else place.base
+    known = {each.name: each for each in place.candidates}
+    found = {name: fit.beyond()[name] for name, fit in place.fits.items()} | base.beyond()
+    return base, [
+        found.get(each.name) or _started(known[each.name], each.parameters)
+        for each in result.findings
+    ]
+
+
+def _says_more(one: Diagnosis, other: Diagnosis) -> bool:
+    """Tell whether an answer names something and leaves less unexplained than another."""
+    if not one.findings:
+        return False
+    return one.verdict == "effect" or (
+        one.unexplained.energy_share < other.unexplained.energy_share or not other.findings
+    )
 
 
 def _with_all(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
@@ -123,7 +149,7 @@ def _with_all(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> Base
     more = [each for each in named if each.name not in base.extras]
     if not more:
         return base
-    return fit_base(model, base.problem.sessions, [*fitted_extras(base).values(), *more], base)
+    return fit_base(model, base.problem.sessions, [*base.beyond().values(), *more], base)
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
@@ -136,7 +162,7 @@ def _table(base: BaseFit, observed: Observed) -> Observations:
 
     So the priors of the statistics, which lie about zero, are the priors of the wrist.
     """
-    own = np.isfinite(base.prior_std) & _of_wrist(base) & base.of_base
+    own = (np.isfinite(base.prior_std) & _of_wrist(base)) | base.on_base
     values = observed.observations.values - base.columns[:, :, own] @ base.z[own]
     return observed.observations.with_values(values)
 

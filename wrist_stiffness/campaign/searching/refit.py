@@ -14,6 +14,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import sealed_units
@@ -106,6 +107,23 @@ def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
     sentences += [f"{each.name} with its own law makes the sealed part worse" for each in gone]
     unexplained = replace(result.unexplained, evidence="; ".join(sentences))
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
+
+
+def valued(result: Diagnosis, fitted: BaseFit) -> Diagnosis:
+    """Return an answer with the parameters of whole fits where a finding stands for one.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        With its findings.
+    fitted : BaseFit
+        The base along with all of them.
+    """
+    found = []
+    for each in result.findings:
+        values = fitted.values_on_top(each.name) if SHARE in each.parameters else each.parameters
+        found.append(replace(each, parameters=values))
+    return replace(result, findings=tuple(found))
 
 
 def sized(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:

@@ -66,7 +66,8 @@ class Screen:
     def __init__(self, base: BaseFit, point: Point, without: str | None = None) -> None:
         self._base, self._point = base, point
         free, weights = base.problem.free, base.problem.weights
-        stays = np.array([free[u.free].effect.name != without for u in base.problem.unknowns])
+        names = np.array([free[u.free].effect.name for u in base.problem.unknowns])
+        stays = (names != without) | base.of_base
         rows = np.vstack([base.whiten(base.columns), np.diag(weights)])
         target = np.concatenate([base.whiten(base.residual), weights * base.z])
         target = target - rows[:, ~stays] @ base.z[~stays]

@@ -6,8 +6,8 @@ After each the earlier ones must still pay, and at the end each must be the best
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from wrist_stiffness.campaign.fitting.problem import Progress
 from wrist_stiffness.campaign.observing import UnitSession
@@ -17,7 +17,7 @@ from wrist_stiffness.campaign.searching.screening import Fitted, Screen
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
-Candidates = Sequence[WristCandidate]
+Candidates = tuple[WristCandidate, ...]
 Sessions = tuple[UnitSession, ...]
 
 WORTH = 30.0
@@ -34,7 +34,7 @@ CLOSE, MOST_REFITTED = 0.6, 2
 """So many candidates that gain nearly as much as the best are fitted with the whole base: what the
 base took up of one of them shows only then."""
 
-EXACT = 0.02
+EXACT = 0.1
 """Share of its size within which a law is taken to be exact here: a gain that what is left of a
 large effect within this share could make draws no further effect in."""
 
@@ -45,8 +45,34 @@ a base that gave way to a large effect does not find back."""
 MOST_TRIED = 3
 """So many candidates are fitted with the whole base before a step is given up."""
 
+PRESSING = frozenset(("axis_misalignment", "flange_contact", "gravity"))
+"""Laws that press and open flanges: where the base took up a part of one, other flanges touch, and
+its columns there say little of what it would explain."""
+
+LOOSE = frozenset(("joint_clearance",))
+"""Laws with gaps of their own: tried likewise, where a fit is begun from the drawing."""
+
 MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A base and the catalogue about it, for the statistics.
+
+    Parameters
+    ----------
+    base : BaseFit
+        Fitted.
+    candidates : tuple of WristCandidate
+        The catalogue.
+    fits : dict of str to BaseFit
+        Where candidates stand for whole fits: these, by name.
+    """
+
+    base: BaseFit
+    candidates: Candidates
+    fits: Mapping[str, BaseFit] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,22 +104,22 @@ class Reached:
         return self.base.cost + sum(WORTH + price for price in self.prices.values())
 
     @property
+    def rough(self) -> bool:
+        """Whether so much is left that a fit is begun from the drawing as well."""
+        return self.base.cost > ROUGH * float(self.base.problem.table.measured.sum())
+
+    @property
     def effects(self) -> dict[str, Effect]:
-        """Effects found, at their values."""
-        return fitted_extras(self.base)
+        """Effects found, at their values; on top of what the base has of them."""
+        return self.base.beyond()
 
     def screen(self, without: str | None = None) -> Screen:
         """Return what it leaves, without one of the effects if asked so."""
         return Screen(self.base, point_of(self.base), without)
 
 
-def seek_point(
-    model: ErrorModel, sessions: Sessions, progress: Progress
-) -> tuple[BaseFit, tuple[WristCandidate, ...]]:
-    """Return the base, fitted along with effects that make a difference, and the catalogue there.
-
-    The catalogue is evaluated about the base alone, and again where the base ends up; an effect
-    found has its columns at its values.
+class Search:
+    """The search on some sessions: quick at first, and thorough where that explains too little.
 
     Parameters
     ----------
@@ -104,20 +130,51 @@ def seek_point(
     progress : callable
         Told (done, total) while the catalogue is evaluated.
     """
-    base = fit_base(model, sessions)
-    reached = Reached(base, {}, base.cost)
-    held = {effect.name for effect in reached.base.problem.model.effects}
 
-    def catalogue() -> tuple[WristCandidate, ...]:
-        near = _near(model, reached.effects)
-        return wrist_candidates(point_of(reached.base), held, near, progress)
+    def __init__(self, model: ErrorModel, sessions: Sessions, progress: Progress) -> None:
+        self._model, self._progress = model, progress
+        base = fit_base(model, sessions)
+        self._alone = Reached(base, {}, base.cost)
+        self._catalogue = self._at(self._alone)
+        self._reached = _extended(model, self._alone, self._catalogue)
 
-    candidates = catalogue()
-    found = _extended(model, reached, candidates)
-    if found is not reached:
-        reached = found
-        candidates = catalogue()
-    return reached.base, candidates
+    def quick(self) -> Place:
+        """Return where tangents led, and the catalogue there."""
+        if self._reached is self._alone:
+            return Place(self._alone.base, self._catalogue)
+        return Place(self._reached.base, self._at(self._reached))
+
+    def thorough(self) -> Iterator[Place]:
+        """Try what no tangent shows, each with the whole base; yield where that led.
+
+        First the base alone, with what each of them changes, base and all, in place of its
+        tangents: so they stand side by side as they are.  Then where the best of them leads.
+        """
+        alone, model = self._alone, self._model
+        tried = PRESSING | LOOSE if alone.rough else PRESSING
+        screen = alone.screen()
+        trials = {
+            each.name: _with(model, alone, screen.fitted(each, shape, value))
+            for value, each, shape in screen.leaders(self._catalogue)
+            if each.law.id in tried
+        }
+        best = min(trials.values(), key=lambda each: each.total, default=alone)
+        if best.total >= alone.total:
+            return
+        catalogue = tuple(
+            each.changed_by(alone.base.residual - trials[each.name].base.residual)
+            if each.name in trials
+            else each
+            for each in self._catalogue
+        )
+        yield Place(alone.base, catalogue, {name: each.base for name, each in trials.items()})
+        found = _extended(model, best, self._catalogue)
+        yield Place(found.base, self._at(found))
+
+    def _at(self, reached: Reached) -> Candidates:
+        held = {effect.name for effect in reached.base.problem.model.effects}
+        near = _near(self._model, reached.effects)
+        return wrist_candidates(point_of(reached.base), held, near, self._progress)
 
 
 def point_of(base: BaseFit) -> Point:
@@ -125,11 +182,6 @@ def point_of(base: BaseFit) -> Point:
     sessions = base.problem.sessions
     used = tuple(each.measured for each in sessions)
     return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
-
-
-def fitted_extras(base: BaseFit) -> dict[str, Effect]:
-    """Return the effects fitted along with the base, by their names."""
-    return {each.name: each for each in base.effects(0) if each.name in base.extras}
 
 
 def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[str, float]]:
@@ -205,11 +257,13 @@ def _with(
 ) -> Reached:
     prices = {name: price for name, price in reached.prices.items() if name != instead_of}
     extras = [reached.effects[name] for name in prices] + [added.effect]
-    sessions, measured = reached.base.problem.sessions, reached.base.problem.table.measured
+    sessions = reached.base.problem.sessions
     base = fit_base(model, sessions, extras, reached.base)
-    if base.cost > ROUGH * measured.sum():
-        base = min(base, fit_base(model, sessions, extras), key=lambda each: each.cost)
-    return replace(reached, base=base, prices={**prices, added.candidate.name: added.price})
+    found = replace(reached, base=base, prices={**prices, added.candidate.name: added.price})
+    if found.rough:
+        afresh = replace(found, base=fit_base(model, sessions, extras))
+        found = min(found, afresh, key=lambda each: each.total)
+    return found
 
 
 def _without(model: ErrorModel, reached: Reached, name: str) -> Reached:
