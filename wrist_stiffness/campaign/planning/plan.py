@@ -18,7 +18,6 @@ from wrist_stiffness.campaign.planning.goals import all_goals, nearest, needed, 
 from wrist_stiffness.campaign.planning.information import (
     Goal,
     Information,
-    Layout,
     MeasurementNoise,
     by_truth,
     calibrated,
@@ -193,8 +192,8 @@ def plan(
         start += carried_over(each, (*SESSION, TARE))
     if before:
         truths = after_data(start, known.layout, question.alike, rng)
-        refuted = refuted(start, known.layout, question.alike)
-        goals = tuple(goal for goal in goals if goal.truth not in refuted)
+        excluded = refuted(start, known.layout, question.alike)
+        goals = tuple(goal for goal in goals if goal.truth not in excluded)
     else:
         truths = as_asked(known, question.alike)
     grams, start, layout = truths.of(known.grams), truths.of(start), truths.layout
