@@ -13,15 +13,19 @@ from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.situation import Situation
 
-FELT = {
+SHIFTS = {
     "joint_1": "uvw",
     "joint_2": "uv",
-    "joint_3": "u",
+    "joint_3": "uv",
     "joint_4": "uv",
     "joint_5": "uvw",
 }
-"""Directions that reach the platform: a cylindrical joint takes up its own axis, and joint_3's body
-on the motor's side, link_3, also slides along and turns about joint_4."""
+"""Directions of a shift that reach the platform or a flange: a cylindrical joint takes up its own
+axis.  joint_3's body on the motor's side, link_3, also slides along joint_4: its v is felt only
+where a flange of joint_4 touches."""
+
+TILTS = SHIFTS | {"joint_3": "u"}
+"""Directions of a tilt that reach the platform: link_3 also turns about joint_4."""
 
 
 class AxisMisalignment(Law):
@@ -42,16 +46,17 @@ class AxisMisalignment(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return shifts and tilts along and about the felt directions."""
         return (
-            *(symmetric(f"shift_{axis}_um", 5000.0, 30.0) for axis in FELT[place]),
-            *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in FELT[place]),
+            *(symmetric(f"shift_{axis}_um", 5000.0, 30.0) for axis in SHIFTS[place]),
+            *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in TILTS[place]),
         )
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the screw, turned with its body."""
-        felt = FELT[place]
-        axes = cross_axes(at.table.geometry, place)[: len(felt)]
-        shift = np.array([values[f"shift_{axis}_um"] for axis in felt]) @ axes
-        tilt = np.array([values[f"tilt_{axis}_mdeg"] for axis in felt]) @ axes
+        axes = cross_axes(at.table.geometry, place)
+        shift, tilt = (
+            np.array([values[f"{kind}_{axis}_{unit}"] for axis in felt]) @ axes[: len(felt)]
+            for kind, felt, unit in (("shift", SHIFTS[place], "um"), ("tilt", TILTS[place], "mdeg"))
+        )
         return at.screw(place, np.concatenate([shift, tilt])), None
