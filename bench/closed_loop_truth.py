@@ -79,7 +79,9 @@ class TrueRunningModel:
         configuration = self.model.table.workspace.configuration(theta)
         turned = state.rotation[0] @ configuration.platform.T
         twist = log_motion(turned[None], state.shift)[0]
-        return Prediction(twist, configuration, np.zeros(0, dtype=bool), self.model)
+        return Prediction(
+            twist, configuration, np.zeros(0, dtype=bool), self.model.table_covariance
+        )
 
 
 class PerfectStream(CorrectionStream):

@@ -189,7 +189,13 @@ class ErrorModel:
 
         sensor = added.sensor(configuration)
         return Prediction(
-            twist, configuration, active, self, sensor, of_parameters, warnings=added.warnings
+            twist,
+            configuration,
+            active,
+            self.table_covariance,
+            sensor,
+            of_parameters,
+            warnings=added.warnings,
         )
 
     @cached_property
@@ -375,7 +381,7 @@ class Session:
             twist,
             configuration,
             result.active[0],
-            model,
+            model.table_covariance,
             (_only(left), _only(right)),
             lambda: varied()[0],
             warnings=result.warnings,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,6 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.single_motion import exp_one, log_one
-
-if TYPE_CHECKING:
-    from wrist_stiffness.model.error_model import ErrorModel
 
 
 @dataclass(frozen=True)
@@ -30,8 +26,8 @@ class Prediction:
         The rigid wrist.
     active : (m,) bool
         Flange sectors in contact.
-    model : ErrorModel
-        Made the prediction.
+    of_table : callable
+        Configuration and twist -> covariance (6, 6) of what the table says.
     sensor : pair of (6,) float
         X and Y of the pose sensor in F [m, rad]; None for nothing.
     of_parameters : callable, optional
@@ -45,7 +41,7 @@ class Prediction:
     twist: Array
     configuration: Configuration
     active: NDArray[np.bool_]
-    model: ErrorModel = field(repr=False)
+    of_table: Callable[[Configuration, Array], Array] = field(repr=False)
     sensor: tuple[Array | None, Array | None] = (None, None)
     of_parameters: Callable[[], Array] | None = field(default=None, repr=False)
     added_covariance: Array | None = None
@@ -54,7 +50,7 @@ class Prediction:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the twist, (6, 6); made where it is asked for, as a search does not."""
-        covariance = self.model.table_covariance(self.configuration, self.twist)
+        covariance = self.of_table(self.configuration, self.twist)
         if self.of_parameters is not None:
             covariance = covariance + self.of_parameters()
         if self.added_covariance is not None:
