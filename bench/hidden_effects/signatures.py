@@ -44,7 +44,7 @@ def sized_or_largest(scale: Scale, start: HiddenEffect) -> tuple[HiddenEffect, s
     try:
         return scale.sized(start, SIZE), f"size {SIZE:g}"
     except InputError:
-        return start, f"the most that is plausible, size {scale.size(start):.2g}"
+        return start, f"plausible, size {scale.size(start):.2g}"
 
 
 def amount(magnitude: float, unit: str) -> str:
