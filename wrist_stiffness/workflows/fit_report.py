@@ -13,9 +13,6 @@ from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import against_floor, is_at_floor, over_floor
 
-FAR = 3.0
-"""Standard deviations of its prior beyond which a parameter is farther off than usual."""
-
 TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
 
 NOT_AT_THE_FLOOR = (
@@ -136,7 +133,7 @@ def far_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
     return [
         f"  {each.effect} {each.key}: {tolerances(each)}; {checks[each.effect]}"
         for each in parameters
-        if each.excited and abs(each.moved) > FAR
+        if each.far
     ]
 
 

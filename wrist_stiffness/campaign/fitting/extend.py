@@ -30,9 +30,6 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
-FAR = 3.0
-"""Standard deviations of its prior beyond which a parameter is farther off than usual."""
-
 MOVED = 2.0
 """Uncertainties, of before, by which a parameter of the base must move to be named."""
 
@@ -120,8 +117,7 @@ class Extension:
         # On a bound of zero a parameter is nothing, which every effect may be in part.
         bounded = [each for each in self.own if each.at_bound and each.value != 0.0]
         untold = [each for each in self.own if not (each.at_bound or each.excited)]
-        far = [each for each in self.own if each.excited and abs(each.moved) > FAR]
-        far = [each for each in far if not each.at_bound]
+        far = [each for each in self.own if each.far and not each.at_bound]
         if bounded:
             keys = ", ".join(each.key for each in bounded)
             out.append(f"on its bound: {keys}; the data ask for what cannot be")

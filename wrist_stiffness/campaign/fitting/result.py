@@ -19,6 +19,9 @@ from wrist_stiffness.model.parameters import Estimate
 EXCITED = 0.7
 """A parameter is excited if its uncertainty falls below this share of its prior's."""
 
+FAR = 3.0
+"""Standard deviations of its prior beyond which a parameter is farther off than usual."""
+
 TOGETHER = 0.7
 """Correlation from which two parameters are said to be told together only."""
 
@@ -65,6 +68,11 @@ class Fitted:
     def moved(self) -> float:
         """How far it went from the mean of its prior, in standard deviations that are usual."""
         return (self.value - self.prior) / self.usual
+
+    @property
+    def far(self) -> bool:
+        """Whether the data say that it is farther off than usual."""
+        return self.excited and abs(self.moved) > FAR
 
 
 @dataclass(frozen=True, eq=False)
