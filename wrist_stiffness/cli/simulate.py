@@ -27,6 +27,7 @@ USUAL_SIZE = 3.0
 """Of an effect that is named without one."""
 
 DRAWN_FOR = (
+    "table",
     "seconds",
     "rate",
     "seed",
@@ -186,6 +187,7 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     )
     if hidden.effect in {law for law, _ in SET_UP}:
         print("every session sets this up anew: the right diagnosis is that nothing is missing")
-    options = (f"--{name.replace('_', '-')} {getattr(arguments, name)}" for name in DRAWN_FOR)
-    print(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(options)}")
+    values = {name: getattr(arguments, name) for name in DRAWN_FOR}
+    told = (f"--{n.replace('_', '-')} {value}" for n, value in values.items() if value is not None)
+    print(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(told)}")
     return EXIT_DONE
