@@ -18,6 +18,7 @@ from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import TOLERATED, FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis.shared import apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -108,13 +109,13 @@ class BaseFit:
         return np.where(self.of_base & (self.problem.weights == 1.0), 1.0, np.inf)
 
     @property
-    def of_base(self) -> Array:
+    def of_base(self) -> Mask:
         """Which unknowns belong to the base, (p,) bool."""
         usual = len(self._usual)
         return np.array([unknown.free < usual for unknown in self.problem.unknowns])
 
     @property
-    def on_base(self) -> Array:
+    def on_base(self) -> Mask:
         """Which unknowns are extras on top of a tolerance of the base, (p,) bool."""
         free = self.problem.free
         names = np.array([free[u.free].effect.name in self._usual for u in self.problem.unknowns])
@@ -128,10 +129,19 @@ class BaseFit:
         """Return the extras by their names, of those on top of the base only what is on top."""
         usual, found = len(self._usual), {}
         for place, free in enumerate(self.problem.free[usual:], usual):
-            own = [(u, z) for u, z in zip(self.problem.unknowns, self.z, strict=True) if u.free == place]
-            values = {u.key: u.mean + float(z) * u.step for u, z in own}
+            # On a bound the way to steps and back rounds beyond it.
+            values = {
+                u.key: float(np.clip(u.mean + z * u.step, u.lower, u.upper))
+                for u, z in zip(self.problem.unknowns, self.z, strict=True)
+                if u.free == place
+            }
             found[free.effect.name] = free.effect.with_values(values)
         return found
+
+    @property
+    def strain(self) -> float:
+        """Sum of squares of the priors of the base."""
+        return float(np.sum((self.problem.weights * self.z)[self.of_base] ** 2))
 
     def covariance(self) -> Array:
         """Return the covariance of all unknowns in steps, to first order, (p, p)."""
