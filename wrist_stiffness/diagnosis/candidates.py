@@ -82,6 +82,8 @@ class Candidate:
         ``yes``, ``needs_signal`` or ``no``.
     fitted : int, optional
         Numbers that were fitted to these observations before they became columns: they cost.
+    strain : float, optional
+        Sum of squares by which that fit moved priors further than the base alone: it costs too.
     """
 
     effect: str
@@ -94,6 +96,7 @@ class Candidate:
     check: str = ""
     compensable: str = "yes"
     fitted: int = 0
+    strain: float = 0.0
 
     @property
     def name(self) -> str:

@@ -101,7 +101,8 @@ def evidence_of(base: Base, hypothesis: Hypothesis, gain: float, scale: float = 
     price = float(np.log(base.freedom))
     added = addition(base, hypothesis)
     if added.sized is None:
-        return gain / scale - hypothesis.candidate.freedom * price
+        candidate = hypothesis.candidate
+        return (gain - candidate.strain) / scale - candidate.freedom * price
     own = float(worth_along(added.moment, added.sized[1], scale))
     return own - len(hypothesis.candidate.shape) * price
 
@@ -179,5 +180,5 @@ def _scores(base: Base, added: Addition, along: Array, moment: Array, energy: Ar
     price = float(np.log(base.freedom))
     candidate = added.hypothesis.candidate
     if added.sized is None:
-        return np.asarray(gain / variance - candidate.freedom * price)
+        return np.asarray((gain - candidate.strain) / variance - candidate.freedom * price)
     return worth_along(moment, added.sized[1], variance) - len(candidate.shape) * price

@@ -70,6 +70,7 @@ class WristCandidate:
     exact: Callable[[Shape], Array] | None = None
     seen: bool = False
     change: Array | None = None
+    strain: float = 0.0
     points: bool = True
 
     @property
@@ -120,9 +121,9 @@ class WristCandidate:
             total = total + float(np.prod(weight)) * self.known[corner]
         return total
 
-    def changed_by(self, change: Array) -> WristCandidate:
+    def changed_by(self, change: Array, strain: float) -> WristCandidate:
         """Return it with what a whole fit changes, (u, 6), in place of its columns."""
-        return replace(self, change=change)
+        return replace(self, change=change, strain=strain)
 
     def candidate(self) -> Candidate:
         """Return it as the statistics take it."""
@@ -135,6 +136,7 @@ class WristCandidate:
             columns=lambda units, shape: change[units.rows],
             shape=(),
             fitted=columns.freedom - 1,
+            strain=self.strain,
         )
 
     def _by_columns(self) -> Candidate:

@@ -162,9 +162,7 @@ class Search:
         if best.total >= alone.total:
             return
         catalogue = tuple(
-            each.changed_by(alone.base.residual - trials[each.name].base.residual)
-            if each.name in trials
-            else each
+            _as_fitted(each, alone.base, trials[each.name].base) if each.name in trials else each
             for each in self._catalogue
         )
         yield Place(alone.base, catalogue, {name: each.base for name, each in trials.items()})
@@ -175,6 +173,12 @@ class Search:
         held = {effect.name for effect in reached.base.problem.model.effects}
         near = _near(self._model, reached.effects)
         return wrist_candidates(point_of(reached.base), held, near, self._progress)
+
+
+def _as_fitted(candidate: WristCandidate, alone: BaseFit, fitted: BaseFit) -> WristCandidate:
+    """Return a candidate that stands for a whole fit with it."""
+    change = alone.residual - fitted.residual
+    return candidate.changed_by(change, fitted.strain - alone.strain)
 
 
 def point_of(base: BaseFit) -> Point:
