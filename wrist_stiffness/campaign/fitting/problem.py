@@ -84,6 +84,10 @@ class Unknown:
     lower: float
     upper: float
 
+    def value(self, steps: float) -> float:
+        """Return its value so many steps from the mean, within the bounds."""
+        return min(max(self.mean + steps * self.step, self.lower), self.upper)
+
 
 def _weight(free: FreeEffect, parameter: Parameter, scale: float) -> float:
     if not np.isfinite(scale):
@@ -165,20 +169,43 @@ class FitProblem:
         session : int
             Number of the session.
         """
+        return self._with_values(self._values(z, session))
+
+    def _values(self, z: Array, session: int) -> list[dict[str, float]]:
+        """Return the fitted values of each free effect."""
         values: list[dict[str, float]] = [{} for _ in self.free]
-        for unknown, steps in zip(self.unknowns, z, strict=True):
+        for unknown, steps in zip(self.unknowns, z.tolist(), strict=True):
             if unknown.session in (None, session):
-                value = unknown.mean + float(steps) * unknown.step
-                values[unknown.free][unknown.key] = min(max(value, unknown.lower), unknown.upper)
-        found = [self._effect(place, tuple(own.items())) for place, own in enumerate(values)]
-        built = [place for place in range(len(found)) if place not in self._on_top]
-        gaps = self._shims.gaps(self._as_built, [found[place] for place in built])
+                values[unknown.free][unknown.key] = unknown.value(steps)
+        return values
+
+    def _with_values(self, values: list[dict[str, float]]) -> tuple[Effect, ...]:
+        keys = [(place, tuple(own.items())) for place, own in enumerate(values)]
+        built = self._built
+        gaps = self._shims.gaps(self._as_built, [self._effect(*keys[place]) for place in built])
         for number, gap in gaps.items():
-            place = built[number]
-            found[place] = self._effect(place, (*values[place].items(), (GAP, gap)))
+            place, own = keys[built[number]]
+            keys[place] = place, (*own, (GAP, gap))
+        found = {place: self._effect(*keys[place]) for place in built}
         for place, first in self._on_top.items():
-            found[first] = _together(found[first], found[place])
-        return tuple(found[place] for place in built)
+            found[first] = self._sum(*keys[first], *keys[place])
+        return tuple(found.values())
+
+    def _moved(
+        self,
+        effects: tuple[Effect, ...],
+        values: list[dict[str, float]],
+        unknown: Unknown,
+        steps: float,
+    ) -> tuple[Effect, ...]:
+        """Return the effects of these values with one unknown so many steps from its mean."""
+        free = unknown.free
+        own = values[free] | {unknown.key: unknown.value(steps)}
+        with_others = self._shims.move_with(self.free[free].effect)
+        if with_others or free in self._on_top or free in self._on_top.values():
+            return self._with_values([*values[:free], own, *values[free + 1 :]])
+        at = self._built.index(free)
+        return (*effects[:at], self._effect(free, tuple(own.items())), *effects[at + 1 :])
 
     @cached_property
     def _on_top(self) -> dict[int, int]:
@@ -198,9 +225,24 @@ class FitProblem:
         return effect
 
     @cached_property
+    def _sum(self) -> Callable[[int, Values, int, Values], Effect]:
+        """Sums of two of these effects."""
+
+        @lru_cache(maxsize=MOST_KNOWN)
+        def together(first: int, own: Values, place: int, values: Values) -> Effect:
+            return _together(self._effect(first, own), self._effect(place, values))
+
+        return together
+
+    @cached_property
+    def _built(self) -> tuple[int, ...]:
+        """Places of the free effects but for what came on top of them later."""
+        return tuple(place for place in range(len(self.free)) if place not in self._on_top)
+
+    @cached_property
     def _as_built(self) -> tuple[Effect, ...]:
-        """Starts of the free effects but for what came on top of them later."""
-        return tuple(f.effect for place, f in enumerate(self.free) if place not in self._on_top)
+        """Starts of these."""
+        return tuple(self.free[place].effect for place in self._built)
 
     @cached_property
     def _shims(self) -> Shims:
@@ -244,16 +286,17 @@ class FitProblem:
         def memoryless(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
             return tuple(effect for effect in effects if not model.remembers((effect,)))
 
-        whole = (*self.model.effects, *self.effects(z, number))
+        values = self._values(z, number)
+        effects = self._with_values(values)
+        whole = (*self.model.effects, *effects)
         step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
         moved, trials, by_path = [], [], []
         for place in asked:
             unknown = self.unknowns[place]
             if unknown.session not in (None, number):
                 continue
-            other = z.copy()
-            other[place] += step[place]
-            trial = (*self.model.effects, *self.effects(other, number))
+            other = self._moved(effects, values, unknown, float(z[place] + step[place]))
+            trial = (*self.model.effects, *other)
             by_path.append(model.remembers((self.free[unknown.free].effect,)))
             trials.append(trial if by_path[-1] else memoryless(trial))
             moved.append(place)

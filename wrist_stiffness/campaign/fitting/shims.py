@@ -53,6 +53,10 @@ class Shims:
             opening[effect.name] = tuple(slopes)
         return cls(opening)
 
+    def move_with(self, effect: Effect) -> bool:
+        """Tell whether a change of an effect changes what `gaps` says."""
+        return effect.name in self.opening or effect.law.id == GAPS
+
     def gaps(self, start: Sequence[Effect], found: Sequence[Effect]) -> dict[int, float]:
         """Return the gaps of found effects when they follow the axes from where these started.
 

@@ -32,6 +32,9 @@ EVENLY_SPREAD = 1.0 / np.sqrt(3.0)
 
 MOST_STEPS = 20
 
+MOST_POINTS = 4
+"""So many points keep their columns."""
+
 COOLING = 0.05
 """Least ratio of the variances of two steps: believed too early, the data close a wrong flange."""
 
@@ -57,6 +60,22 @@ class BaseProblem(FitProblem):
     """
 
     whole: ErrorModel
+
+    def columns_at(self, z: Array, places: tuple[int, ...] | None = None) -> Array:
+        """Return `columns`, of the last few points without evaluating anew; not to be changed.
+
+        A fit ends where its last step failed, and the next one begins where it ended.
+        """
+        key = (z.tobytes(), places)
+        if key not in self._known:
+            if len(self._known) == MOST_POINTS:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = self.columns(z, places)
+        return self._known[key]
+
+    @cached_property
+    def _known(self) -> dict[tuple[bytes, tuple[int, ...] | None], Array]:
+        return {}
 
     @cached_property
     def _factor(self) -> Array:
@@ -94,6 +113,8 @@ class BaseFit:
         Names of the further effects.
     cost : float
         Weighted sum of squares with the priors' part, in units of the noise.
+    bare : BaseProblem
+        The base alone, which knows its columns here.
     """
 
     problem: BaseProblem
@@ -102,6 +123,7 @@ class BaseFit:
     columns: Array
     extras: tuple[str, ...]
     cost: float
+    bare: BaseProblem
 
     @property
     def prior_std(self) -> Array:
@@ -226,7 +248,13 @@ def fit_base(
     more = [_about_zero(each) for each in ordered]
     on_base = sum(each.name in usual for each in ordered)
     whole = model.with_effects(*held)
-    bare = BaseProblem(whole, sessions, (*free, *more[:on_base]), model)
+    if start is not None and start.bare.whole is model and start.bare.sessions is sessions:
+        alone = start.bare
+    else:
+        alone = BaseProblem(whole, sessions, free, model)
+    bare = alone
+    if on_base:
+        bare = BaseProblem(whole, sessions, (*free, *more[:on_base]), model)
     problem = BaseProblem(whole, sessions, (*free, *more), model)
     z = _start(problem, start, added)
     lower, upper = problem.bounds
@@ -254,7 +282,8 @@ def fit_base(
         if cooled and before - after < ENOUGH * before:
             break
     cost = _cost(problem.whiten(residual), z, weights, 1.0)
-    return BaseFit(problem, z, residual, _columns(problem, bare, z), tuple(added), cost)
+    columns = _columns(problem, bare, z)
+    return BaseFit(problem, z, residual, columns, tuple(added), cost, alone)
 
 
 def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
@@ -264,12 +293,12 @@ def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
     again for each of them.
     """
     of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
-    of_extras = [place for place, u in enumerate(problem.unknowns) if u.free >= len(bare.free)]
-    first = bare.columns(z[of_bare])
+    of_extras = tuple(n for n, u in enumerate(problem.unknowns) if u.free >= len(bare.free))
+    first = bare.columns_at(z[of_bare])
     columns = np.zeros((*first.shape[:2], len(z)))
     columns[:, :, of_bare] = first
     if of_extras:
-        columns[:, :, of_extras] = problem.columns(z, places=of_extras)
+        columns[:, :, of_extras] = problem.columns_at(z, of_extras)
     return columns
 
 
