@@ -1,5 +1,7 @@
 """The search for the point: effects enter while they pay, and hold their places against others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,19 @@ def test_what_the_data_do_not_show_of_an_effect_stays_at_its_usual_size(model, u
     sizes = np.array([abs(e.value) / scale[key] for key, e in own.estimates.items()])
     assert sizes.max() < 5.0
     assert np.median(sizes) < 1.0
+
+
+@pytest.mark.slow
+def test_an_extra_on_its_bound_stays_an_effect(both):
+    base = both.base
+    bound = find_law("backlash").parameters("motor_1")[0].upper
+    z = base.z.copy()
+    for place, unknown in enumerate(base.problem.unknowns):
+        if base.problem.free[unknown.free].effect.name == "backlash@motor_1":
+            # What the way to steps and back rounds to.
+            z[place] = (bound - unknown.mean) / unknown.step * (1.0 + 1e-15)
+    found = replace(base, z=z).beyond()["backlash@motor_1"]
+    assert found.estimates["width_mdeg"].value == bound
 
 
 def test_motors_can_turn_back_what_points_the_platform_elsewhere():
