@@ -172,7 +172,7 @@ def _scores(base: Base, added: Addition, along: Array, moment: Array, energy: Ar
     along, moment : (r, q) and (k, q) arrays
         Product of its directions, and of those at usual sizes, with each residual.
     energy : (q,) array
-        Sum of squares of each residual.
+        Sum of squares of each residual, the measured one first.
     """
     gain = np.sum(along**2, axis=0)
     left = base.freedom - len(along)
@@ -180,5 +180,8 @@ def _scores(base: Base, added: Addition, along: Array, moment: Array, energy: Ar
     price = float(np.log(base.freedom))
     candidate = added.hypothesis.candidate
     if added.sized is None:
-        return np.asarray((gain - candidate.strain) / variance - candidate.freedom * price)
+        # What a fit relieved the priors of is evidence, and no rearranged residual did that.
+        relieved = np.zeros(len(energy))
+        relieved[0] = -candidate.strain
+        return np.asarray((gain + relieved) / variance - candidate.freedom * price)
     return worth_along(moment, added.sized[1], variance) - len(candidate.shape) * price

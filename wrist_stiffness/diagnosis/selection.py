@@ -154,8 +154,14 @@ def _sharpened(
 
 
 def _others(hypotheses: list[Hypothesis], entered: tuple[Entered, ...]) -> list[Hypothesis]:
+    """Return what can still enter: of all that were fitted alone, one at most."""
     taken = {each.name for each in entered}
-    return [each for each in hypotheses if each.candidate.name not in taken]
+    alone = any(each.hypothesis.candidate.fitted for each in entered)
+    return [
+        each
+        for each in hypotheses
+        if each.candidate.name not in taken and not (alone and each.candidate.fitted)
+    ]
 
 
 def _swapped(
