@@ -6,6 +6,7 @@ counts would both drown what a load does and make the mean look too good.
 """
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from wrist_stiffness.diagnosis.observations import Array, Observations
 
@@ -28,8 +29,8 @@ def own_covariance(observations: Observations, covariance: Array) -> Array:
     return np.asarray(whole - shared @ np.swapaxes(shared, 1, 2))
 
 
-def apart(observations: Observations, factors: Array, columns: Array) -> Array:
-    """Bring columns to unit scatter that the units of a stand no longer share, (n, m, k).
+class Apart:
+    """Brings columns to unit scatter that the units of a stand no longer share.
 
     The covariance of a stand is that of independent units plus few directions; its inverse root
     differs from theirs in these directions alone.
@@ -40,19 +41,39 @@ def apart(observations: Observations, factors: Array, columns: Array) -> Array:
         Units.
     factors : (n, m, m) array
         Inverse factors of each unit's own covariance.
-    columns : (n, m, k) array
-        Zero where not measured.
     """
-    white = factors @ columns
-    if observations.shared is None or observations.stand is None:
-        return np.asarray(white)
-    loadings = factors @ (observations.shared * observations.measured[:, :, None])
-    for stand in np.unique(observations.stand[observations.stand >= 0]):
-        rows = np.flatnonzero(observations.stand == stand)
-        tall = loadings[rows].reshape(-1, loadings.shape[2])
-        left, size, _ = np.linalg.svd(tall, full_matrices=False)
-        flat = white[rows].reshape(len(tall), -1)
-        shrink = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
-        flat = flat - left @ (shrink[:, None] * (left.T @ flat))
-        white[rows] = flat.reshape(white[rows].shape)
-    return np.asarray(white)
+
+    def __init__(self, observations: Observations, factors: Array) -> None:
+        self._factors = factors
+        self._shrink = np.empty((0, 1))
+        if observations.shared is None or observations.stand is None:
+            return
+        loadings = factors @ (observations.shared * observations.measured[:, :, None])
+        numbers = np.arange(observations.values.size).reshape(observations.values.shape)
+        entries, sizes, count = [], [np.empty(0)], 0
+        for stand in np.unique(observations.stand[observations.stand >= 0]):
+            units = observations.stand == stand
+            tall = loadings[units].reshape(-1, loadings.shape[2])
+            left, size, _ = np.linalg.svd(tall, full_matrices=False)
+            rows, columns = np.meshgrid(numbers[units], count + np.arange(len(size)), indexing="ij")
+            entries.append(np.stack([left.ravel(), rows.ravel(), columns.ravel()]))
+            sizes.append(size)
+            count += len(size)
+        if count:
+            self._shrink = 1.0 - 1.0 / np.sqrt(1.0 + np.concatenate(sizes)[:, None] ** 2)
+            value, row, column = np.concatenate(entries, axis=1)
+            at = (row.astype(int), column.astype(int))
+            self._directions = csr_array((value, at), shape=(observations.values.size, count))
+
+    def __call__(self, columns: Array) -> Array:
+        """Return columns (n, m, k), zero where not measured, of unit scatter, (n, m, k)."""
+        white = np.asarray(self._factors @ columns)
+        if len(self._shrink):
+            flat = white.reshape(len(white) * white.shape[1], white.shape[2])
+            flat -= self._directions @ (self._shrink * (self._directions.T @ flat))
+        return white
+
+
+def apart(observations: Observations, factors: Array, columns: Array) -> Array:
+    """Bring columns (n, m, k) to unit scatter once: see `Apart`."""
+    return Apart(observations, factors)(columns)

@@ -19,7 +19,7 @@ from wrist_stiffness.campaign.fitting.free_effects import TOLERATED, FreeEffect,
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.campaign.units import Mask
-from wrist_stiffness.diagnosis.shared import apart, own_covariance
+from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -78,19 +78,19 @@ class BaseProblem(FitProblem):
         return {}
 
     @cached_property
-    def _factor(self) -> Array:
+    def _apart(self) -> Apart:
         stated = self.table.covariance
         if stated is None:
             stated = np.diag(4.0 * WANDER**2)
         own = own_covariance(self.table, stated) + np.diag(WANDER**2)
-        return np.linalg.inv(np.linalg.cholesky(own))
+        return Apart(self.table, np.linalg.inv(np.linalg.cholesky(own)))
 
     def whiten(self, values: Array) -> Array:
         """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
         columns = values if values.ndim == 3 else values[:, :, None]
         measured = self.table.measured[:, :, None]
         filled = np.where(measured, np.nan_to_num(columns), 0.0)
-        white = apart(self.table, self._factor, filled)
+        white = self._apart(filled)
         flat: Array = white.reshape(-1, columns.shape[2])
         return flat if values.ndim == 3 else flat[:, 0]
 
