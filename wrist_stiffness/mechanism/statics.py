@@ -22,7 +22,7 @@ from wrist_stiffness.mechanism.components import (
 )
 from wrist_stiffness.mechanism.influence import Influence, influence
 from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
-from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.mechanism.vectors import below, beside, block_diagonal
 
 N_ELASTIC = len(ELASTIC)
 
@@ -359,24 +359,24 @@ def _summed(
     through = wrench[..., part, :]
     sagged = flexibility @ through[..., None]
     # Sums over the components by one product each: side by side, then below each other.
-    carry, slid = _beside(block_diagonal(g)), _beside(rows)
+    carry, slid = beside(block_diagonal(g)), beside(rows)
 
     # A unit slide force of each passive joint: by virtual work it pulls at the components with the
     # rows that map their translations to the slides.
     bent = flexibility[..., :3] @ np.swapaxes(rows, -1, -2)
-    slide_flexibility = slid @ _below(bent[..., :3, :])
-    slide_twist = carry @ _below(bent)
+    slide_flexibility = slid @ below(bent[..., :3, :])
+    slide_twist = carry @ below(bent)
 
     # What a unit force of each sector does through its own bushing.
     screw, screw_slide, screw_twist = (np.empty((*r.shape[:-3], len(own), k)) for k in (6, 3, 6))
     for component in np.unique(own):
-        beside = own == component
-        turned = _turned(r[..., component, None, :, :], sectors.screw[mine][beside])
-        screw[..., beside, :] = turned
-        screw_slide[..., beside, :] = turned[..., :3] @ np.swapaxes(
+        alike = own == component
+        turned = _turned(r[..., component, None, :, :], sectors.screw[mine][alike])
+        screw[..., alike, :] = turned
+        screw_slide[..., alike, :] = turned[..., :3] @ np.swapaxes(
             rows[..., component, :, :], -1, -2
         )
-        screw_twist[..., beside, :] = _turned(g[..., component, None, :, :], turned)
+        screw_twist[..., alike, :] = _turned(g[..., component, None, :, :], turned)
     # Half of a symmetric sum.
     half = 0.5 * slide_flexibility @ sectors.slide.T
     half[..., mine] += np.swapaxes(screw_slide, -1, -2)
@@ -386,25 +386,14 @@ def _summed(
     force_twist = slide_twist @ sectors.slide.T
     force_twist[..., mine] += np.swapaxes(screw_twist, -1, -2)
 
-    gap = sectors.gap + (slid @ _below(sagged[..., :3, :]))[..., 0] @ sectors.slide.T
+    gap = sectors.gap + (slid @ below(sagged[..., :3, :]))[..., 0] @ sectors.slide.T
     field = _to_body(r, gravity).take(own, axis=-3)
     gap[..., mine] += (sectors.weight_approach[mine, None, :] @ field)[..., 0, 0]
     gap[..., mine] += (screw * through.take(own, axis=-2)).sum(axis=-1)
     return _Sums(
-        compliance=carry @ _below(flexibility @ np.swapaxes(block_diagonal(g), -1, -2)),
+        compliance=carry @ below(flexibility @ np.swapaxes(block_diagonal(g), -1, -2)),
         force_twist=force_twist,
         approach=approach,
         gap=gap,
-        weight_twist=(carry @ _below(sagged))[..., 0],
+        weight_twist=(carry @ below(sagged))[..., 0],
     )
-
-
-def _beside(matrices: Array) -> Array:
-    """Put the c matrices (..., c, i, j) of each pose side by side, (..., i, c j)."""
-    moved = np.swapaxes(matrices, -3, -2)
-    return moved.reshape(*moved.shape[:-2], -1)
-
-
-def _below(matrices: Array) -> Array:
-    """Put the c matrices (..., c, i, j) of each pose below each other, (..., c i, j)."""
-    return matrices.reshape(*matrices.shape[:-3], -1, matrices.shape[-1])

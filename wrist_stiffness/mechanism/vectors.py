@@ -55,3 +55,14 @@ def block_diagonal(rotation: Array) -> Array:
     out[..., :3, :3] = rotation
     out[..., 3:, 3:] = rotation
     return out
+
+
+def beside(matrices: Array) -> Array:
+    """Put the c matrices (..., c, i, j) of each pose side by side, (..., i, c j)."""
+    moved = np.swapaxes(matrices, -3, -2)
+    return moved.reshape(*moved.shape[:-2], -1)
+
+
+def below(matrices: Array) -> Array:
+    """Put the c matrices (..., c, i, j) of each pose below each other, (..., c i, j)."""
+    return matrices.reshape(*matrices.shape[:-3], -1, matrices.shape[-1])
