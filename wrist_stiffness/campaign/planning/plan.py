@@ -33,6 +33,7 @@ from wrist_stiffness.campaign.planning.pool import (
     arrange,
     draw_settings,
     fixed_visits,
+    moved_outward,
     reference_pose,
 )
 from wrist_stiffness.campaign.planning.question import SESSION, TARE, Question
@@ -175,6 +176,8 @@ def plan(
     settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
     fixed = fixed_visits(settings, pace, workspace)
     whole = question.goals is None
+    if not whole:
+        settings += [moved_outward(setting, workspace) for setting in settings]
     order = rng.permutation(2 * len(settings))
     pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
     agree = bool(earlier and question.alike)

@@ -38,6 +38,9 @@ WARM_UP_SHARE, WARM_UP_LEAST_S, WARM_UP_MOST_S = 0.1, 30.0, 300.0
 DRAWS = 200
 """Tries to find a load within the table's range."""
 
+OUTWARD_STEPS = 30
+"""Radii that are tried for a setting that is moved outward."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setting:
@@ -146,19 +149,47 @@ def draw_settings(
     return settings
 
 
+def moved_outward(setting: Setting, workspace: Workspace) -> Setting:
+    """Return a setting as far from home as the workspace lets it be visited with its load.
+
+    Most effects differ most where the motors have turned far, which random poses seldom have.
+    """
+    reference = reference_pose(workspace)
+    nearest = float(np.linalg.norm(setting.theta))
+    farthest = float(np.linalg.norm(np.abs(workspace.rectangle).max(axis=0)))
+    for radius in np.linspace(farthest, nearest, OUTWARD_STEPS, endpoint=False):
+        theta = setting.theta * radius / nearest
+        if _visitable(workspace, theta, reference) and within(
+            setting.load.wrench(_platforms(workspace, theta, setting.approach)), workspace.limits
+        ):
+            return replace(setting, theta=theta)
+    return setting
+
+
 def _poses(workspace: Workspace, count: int, reference: Array, rng: np.random.Generator) -> Array:
-    """Return poses of the operative workspace that can be approached from all sides, (n, 2)."""
+    """Return poses that can be visited, (n, 2)."""
     lower, upper = workspace.rectangle
-    tilt = TILT_SHARE * workspace.limits.operative_tilt
     found: list[Array] = []
     while len(found) < count:
         theta = rng.uniform(lower, upper)
-        if not workspace.operative(theta) or workspace.mechanism.tilt(theta) > tilt:
-            continue
-        sides = np.array([[1.0, 1.0], [1.0, -1.0]])
-        if all(_approachable(workspace, theta, reference, side) for side in sides):
+        if _visitable(workspace, theta, reference):
             found.append(theta)
     return np.array(found)
+
+
+def _visitable(workspace: Workspace, theta: Array, reference: Array) -> bool:
+    """Tell whether a pose of the operative workspace can be approached from all sides."""
+    tilt = TILT_SHARE * workspace.limits.operative_tilt
+    if not workspace.operative(theta) or workspace.mechanism.tilt(theta) > tilt:
+        return False
+    sides = np.array([[1.0, 1.0], [1.0, -1.0]])
+    return all(_approachable(workspace, theta, reference, side) for side in sides)
+
+
+def _platforms(workspace: Workspace, theta: Array, approach: Array) -> Array:
+    """Return the platform's rotations on both approaches, (n, 3, 3)."""
+    way = theta + np.linspace(-1.0, 1.0, 9)[:, None] * (theta - Visit(theta, approach).before)
+    return workspace.mechanism.forward(way).platform
 
 
 def _approachable(workspace: Workspace, theta: Array, reference: Array, side: Array) -> bool:
@@ -179,8 +210,7 @@ def _draw_load(
     rng: np.random.Generator,
 ) -> AppliedLoad | None:
     """Return a load that stays in the table's range on both approaches, None if none does."""
-    way = theta + np.linspace(-1.0, 1.0, 9)[:, None] * (theta - Visit(theta, approach).before)
-    platform = workspace.mechanism.forward(way).platform
+    platform = _platforms(workspace, theta, approach)
     for _ in range(DRAWS):
         load = source.draw(gravity, rng)
         if within(load.wrench(platform), workspace.limits):
