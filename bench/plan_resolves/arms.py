@@ -84,8 +84,8 @@ class Arms:
             data = [self.first, extra]
         return needed, [len(each) for each in rounds]
 
-    def random(self) -> dict[str, Needed]:
-        """Return what random poses need, measured like planned ones, and under load only."""
+    def random(self) -> tuple[Needed, Measured]:
+        """Return what random poses need, measured like planned ones, and the measurements."""
         rng = np.random.default_rng([self.case.seed, 1])
         settings = draw_settings(WORKSPACE, LOADS, TABLE.geometry.gravity, rng)
         visits = [setting.visits(PACE.dwell_s)[rng.integers(2)] for setting in settings]
@@ -94,8 +94,12 @@ class Arms:
             needed = self.needed(extra, [count])
             if np.isfinite(needed.poses):
                 break
-        once = replace(extra, experiment=once_each(extra.experiment))
-        return {"random": needed, "random_once": self.needed(once, [count])}
+        return needed, extra
+
+    def under_load(self, extra: Measured) -> Needed:
+        """Return what the same poses need where each is measured under its load only."""
+        once = once_each(extra.experiment)
+        return self.needed(replace(extra, experiment=once), [int(once.visit.max()) + 1])
 
     def performed(self, visits: list[Visit]) -> Measured:
         """Return what the virtual cell measures at visits."""

@@ -51,10 +51,11 @@ def outcome(seed: int, paper: Catalogue) -> dict[str, object]:
         case = paper.draw(seed)
         found: dict[str, object] = {"seed": seed, "truth": case.truth, "twins": case.twins}
         arms = Arms(case, paper)
-        needed = arms.random()
-        if needed["random"].poses <= AT_ONCE:
+        random, measured = arms.random()
+        if random.poses <= AT_ONCE:
             return {**found, "left_out": "random poses resolve it at once"}
-        needed["planned"], plans = arms.planned()
+        planned, plans = arms.planned()
+        needed = {"planned": planned, "random": random, "random_once": arms.under_load(measured)}
         found |= {name: asdict(each) for name, each in needed.items()}
         return {**found, "plans": plans, "seconds": round(monotonic() - begin, 1)}
     except NoCase as error:
