@@ -197,6 +197,11 @@ def main() -> int:
     parser.add_argument("--most", type=int, help="stop after so many cases")
     parser.add_argument("--minutes", type=float, help="begin no case after so many minutes")
     parser.add_argument("--only", default="", help="cases whose key holds this text")
+    parser.add_argument(
+        "--stages",
+        default="0,1,2,3",
+        help="0 main design, 1 other bases and sensors, 2 rests alone, 3 other experiments",
+    )
     parser.add_argument("--solvers", default=",".join(SOLVERS), help="names with commas between")
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
     arguments = parser.parse_args()
@@ -209,8 +214,11 @@ def main() -> int:
     done = defaultdict(set)
     for line in current(path, solvers):
         done[line["key"]].add(line["solver"])
+    stages = {int(each) for each in arguments.stages.split(",")}
     cases = [
-        c for c in (quick_cases() if arguments.quick else full_cases()) if arguments.only in c.key
+        case
+        for case in (quick_cases() if arguments.quick else full_cases())
+        if arguments.only in case.key and stage_of(case) in stages
     ]
     todo = [
         (case, missing)

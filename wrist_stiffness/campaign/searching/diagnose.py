@@ -34,6 +34,10 @@ LEAST_WANDER = 0.5
 and a drift below it is not told from one."""
 
 
+MUCH = 0.25
+"""Share of the excess over the noise that is much to be left beside what was named."""
+
+
 @dataclass(frozen=True, eq=False)
 class WristDiagnosis:
     """Answer of a diagnosis on the wrist.
@@ -94,7 +98,7 @@ def diagnose_sessions(
     search = Search(model, units, progress)
     place = search.quick()
     result = _asked(place, rng, settings)
-    if result.verdict == "unknown":
+    if _leaves_much(result):
         for other in search.thorough():
             again = _asked(other, rng, settings)
             if _says_more(again, result):
@@ -133,6 +137,12 @@ def _begun(place: Place, result: Diagnosis) -> tuple[BaseFit, list[Effect]]:
         found.get(each.name) or _started(known[each.name], each.parameters)
         for each in result.findings
     ]
+
+
+def _leaves_much(result: Diagnosis) -> bool:
+    """Tell whether an answer leaves so much unknown that a thorough search is worth its time."""
+    named_most = result.findings and result.unexplained.energy_share < MUCH
+    return result.verdict == "unknown" and not named_most
 
 
 def _says_more(one: Diagnosis, other: Diagnosis) -> bool:

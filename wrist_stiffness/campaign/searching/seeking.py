@@ -159,7 +159,7 @@ class Search:
             if each.law.id in tried
         }
         best = min(trials.values(), key=lambda each: each.total, default=alone)
-        if best.total >= alone.total:
+        if best.total >= self._reached.total:
             return
         catalogue = tuple(
             _as_fitted(each, alone.base, trials[each.name].base) if each.name in trials else each
