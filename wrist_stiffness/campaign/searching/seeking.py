@@ -159,8 +159,10 @@ class Search:
             if each.law.id in tried
         }
         best = min(trials.values(), key=lambda each: each.total, default=alone)
-        if best.total >= self._reached.total:
+        if best.total > min(alone.total, self._reached.total + WORTH):
             return
+        if len(self._reached.prices) == 1:
+            trials |= dict.fromkeys(self._reached.prices, self._reached)
         catalogue = tuple(
             _as_fitted(each, alone.base, trials[each.name].base) if each.name in trials else each
             for each in self._catalogue
