@@ -1,6 +1,7 @@
 """Hidden truths on the made-up arm, and on plain tables where every answer is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -227,6 +228,53 @@ def test_a_crowd_of_lookalikes_names_nothing(rng):
     assert (crowd.verdict, crowd.findings) == ("unknown", ())
     (named,) = diagnose(table, (line("z"), *twins[:3]), (offset(),), rng, few).findings
     assert len(named.names) == 3
+
+
+def test_what_resamples_do_not_choose_again_is_not_named(rng):
+    table = plain(rng)
+    table = table.with_values(table.values + np.outer(table.covariate("x"), [1, 1]))
+    catalogue = (line("x"), line("z"))
+    (named,) = diagnose(table, catalogue, (offset(),), rng).findings
+    assert named.name == "line@x"
+    never = replace(Settings(), least_stability=1.01)
+    doubted = diagnose(table, catalogue, (offset(),), rng, never)
+    assert (doubted.verdict, doubted.findings) == ("unknown", ())
+    assert (
+        "line@x explains it best, but only 100 % of the resamples" in doubted.unexplained.evidence
+    )
+
+
+def whole_fit(name, direction, strain=0.0):
+    """A candidate that was fitted alone, with three numbers, before it became a column."""
+
+    def columns(table, _):
+        return direction(table)[:, :, None]
+
+    share = (Parameter("share", 0.0),)
+    return Candidate("fit", name, share, columns, fitted=2, strain=strain)
+
+
+def test_of_effects_that_were_fitted_alone_one_enters(rng):
+    """Each has relieved the same priors: two would count that twice."""
+    table = plain(rng)
+    both = [np.outer(table.covariate(name), [1.0, 1.0]) for name in ("x", "z")]
+    table = table.with_values(table.values + both[0] + both[1])
+    fits = tuple(whole_fit(f"{n}", lambda t, own=own: own[t.rows]) for n, own in enumerate(both))
+    found = diagnose(table, fits, (offset(),), rng)
+    assert len(found.findings) == 1
+    assert found.verdict == "unknown"
+    free = tuple(replace(each, fitted=0) for each in fits)
+    assert len(diagnose(table, free, (offset(),), rng).findings) == 2
+
+
+def test_of_two_that_explain_alike_the_one_that_strains_the_base_stands_back(rng):
+    table = plain(rng)
+    change = np.outer(table.covariate("x"), [1.0, 1.0])
+    table = table.with_values(table.values + change)
+    easy = whole_fit("easy", lambda t: change[t.rows], strain=-20.0)
+    forced = whole_fit("forced", lambda t: change[t.rows], strain=20.0)
+    (named,) = diagnose(table, (forced, easy), (offset(),), rng).findings
+    assert named.names == ("fit@easy",)
 
 
 def test_permutations_by_which_nothing_could_be_found_are_refused():
