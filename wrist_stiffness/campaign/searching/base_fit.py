@@ -198,9 +198,9 @@ class BaseFit:
         """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
         return self.problem.whiten(values)
 
-    def without_extras(self) -> Observed:
-        """Return the table of what the base alone leaves where it was fitted with the extras."""
-        models = [self.model(n, with_extras=False) for n in range(len(self.problem.sessions))]
+    def left(self, with_extras: bool) -> Observed:
+        """Return the table of what the fit leaves, or only the base where it was fitted."""
+        models = [self.model(n, with_extras) for n in range(len(self.problem.sessions))]
         predicted = np.concatenate([each.along([each.effects])[0] for each in models])
         return tabulate(self.problem.model, self.problem.sessions, predicted)
 

@@ -34,6 +34,9 @@ LEAST_WANDER = 0.5
 and a drift below it is not told from one."""
 
 
+FOUND = ", found"
+"""After the name of an effect that is refitted beside the base, because it is known by now."""
+
 MUCH = 0.25
 """Share of the excess over the noise that is much to be left beside what was named."""
 
@@ -101,6 +104,10 @@ def diagnose_sessions(
     if _leaves_much(result):
         for other in search.thorough():
             again = _asked(other, rng, settings)
+            whole = [each.name for each in again.findings if each.name in other.fits]
+            if whole:
+                beside = search.beside(other.fits[whole[0]])
+                again = _confirmed(again, whole[0], _asked(beside, rng, settings))
             if _says_more(again, result):
                 place, result = other, again
                 break
@@ -114,16 +121,33 @@ def diagnose_sessions(
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
     suspected = _with_all(model, base, named)
     ranked = contributions(suspected, {each.name for each in kept})
-    observed = base.without_extras()
+    observed = base.left(with_extras=False)
     result = sized(valued(result, final), kept)
     return WristDiagnosis(result, observed, kept, final, suspected, ranked, absorbed)
 
 
 def _asked(place: Place, rng: np.random.Generator, settings: Settings | None) -> Diagnosis:
     """Return what the statistics say at a place."""
-    table = _table(place.base, place.base.without_extras())
     known = tuple(each.candidate() for each in place.candidates)
-    return diagnose(table, known, _nuisances(place.base), rng, settings)
+    nuisances = _nuisances(place.base, place.known)
+    return diagnose(_table(place), known, nuisances, rng, settings)
+
+
+def _confirmed(found: Diagnosis, name: str, beside: Diagnosis) -> Diagnosis:
+    """Return an answer with one finding, and of the others what is found beside it as well.
+
+    Slopes about the base alone say little of a second effect: flanges stand otherwise there.
+    """
+    (first,) = (each for each in found.findings if each.name == name)
+    if not beside.findings and len(found.findings) == 1:
+        return found
+    return replace(
+        found,
+        verdict="unknown" if beside.verdict == "unknown" else "effect",
+        after=beside.after,
+        findings=(first, *beside.findings),
+        unexplained=beside.unexplained,
+    )
 
 
 def _begun(place: Place, result: Diagnosis) -> tuple[BaseFit, list[Effect]]:
@@ -167,26 +191,30 @@ def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float
     return candidate.effect({name: value for name, (value, _) in parameters.items()}, shape)
 
 
-def _table(base: BaseFit, observed: Observed) -> Observations:
+def _table(place: Place) -> Observations:
     """Return what is left with the wrist's tolerances at their prior means again, to first order.
 
     So the priors of the statistics, which lie about zero, are the priors of the wrist.
     """
-    own = (np.isfinite(base.prior_std) & _of_wrist(base)) | base.on_base
-    values = observed.observations.values - base.columns[:, :, own] @ base.z[own]
-    return observed.observations.with_values(values)
+    base = place.base
+    own = np.isfinite(base.prior_std) & _of_wrist(base)
+    if not place.known:
+        own |= base.on_base
+    left = base.left(with_extras=place.known).observations
+    return left.with_values(left.values - base.columns[:, :, own] @ base.z[own])
 
 
 def _of_wrist(base: BaseFit) -> np.ndarray:
     return np.array([unknown.session is None for unknown in base.problem.unknowns])
 
 
-def _nuisances(base: BaseFit) -> tuple[Nuisance, ...]:
+def _nuisances(base: BaseFit, with_extras: bool = False) -> tuple[Nuisance, ...]:
     """Return the refitted base as columns; registrations, zeros and tare are free anew."""
     groups: dict[tuple[str, bool], dict[str, list[int]]] = {}
     for place, unknown in enumerate(base.problem.unknowns):
-        if base.of_base[place]:
+        if base.of_base[place] or with_extras:
             name = base.problem.free[unknown.free].effect.name
+            name += "" if base.of_base[place] else FOUND
             group = groups.setdefault((name, unknown.session is not None), {})
             group.setdefault(unknown.key, []).append(place)
     found = [

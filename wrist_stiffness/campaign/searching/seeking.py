@@ -68,11 +68,14 @@ class Place:
         The catalogue.
     fits : dict of str to BaseFit
         Where candidates stand for whole fits: these, by name.
+    known : bool
+        Whether what is fitted along with the base is known, and asked is what there is beside it.
     """
 
     base: BaseFit
     candidates: Candidates
     fits: Mapping[str, BaseFit] = field(default_factory=dict)
+    known: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +174,12 @@ class Search:
         found = _extended(model, best, self._catalogue)
         yield Place(found.base, self._at(found))
 
+    def beside(self, base: BaseFit) -> Place:
+        """Return the place where everything that was fitted along with a base is known."""
+        held = {effect.name for effect in base.problem.model.effects} | set(base.extras)
+        point = point_of(base, with_extras=True)
+        return Place(base, wrist_candidates(point, held, {}, self._progress), known=True)
+
     def _at(self, reached: Reached) -> Candidates:
         held = {effect.name for effect in reached.base.problem.model.effects}
         near = _near(self._model, reached.effects)
@@ -183,11 +192,11 @@ def _as_fitted(candidate: WristCandidate, alone: BaseFit, fitted: BaseFit) -> Wr
     return candidate.changed_by(change, fitted.strain - alone.strain)
 
 
-def point_of(base: BaseFit) -> Point:
-    """Return the fitted base, without the effects fitted along."""
+def point_of(base: BaseFit, with_extras: bool = False) -> Point:
+    """Return the fitted base, as a rule without the effects fitted along."""
     sessions = base.problem.sessions
     used = tuple(each.measured for each in sessions)
-    return Point(tuple(base.model(n, with_extras=False) for n in range(len(sessions))), used)
+    return Point(tuple(base.model(n, with_extras) for n in range(len(sessions))), used)
 
 
 def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[str, float]]:
