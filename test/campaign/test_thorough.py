@@ -8,8 +8,15 @@ from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import SHARE, wrist_candidates
-from wrist_stiffness.campaign.searching.diagnose import LEAST_WANDER, _wander, diagnose_sessions
+from wrist_stiffness.campaign.searching.diagnose import (
+    LEAST_WANDER,
+    _confirmed,
+    _wander,
+    diagnose_sessions,
+)
 from wrist_stiffness.campaign.searching.seeking import point_of
+from wrist_stiffness.diagnosis import Diagnosis
+from wrist_stiffness.diagnosis.result import Finding, Unexplained
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
@@ -53,8 +60,9 @@ def axis(**values):
 @pytest.mark.slow
 def test_an_axis_that_moved_after_shimming_is_found_with_the_whole_base(model, session):
     found = diagnose_sessions(model, [session], np.random.default_rng(1))
-    assert AXIS in found.diagnosis.findings[0].names
-    parameters = found.diagnosis.findings[0].parameters
+    (finding,) = found.diagnosis.findings
+    assert AXIS in finding.names
+    parameters = finding.parameters
     assert SHARE not in parameters
     assert all(sigma > 0.0 for _, sigma in parameters.values())
 
@@ -109,3 +117,29 @@ def test_a_wander_is_never_less_than_half_the_scatter_of_a_sample(alone):
     columns = _wander(alone).columns(alone.problem.table)
     size = np.sqrt(np.mean(columns[:, :, :6] ** 2, axis=0)).max(axis=1)
     assert np.all(size > 0.6 * LEAST_WANDER * session.white)
+
+
+def finding(name):
+    return Finding((tuple(name.split("@")),), {}, 0.1, 50.0, 0.001, 1.0, {}, "yes", "", "")
+
+
+def answer(verdict, *names):
+    left = Unexplained((), 0.0, "of " + verdict)
+    found = tuple(finding(name) for name in names)
+    return Diagnosis(verdict, "dwell", {}, {}, {}, (), found, left, (), 0, "")
+
+
+@pytest.mark.parametrize(
+    ("found", "beside", "verdict", "names"),
+    [
+        (("effect", "a@x", "b@x"), ("none",), "effect", ["a@x"]),
+        (("effect", "b@x", "a@x"), ("effect", "c@x"), "effect", ["a@x", "c@x"]),
+        (("effect", "a@x", "b@x"), ("unknown",), "unknown", ["a@x"]),
+        (("unknown", "a@x"), ("none",), "unknown", ["a@x"]),
+    ],
+)
+def test_beside_a_whole_fit_stays_what_is_found_about_it(found, beside, verdict, names):
+    """Of an only finding the verdict stays: what its law leaves is judged by what it explains."""
+    result = _confirmed(answer(*found), "a@x", answer(*beside))
+    assert result.verdict == verdict
+    assert [each.name for each in result.findings] == names
