@@ -131,7 +131,7 @@ class Search:
     sessions : tuple of UnitSession
         In the order of time.
     progress : callable
-        Told (done, total) while the catalogue is evaluated.
+        Told (done, total) while the catalogue is evaluated, and while whole fits are made.
     """
 
     def __init__(self, model: ErrorModel, sessions: Sessions, progress: Progress) -> None:
@@ -156,11 +156,11 @@ class Search:
         alone, model = self._alone, self._model
         tried = PRESSING | LOOSE if alone.rough else PRESSING
         screen = alone.screen()
-        trials = {
-            each.name: _with(model, alone, screen.fitted(each, shape, value))
-            for value, each, shape in screen.leaders(self._catalogue)
-            if each.law.id in tried
-        }
+        leaders = [each for each in screen.leaders(self._catalogue) if each[1].law.id in tried]
+        trials = {}
+        for number, (value, each, shape) in enumerate(leaders):
+            trials[each.name] = _with(model, alone, screen.fitted(each, shape, value))
+            self._progress(number + 1, len(leaders))
         best = min(trials.values(), key=lambda each: each.total, default=alone)
         if best.total > min(alone.total, self._reached.total + WORTH):
             return
