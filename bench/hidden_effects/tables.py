@@ -91,6 +91,9 @@ def newcombe(one: NDArray[np.bool_], two: NDArray[np.bool_]) -> tuple[float, flo
     return p - q - float(np.sqrt(max(low, 0.0))), p - q + float(np.sqrt(max(high, 0.0)))
 
 
+SHOWING = (0.0, 6.0, 12.0, 25.0, 50.0)
+"""Steps of the length of what is left of a signature, in standard deviations."""
+
 COUNT: Column = ("cases", lambda lines: str(len(lines)))
 TOP: Column = ("right top answer", rate_of(lambda line: line["top"]))
 INSIDE: Column = ("inside first class", rate_of(lambda line: line["inside"]))
@@ -198,6 +201,7 @@ def of_one_solver(lines: Sequence[Line], solver: str) -> str:
     posed = [line for line in own if line["main"] and _alone(line)]
     parts = [
         ("one effect that a wrist may have, main design: which", likely, "effect"),
+        ("how much is left of them beyond the base", [_seen(each) for each in likely], "from"),
         ("how large, plausible ones", likely, "size"),
         ("how large, all that can be seen", main, "size"),
         ("how large, seen or not", posed, "size"),
@@ -211,6 +215,11 @@ def of_one_solver(lines: Sequence[Line], solver: str) -> str:
         for title, mine, group in parts
         if mine
     )
+
+
+def _seen(line: Line) -> Line:
+    """Return a line with the standard deviations from which on its effect shows."""
+    return line | {"from": max(step for step in SHOWING if line["detectability"] >= step)}
 
 
 def _alone(line: Line) -> bool:
