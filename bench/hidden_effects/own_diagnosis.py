@@ -92,12 +92,13 @@ def calibrated(days: tuple[Day, Day]) -> tuple[Array, Array]:
 def predicted(model: ErrorModel, day: Day) -> Array:
     """Return what a model explains of a day's residual against the table, (u, 6).
 
-    Nothing where it refuses to predict: an effect of the load may lead beyond the table.
+    Nothing where it refuses to predict: there the sensor says a load beyond the table.
     """
     block = day.recorded.block
     twist = model.batch(block).measured
     refused = ~np.isfinite(twist).all(axis=1)
-    twist[refused] = ErrorModel("benchmark", wrist(), "closed_form").batch(block).measured[refused]
-    rotation, shift = exp_twist(twist)
+    rotation, shift = exp_twist(np.where(refused[:, None], 0.0, twist))
     nominal = model.table.mechanism.forward(block.theta).platform
-    return day.explained(rotation @ nominal, shift)
+    rotation, shift = rotation @ nominal, shift.copy()
+    rotation[refused], shift[refused] = day.base.rotation[refused], day.base.shift[refused]
+    return day.explained(rotation, shift)
