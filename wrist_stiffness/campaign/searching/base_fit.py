@@ -165,6 +165,13 @@ class BaseFit:
         """Sum of squares of the priors of the base."""
         return float(np.sum((self.problem.weights * self.z)[self.of_base] ** 2))
 
+    @property
+    def strained(self) -> bool:
+        """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
+        known = self.of_base & (self.problem.weights == 1.0)
+        own = np.array([unknown.session is None for unknown in self.problem.unknowns])
+        return bool(chi2.sf(self.strain, np.count_nonzero(known & own)) < 0.05)
+
     def covariance(self) -> Array:
         """Return the covariance of all unknowns in steps, to first order, (p, p)."""
         white = self.whiten(self.columns)

@@ -101,7 +101,7 @@ def diagnose_sessions(
     search = Search(model, units, progress)
     place = search.quick()
     result = _asked(place, rng, settings)
-    if _leaves_much(result):
+    if _leaves_much(result) or (result.verdict == "none" and search.strained):
         for other in search.thorough():
             again = _asked(other, rng, settings)
             whole = [each.name for each in again.findings if each.name in other.fits]

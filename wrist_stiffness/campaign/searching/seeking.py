@@ -141,6 +141,11 @@ class Search:
         self._catalogue = self._at(self._alone)
         self._reached = _extended(model, self._alone, self._catalogue)
 
+    @property
+    def strained(self) -> bool:
+        """Whether the base alone had to go far to explain the sessions."""
+        return self._alone.base.strained
+
     def quick(self) -> Place:
         """Return where tangents led, and the catalogue there."""
         if self._reached is self._alone:
