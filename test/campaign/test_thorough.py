@@ -75,6 +75,13 @@ def test_shims_do_not_follow_what_came_on_top(model, session, alone):
     assert found.strain < 0.5 * alone.strain
 
 
+@pytest.mark.slow
+def test_a_base_is_strained_where_it_stood_in_for_an_effect(model, alone):
+    assert alone.strained
+    told = fit_base(model, alone.problem.sessions, [axis(shift_u_um=5.0)], alone)
+    assert not told.strained
+
+
 def test_gaps_follow_the_axis_as_built_and_not_what_came_on_top(model, alone):
     units = alone.problem.sessions
     free = (
