@@ -70,14 +70,21 @@ def refit(
 def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
     sessions = base.problem.sessions
     if not named:
-        # A base that had effects along which are not named stands where those left it.
-        return fit_base(model, sessions) if base.extras else base
+        if not base.extras:
+            return base
+        # What is not named may have drawn the base along, or out of a wrong flange's hold.
+        starts = (None, base)
+        return min((fit_base(model, sessions, (), each) for each in starts), key=_cost)
     same = {each.name for each in named} == set(base.extras)
     fitted = base if same else fit_base(model, sessions, named, base)
     if _variance(fitted) < INEXACT:
         return fitted
     # Flanges and play let a base that took up a large effect not find back: so from the drawing.
-    return min(fitted, fit_base(model, sessions, named), key=lambda each: each.cost)
+    return min(fitted, fit_base(model, sessions, named), key=_cost)
+
+
+def _cost(fitted: BaseFit) -> float:
+    return fitted.cost
 
 
 def _variance(fitted: BaseFit) -> float:

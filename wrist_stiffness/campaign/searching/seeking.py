@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from wrist_stiffness.campaign.fitting.problem import Progress
 from wrist_stiffness.campaign.observing import UnitSession
@@ -137,9 +138,18 @@ class Search:
     def __init__(self, model: ErrorModel, sessions: Sessions, progress: Progress) -> None:
         self._model, self._progress = model, progress
         base = fit_base(model, sessions)
-        self._alone = Reached(base, {}, base.cost)
-        self._catalogue = self._at(self._alone)
-        self._reached = _extended(model, self._alone, self._catalogue)
+        self._first = Reached(base, {}, base.cost)
+        self._catalogue = self._at(self._first)
+        self._reached = _extended(model, self._first, self._catalogue)
+
+    @cached_property
+    def _alone(self) -> Reached:
+        """The base alone, from where the search led: a wrong flange may have caught it before."""
+        sessions = self._first.base.problem.sessions
+        again = fit_base(self._model, sessions, (), self._reached.base)
+        if again.cost > self._first.base.cost - WORTH:
+            return self._first
+        return Reached(again, {}, again.cost)
 
     @property
     def strained(self) -> bool:
@@ -148,8 +158,8 @@ class Search:
 
     def quick(self) -> Place:
         """Return where tangents led, and the catalogue there."""
-        if self._reached is self._alone:
-            return Place(self._alone.base, self._catalogue)
+        if self._reached is self._first:
+            return Place(self._first.base, self._catalogue)
         return Place(self._reached.base, self._at(self._reached))
 
     def thorough(self) -> Iterator[Place]:
@@ -159,9 +169,10 @@ class Search:
         tangents: so they stand side by side as they are.  Then where the best of them leads.
         """
         alone, model = self._alone, self._model
+        known = self._catalogue if alone is self._first else self._at(alone)
         tried = PRESSING | LOOSE if alone.rough else PRESSING
         screen = alone.screen()
-        leaders = [each for each in screen.leaders(self._catalogue) if each[1].law.id in tried]
+        leaders = [each for each in screen.leaders(known) if each[1].law.id in tried]
         trials = {}
         for number, (value, each, shape) in enumerate(leaders):
             trials[each.name] = _with(model, alone, screen.fitted(each, shape, value))
@@ -173,10 +184,10 @@ class Search:
             trials |= dict.fromkeys(self._reached.prices, self._reached)
         catalogue = tuple(
             _as_fitted(each, alone.base, trials[each.name].base) if each.name in trials else each
-            for each in self._catalogue
+            for each in known
         )
         yield Place(alone.base, catalogue, {name: each.base for name, each in trials.items()})
-        found = _extended(model, best, self._catalogue)
+        found = _extended(model, best, known)
         yield Place(found.base, self._at(found))
 
     def beside(self, base: BaseFit) -> Place:
