@@ -98,19 +98,7 @@ def diagnose_sessions(
     if not sessions:
         raise InputError("no session to diagnose")
     units = tuple(as_units(model, session) for session in sessions)
-    search = Search(model, units, progress)
-    place = search.quick()
-    result = _asked(place, rng, settings)
-    if _leaves_much(result) or (result.verdict == "none" and search.strained):
-        for other in search.thorough():
-            again = _asked(other, rng, settings)
-            whole = [each.name for each in again.findings if each.name in other.fits]
-            if whole:
-                beside = search.beside(other.fits[whole[0]])
-                again = _confirmed(again, whole[0], _asked(beside, rng, settings))
-            if _says_more(again, result):
-                place, result = other, again
-                break
+    place, result = _answered(Search(model, units, progress), rng, settings)
     base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
     final = refit(model, base, named, share)
@@ -124,6 +112,24 @@ def diagnose_sessions(
     observed = base.left(with_extras=False)
     result = sized(valued(result, final), kept)
     return WristDiagnosis(result, observed, kept, final, suspected, ranked, absorbed)
+
+
+def _answered(
+    search: Search, rng: np.random.Generator, settings: Settings | None
+) -> tuple[Place, Diagnosis]:
+    """Return the answer of a search, the quick one as a rule, and where it was found."""
+    place = search.quick()
+    result = _asked(place, rng, settings)
+    if _leaves_much(result) or (result.verdict == "none" and search.strained):
+        for other in search.thorough():
+            again = _asked(other, rng, settings)
+            whole = [each.name for each in again.findings if each.name in other.fits]
+            if whole:
+                beside = search.beside(other.fits[whole[0]])
+                again = _confirmed(again, whole[0], _asked(beside, rng, settings))
+            if _says_more(again, result):
+                return other, again
+    return place, result
 
 
 def _asked(place: Place, rng: np.random.Generator, settings: Settings | None) -> Diagnosis:
