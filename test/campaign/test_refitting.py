@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.campaign.searching import refit as refitting
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.refit import blanked, refit, sized, unseen, withdrawn
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
@@ -74,6 +75,29 @@ def test_an_effect_that_fails_on_unseen_units_is_withdrawn(model, in_the_cell, l
     base = fit_base(model, (as_units(model, both),))
     fitted = refit(model, base, [backlash(1e3 * np.degrees(WIDTH_RAD))], SHARE)
     assert fitted.extras == ()
+
+
+@pytest.mark.parametrize("saw_all", [False, True])
+def test_what_fits_to_all_units_chose_is_judged_however_little_it_leaves(
+    model, lost_motion, monkeypatch, saw_all
+):
+    """The part put aside was in those fits: that nothing is left is no proof."""
+    base = fit_base(model, (as_units(model, lost_motion),))
+    named = [backlash(1e3 * np.degrees(WIDTH_RAD))]
+    fitted = refit(model, base, named, SHARE)
+    assert fitted.cost < refitting.INEXACT * 6 * base.problem.table.n_units
+    asked = []
+    judge = refitting.unseen
+
+    def counted(*arguments):
+        asked.append(judge(*arguments))
+        return asked[-1]
+
+    monkeypatch.setattr(refitting, "unseen", counted)
+    again = refit(model, base, named, SHARE, saw_all)
+    assert again.extras == ("backlash@motor_1",)
+    assert len(asked) == (2 if saw_all else 0)
+    assert sorted(asked, reverse=True) == asked
 
 
 @pytest.mark.slow

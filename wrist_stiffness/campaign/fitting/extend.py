@@ -12,12 +12,7 @@ from wrist_stiffness.campaign.fitting.calibrate import said_calibrated, told_mod
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
-from wrist_stiffness.campaign.fitting.problem import (
-    NO_PRIOR,
-    FitProblem,
-    Progress,
-    silent,
-)
+from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting.recipes import recipe
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.fitting.start_search import start_values

@@ -101,7 +101,7 @@ def diagnose_sessions(
     place, result = _answered(Search(model, units, progress), rng, settings)
     base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
-    final = refit(model, base, named, share)
+    final = refit(model, base, named, share, saw_all=bool(place.fits))
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
     result = withdrawn(result, len(effects))
     kept = tuple(effects[each.name] for each in result.findings)

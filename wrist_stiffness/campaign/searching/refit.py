@@ -32,7 +32,11 @@ FAR_BEYOND = 30.0
 
 
 def refit(
-    model: ErrorModel, base: BaseFit, named: Sequence[Effect], sealed_share: float
+    model: ErrorModel,
+    base: BaseFit,
+    named: Sequence[Effect],
+    sealed_share: float,
+    saw_all: bool = False,
 ) -> BaseFit:
     """Return the base fitted along with as much of what was named as holds.
 
@@ -49,10 +53,12 @@ def refit(
         In the order of entry, with the values from which they begin.
     sealed_share : float
         Part of a single session that is put aside; of several it is the last one.
+    saw_all : bool
+        Whether fits to all units chose what was named: then it is judged however little it leaves.
     """
     kept = list(named)
     fitted = _along(model, base, kept)
-    if not kept or _variance(fitted) < INEXACT:
+    if not kept or (_variance(fitted) < INEXACT and not saw_all):
         return fitted
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
