@@ -44,6 +44,23 @@ def test_a_signal_ends_a_node_cleanly(graph, name, ending):
     assert "Traceback" not in errors
 
 
+def test_an_impatient_user_sees_no_traceback(graph):
+    with subprocess.Popen(
+        NODES["angle_corrector"].command(), stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            graph.status("angle_corrector", lambda status, values: True)
+            until = time.monotonic() + DEADLINE_S
+            while process.poll() is None and time.monotonic() < until:
+                process.send_signal(signal.SIGINT)
+                time.sleep(0.001)
+            _, errors = process.communicate(timeout=DEADLINE_S)
+        finally:
+            process.kill()
+    assert process.returncode in (0, -signal.SIGINT)  # the latter once Python itself is gone
+    assert "Traceback" not in errors
+
+
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [

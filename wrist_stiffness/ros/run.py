@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
+import signal
 import sys
+import threading
 from collections.abc import Callable
 
 import rclpy
@@ -34,15 +36,18 @@ def run(make_node: Callable[[], Node]) -> int:
         0, or 2 if the node cannot start as asked; one line on stderr says why.
     """
     end_with_parent()
+    interrupted = _interrupts_without_raising()
     rclpy.init()
     executor = StreamExecutor()
     try:
+        if interrupted.is_set():
+            return 0
         executor.add_node(make_node())
         # What a node starts with stays: the collector need not go through it again and again.
         gc.collect()
         gc.freeze()
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     except (WristError, ParameterException) as error:
         print(f"wrist-stiffness node: error: {' '.join(str(error).split())}", file=sys.stderr)
@@ -56,3 +61,19 @@ def run(make_node: Callable[[], Node]) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _interrupts_without_raising() -> threading.Event:
+    """Let SIGINT end the node as SIGTERM does: by the shutdown of its context, which rclpy sees to.
+
+    rclpy calls the handler that was there before its own. Python's raises a KeyboardInterrupt
+    wherever the program happens to be, and inside a `__del__` it is printed as a traceback.
+
+    Returns
+    -------
+    threading.Event
+        Set by a SIGINT, also by one that comes before rclpy listens.
+    """
+    interrupted = threading.Event()
+    signal.signal(signal.SIGINT, lambda number, frame: interrupted.set())
+    return interrupted
