@@ -26,7 +26,6 @@ AT_REST = (
 """Effects whose laws need no motion: those that the exact path can hide."""
 
 SAMPLED_ONE_IN = 25
-CEILING_ONE_IN = 6
 
 WRISTS, WRISTS_ELSEWHERE = 60, 12
 """Wrong wrists, each with its noise, that take turns in the main design and in any other."""
@@ -105,8 +104,7 @@ class Case:
     def asked(self, solver: str) -> bool:
         """Whether a slow solver is asked this case."""
         if solver == "knows_the_laws":
-            fits = self.main and self.kind == "single"
-            return fits and crc32(f"ceiling {self.key}".encode()) % CEILING_ONE_IN == 0
+            return self.main and self.kind in ("single", "double")
         return crc32(f"sample {self.key}".encode()) % SAMPLED_ONE_IN == 0
 
     @property

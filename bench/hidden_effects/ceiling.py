@@ -1,8 +1,7 @@
 """The ceiling: the simulation's own laws, with magnitude and shape fitted, at the likeliest places.
 
 The laws act on the true base, so no calibration can follow them better; how far it is from the
-table counts as unknown within the tolerances of wrong bases, as for all other solvers.  Tens of
-simulations for a place make it slow: it is asked a sample of the cases.
+table counts as unknown within the tolerances of wrong bases, as for all other solvers.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ from wrist_stiffness.simulation.makers import Draw
 from wrist_stiffness.simulation.residual import BasePose, base_pose, departure
 from wrist_stiffness.simulation.wrist import TrueWrist
 
-PLACES = 5
+PLACES = 6
 """Likeliest places by linear words, which are fitted with their laws."""
 
-DRAWS = 3
+DRAWS = 5
 """Random shapes of which the best one begins a fit."""
 
 MOST_EFFECTS = 2
-EVALUATIONS = 6
+EVALUATIONS = 20
 """Of a fit, the differences for its slopes aside."""
 
 SMALL_STEP = 3e-3
