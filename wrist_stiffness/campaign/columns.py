@@ -42,6 +42,12 @@ class SessionModel:
         """Tell whether any of the effects needs the path and not the mean moment alone."""
         return any(self._has_memory(effect) for effect in effects)
 
+    def of_the_moment(self, effects: Effects) -> Effects:
+        """Return those effects whose slope the mean moment shows: all that have no past."""
+        return tuple(
+            each for each in effects if each.law.state_is_a_guess or not self._has_memory(each)
+        )
+
     def _has_memory(self, effect: Effect) -> bool:
         known, asked = self.session.remembering, (effect.law, effect.component)
         if asked not in known:
@@ -64,13 +70,23 @@ class SessionModel:
             for found in bare.batch_with(self.session.block, trials[start : start + AT_A_TIME])
         ]
 
-    def predicted(self, trials: Sequence[Effects]) -> list[Array]:
-        """Return the same, good enough for differences: the path only where an effect needs it."""
+    def predicted(
+        self, trials: Sequence[Effects], along: Sequence[bool] | None = None
+    ) -> list[Array]:
+        """Return the same, good enough for differences: the path only where an effect needs it.
+
+        Parameters
+        ----------
+        trials : sequence of tuple of Effect
+            Full sets of effects.
+        along : sequence of bool, optional
+            Which of them are evaluated on the path; by default those that remember.
+        """
         bare = self.model.with_effects()
-        path = [self.remembers(trial) for trial in trials]
+        path = [self.remembers(trial) for trial in trials] if along is None else along
         out: list[Array] = [np.empty(0)] * len(trials)
         for needs_path in (False, True):
-            chosen = [i for i, own in enumerate(path) if own is needs_path]
+            chosen = [i for i, own in enumerate(path) if own == needs_path]
             for start in range(0, len(chosen), AT_A_TIME):
                 part = chosen[start : start + AT_A_TIME]
                 block = self.session.block if needs_path else self.session.still

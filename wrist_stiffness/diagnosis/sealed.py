@@ -44,6 +44,11 @@ class HeldOut:
     residual: Array
     white: Array
 
+    @property
+    def energy(self) -> float:
+        """Weighted sum of squares, in units of the noise."""
+        return float(self.white @ self.white)
+
     def rmse(self, quantity: Quantity) -> float:
         """Root mean square of the vector norm of a quantity; blanks do not count."""
         columns = self.residual[:, list(quantity.components)]
@@ -86,7 +91,7 @@ def refuted(before: HeldOut, after: HeldOut) -> bool:
     2 |f|, so a loss beyond twice that is none of a right effect.
     """
     change = float(np.linalg.norm(before.white - after.white))
-    gain = float(before.white @ before.white - after.white @ after.white)
+    gain = before.energy - after.energy
     return gain < -4 * change
 
 

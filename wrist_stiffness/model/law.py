@@ -51,6 +51,9 @@ class Law(ABC):
     many_waves : bool
         Whether half a second of motion may go through more than one of its waves, so that no mean
         angle stands for what it did.
+    state_is_a_guess : bool
+        Whether its state is only where the search for its answer begins: a moment without its past
+        gives the same answer.
     file : path or None
         The Python file of a user's own law.
     """
@@ -64,6 +67,7 @@ class Law(ABC):
     excited_by: str
     constant: bool = False
     many_waves: bool = False
+    state_is_a_guess: bool = False
     file: Path | None = None
 
     @property

@@ -260,9 +260,10 @@ class FitProblem:
     def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
-        By one-sided differences, away from the nearer bound.  Where neither the parameter's effect
-        nor the step needs the path, effects with a memory are left out of the difference: that is
-        far quicker, and good enough for the slope.
+        By one-sided differences, away from the nearer bound.  Where the parameter's effect does not
+        need the path, the difference is taken at mean moments, without the effects that have a
+        past: that is far quicker, and good enough for the slope.  Play stays: where a pin is free,
+        nothing else has the slope that it has without.
 
         Parameters
         ----------
@@ -283,9 +284,6 @@ class FitProblem:
         """Return the columns of one session's units, (u, 6, number asked)."""
         model, session = self._models[number], self.sessions[number]
 
-        def memoryless(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
-            return tuple(effect for effect in effects if not model.remembers((effect,)))
-
         values = self._values(z, number)
         effects = self._with_values(values)
         whole = (*self.model.effects, *effects)
@@ -298,9 +296,11 @@ class FitProblem:
             other = self._moved(effects, values, unknown, float(z[place] + step[place]))
             trial = (*self.model.effects, *other)
             by_path.append(model.remembers((self.free[unknown.free].effect,)))
-            trials.append(trial if by_path[-1] else memoryless(trial))
+            trials.append(trial if by_path[-1] else model.of_the_moment(trial))
             moved.append(place)
-        path, quick, *changed = model.predicted([whole, memoryless(whole), *trials])
+        path, quick, *changed = model.predicted(
+            [whole, model.of_the_moment(whole), *trials], [model.remembers(whole), False, *by_path]
+        )
         twists = [
             path + twist - (path if on_path else quick)
             for on_path, twist in zip(by_path, changed, strict=True)

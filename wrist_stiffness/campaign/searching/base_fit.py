@@ -232,6 +232,7 @@ def fit_base(
     sessions: tuple[UnitSession, ...],
     extras: Sequence[Effect] = (),
     start: BaseFit | None = None,
+    beside: bool = False,
 ) -> BaseFit:
     """Fit registrations, zeros, tare and tolerances, within their priors.
 
@@ -247,6 +248,9 @@ def fit_base(
         belongs to the base comes on top of what the wrist was built with.
     start : BaseFit, optional
         Where the base begins.
+    beside : bool
+        Whether the base's columns are taken beside the extras; else as if these were not there,
+        which is far quicker and leads nearly as far, but for play.
     """
     free, held = free_base(model)
     added = {effect.name: effect for effect in extras}
@@ -263,6 +267,8 @@ def fit_base(
     if on_base:
         bare = BaseProblem(whole, sessions, (*free, *more[:on_base]), model)
     problem = BaseProblem(whole, sessions, (*free, *more), model)
+    if beside:
+        bare = problem
     z = _start(problem, start, added)
     lower, upper = problem.bounds
     weights = problem.weights
@@ -302,10 +308,11 @@ def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
     of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
     of_extras = tuple(n for n, u in enumerate(problem.unknowns) if u.free >= len(bare.free))
     first = bare.columns_at(z[of_bare])
+    if not of_extras:
+        return first
     columns = np.zeros((*first.shape[:2], len(z)))
     columns[:, :, of_bare] = first
-    if of_extras:
-        columns[:, :, of_extras] = problem.columns_at(z, of_extras)
+    columns[:, :, of_extras] = problem.columns_at(z, of_extras)
     return columns
 
 

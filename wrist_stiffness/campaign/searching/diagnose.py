@@ -18,7 +18,13 @@ from wrist_stiffness.campaign.observing import Observed, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
-from wrist_stiffness.campaign.searching.refit import refit, sized, valued, withdrawn
+from wrist_stiffness.campaign.searching.refit import (
+    refit,
+    rejudged,
+    sized,
+    valued,
+    withdrawn,
+)
 from wrist_stiffness.campaign.searching.seeking import Place, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
@@ -101,9 +107,10 @@ def diagnose_sessions(
     place, result = _answered(Search(model, units, progress), rng, settings)
     base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
-    final = refit(model, base, named, share, saw_all=bool(place.fits))
+    judged = refit(model, base, named, share, saw_all=bool(place.fits))
+    final = judged.base
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
-    result = withdrawn(result, len(effects))
+    result = rejudged(withdrawn(result, len(effects)), judged.stages)
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))

@@ -8,16 +8,17 @@ the units put aside worse than the base alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.observing import UnitSession
+from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
 from wrist_stiffness.campaign.searching.candidates import SHARE
+from wrist_stiffness.campaign.searching.seeking import LOOSE
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
-from wrist_stiffness.diagnosis.sealed import sealed_units
+from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
@@ -31,14 +32,31 @@ FAR_BEYOND = 30.0
 """Usual sizes of a parameter that are far beyond the usual: is it this effect, in this unit?"""
 
 
+@dataclass(frozen=True, eq=False)
+class Refitted:
+    """What held, and how well it foretold the units put aside.
+
+    Parameters
+    ----------
+    base : BaseFit
+        Fitted to all units along with what holds.
+    stages : tuple of HeldOut
+        Units put aside, foretold by fits to the others: by the base alone, then with one effect
+        more each time.  Empty where the search had not seen them, so its own stages hold.
+    """
+
+    base: BaseFit
+    stages: tuple[HeldOut, ...] = ()
+
+
 def refit(
     model: ErrorModel,
     base: BaseFit,
     named: Sequence[Effect],
     sealed_share: float,
     saw_all: bool = False,
-) -> BaseFit:
-    """Return the base fitted along with as much of what was named as holds.
+) -> Refitted:
+    """Fit the base along with as much of what was named as holds.
 
     Where the laws leave much more than noise, what entered last is taken out for as long as the
     units put aside come out worse with the effects than without.
@@ -59,18 +77,24 @@ def refit(
     kept = list(named)
     fitted = _along(model, base, kept)
     if not kept or (_variance(fitted) < INEXACT and not saw_all):
-        return fitted
+        return Refitted(fitted)
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
     seen = blanked(sessions, aside)
     alone = unseen(fit_base(model, seen), sessions, aside, fitted)
     while kept:
-        trial = fit_base(model, seen, kept, fitted)
-        if unseen(trial, sessions, aside, fitted) < alone:
+        trial = unseen(fit_base(model, seen, kept, fitted), sessions, aside, fitted)
+        if trial.energy < alone.energy:
             break
         kept.pop()
         fitted = _along(model, base, kept)
-    return fitted
+    if not saw_all:
+        return Refitted(fitted)
+    stages = [alone]
+    for count in range(1, len(kept)):
+        part = fit_base(model, seen, kept[:count], fitted)
+        stages.append(unseen(part, sessions, aside, fitted))
+    return Refitted(fitted, (*stages, trial) if kept else ())
 
 
 def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
@@ -83,10 +107,14 @@ def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit
         return min((fit_base(model, sessions, (), each) for each in starts), key=_cost)
     same = {each.name for each in named} == set(base.extras)
     fitted = base if same else fit_base(model, sessions, named, base)
-    if _variance(fitted) < INEXACT:
-        return fitted
-    # Flanges and play let a base that took up a large effect not find back: so from the drawing.
-    return min(fitted, fit_base(model, sessions, named), key=_cost)
+    if _variance(fitted) >= INEXACT:
+        # Flanges and play let a base that took up a large effect not find back: from the drawing.
+        fitted = min(fitted, fit_base(model, sessions, named), key=_cost)
+    if any(each.law.id in LOOSE for each in named):
+        # Where a pin is free, the base does something else than without play.
+        extras = list(fitted.beyond().values())
+        fitted = min(fitted, fit_base(model, sessions, extras, fitted, beside=True), key=_cost)
+    return fitted
 
 
 def _cost(fitted: BaseFit) -> float:
@@ -178,8 +206,8 @@ def blanked(sessions: Sessions, aside: Mask) -> Sessions:
     return tuple(parts)
 
 
-def unseen(fitted: BaseFit, sessions: Sessions, aside: Mask, whole: BaseFit) -> float:
-    """Return the weighted sum of squares of units put aside.
+def unseen(fitted: BaseFit, sessions: Sessions, aside: Mask, whole: BaseFit) -> HeldOut:
+    """Return what a fit leaves of units put aside.
 
     What is set up anew in a session of which the fit saw nothing is taken from the fit that saw
     all, and refitted to first order; everything else keeps its value.
@@ -202,11 +230,43 @@ def unseen(fitted: BaseFit, sessions: Sessions, aside: Mask, whole: BaseFit) -> 
     z = fitted.z.copy()
     z[fresh] = [known[_key(fitted, n)] for n in fresh]
     rows = np.repeat(aside, 6)
-    left = problem.whiten(problem.residual(z))[rows]
+    residual = problem.residual(z)
+    left = problem.whiten(residual)[rows]
     if fresh:
-        columns = problem.whiten(problem.columns(z, places=fresh))[rows]
-        left = left + columns @ np.linalg.lstsq(columns, -left, rcond=1e-9)[0]
-    return float(left @ left)
+        columns = problem.columns(z, places=fresh)
+        white = problem.whiten(columns)[rows]
+        step = np.linalg.lstsq(white, -left, rcond=1e-9)[0]
+        residual, left = residual + columns @ step, left + white @ step
+    return HeldOut(residual[aside], left)
+
+
+def rejudged(result: Diagnosis, stages: Sequence[HeldOut]) -> Diagnosis:
+    """Return an answer with the errors of fits that had not seen the part put aside.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        With as many findings as hold.
+    stages : sequence of HeldOut
+        Before the first of them and after each; none where the errors hold as they are.
+    """
+    if not stages:
+        return result
+    reported = [q for q in QUANTITIES if q.key in result.before]
+    findings = tuple(
+        replace(
+            each,
+            heldout_rmse_ratio=float(np.sqrt(after.energy / before.energy)),
+            buys={q.key: bought(before, after, q) for q in reported},
+        )
+        for each, before, after in zip(result.findings, stages[:-1], stages[1:], strict=True)
+    )
+    return replace(
+        result,
+        before={q.key: stages[0].rmse(q) for q in reported},
+        after={q.key: stages[-1].rmse(q) for q in reported},
+        findings=findings,
+    )
 
 
 def _key(fitted: BaseFit, number: int) -> tuple[str, str, int | None]:

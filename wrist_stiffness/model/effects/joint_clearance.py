@@ -28,6 +28,7 @@ class JointClearance(Law):
     id = "joint_clearance"
     stage = "reaction"
     places = JOINTS
+    state_is_a_guess = True
     sentence = "{place} has play: the pin lies on the side of its bearing force"
     check = "push and pull the joint across its axis with a dial gauge; swap the bushing"
     excited_by = "loads of opposite directions, so that the bearing force changes sides"
