@@ -38,8 +38,8 @@ def best_by_chance(seed):
         for place, size in enumerate(SIZES)
     ]
     ranked = scored(base, hypotheses, 10.0, np.inf)
-    order, sign = rearrangements(np.zeros(UNITS, dtype=np.int64), 99, rng)
-    return chance_of_best(base, ranked, 1, order, sign)
+    rearranged = rearrangements(base, np.zeros(UNITS, dtype=np.int64), 99, rng)
+    return chance_of_best(base, ranked, rearranged)
 
 
 def test_p_values_of_the_best_are_even_where_nothing_hides():

@@ -3,35 +3,72 @@
 Freedman and Lane (1983): residuals of the reduced model are rearranged, the model is refitted, the
 largest statistic over all candidates is kept.  So a large catalogue pays for its size, whatever
 its members share.  Short stretches of units move together, with a random sign, and never leave
-their session, so that wander which the noise model missed stays in place.
+their session, so that wander which the noise model missed stays in place.  A prior is no unit: how
+far it was strained is evidence, and by chance it is strained as it says itself.
 """
+
+from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from wrist_stiffness.diagnosis.observations import Array, Labels
+from wrist_stiffness.diagnosis.projection import Base
 
 STRETCH = 3
 """Units that move together."""
 
 
-def rearrangements(
-    sessions: Labels, repeats: int, rng: np.random.Generator
-) -> tuple[Labels, Array]:
-    """Random rearrangements of units.
+@dataclass(frozen=True, eq=False)
+class Rearrangements:
+    """Random rearrangements of units, and random strains of priors.
 
     Parameters
     ----------
+    order : (repeats, n) array of int
+        Which unit comes to each place.
+    sign : (repeats, n) array
+        With which sign.
+    strain : (repeats, p) array
+        Of each prior, in its standard deviations.
+    """
+
+    order: Labels
+    sign: Array
+    strain: Array
+
+    def residuals(self, base: Base) -> Array:
+        """Return what a base leaves of a rearrangement of what it left, (N, repeats).
+
+        Parameters
+        ----------
+        base : Base
+            Refitted to each of them.
+        """
+        repeats, n = self.order.shape
+        data = len(base.residual) - self.strain.shape[1]
+        units = base.residual[:data].reshape(n, -1)
+        moved = (units[self.order] * self.sign[:, :, None]).reshape(repeats, data)
+        rows = np.hstack([moved, self.strain]).T
+        return np.asarray(rows - base.basis @ (base.basis.T @ rows))
+
+
+def rearrangements(
+    base: Base, sessions: Labels, repeats: int, rng: np.random.Generator
+) -> Rearrangements:
+    """Draw rearrangements.
+
+    Parameters
+    ----------
+    base : Base
+        Whose residual is rearranged.
     sessions : (n,) array
         Session of each unit.
     repeats : int
         How many.
     rng : numpy.random.Generator
         Source of chance.
-
-    Returns
-    -------
-    (repeats, n) array of int, (repeats, n) array
-        Which unit comes to each place, and with which sign.
     """
     n = len(sessions)
     order, sign = np.empty((repeats, n), dtype=np.int64), np.empty((repeats, n))
@@ -46,23 +83,4 @@ def rearrangements(
         sign[:, places] = np.where(
             np.take_along_axis(flip[:, piece], moved, axis=1) < 0.5, -1.0, 1.0
         )
-    return order, sign
-
-
-def rearranged(residual: Array, n_components: int, order: Labels, sign: Array) -> Array:
-    """Rearranged residuals, (N, repeats); the rows of the priors stay.
-
-    Parameters
-    ----------
-    residual : (N,) array
-        Whitened residual, components of one unit next to each other.
-    n_components : int
-        Numbers per unit.
-    order, sign : (repeats, n) arrays
-        From `rearrangements`.
-    """
-    repeats, n = order.shape
-    units = residual[: n * n_components].reshape(n, n_components)
-    moved = (units[order] * sign[:, :, None]).reshape(repeats, -1)
-    rest = np.broadcast_to(residual[n * n_components :], (repeats, residual.size - moved.shape[1]))
-    return np.hstack([moved, rest]).T
+    return Rearrangements(order, sign, rng.standard_normal((repeats, base.n_priors)))

@@ -82,6 +82,8 @@ class Base:
         What the base leaves of the observations.
     n_rows : int
         Measured numbers plus proper priors.
+    n_priors : int
+        How many of the rows are priors: the last ones.
     known : dict
         What was worked out about hypotheses against it: the same questions come back.
     """
@@ -89,6 +91,7 @@ class Base:
     basis: Array
     residual: Array
     n_rows: int
+    n_priors: int
     known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -116,6 +119,7 @@ class Base:
             np.hstack([self.basis, more]),
             self.residual - more @ (more.T @ self.residual),
             self.n_rows,
+            self.n_priors,
         )
 
 
@@ -136,7 +140,8 @@ def make_base(columns: Array, prior_std: Array, values: Array, n_measured: int) 
     proper = np.isfinite(prior_std)
     basis = orthonormal(with_prior_rows(columns, np.diag(1 / prior_std)[proper]))
     padded = np.concatenate([values, np.zeros(proper.sum())])
-    return Base(basis, padded - basis @ (basis.T @ padded), n_measured + int(proper.sum()))
+    priors = int(proper.sum())
+    return Base(basis, padded - basis @ (basis.T @ padded), n_measured + priors, priors)
 
 
 def with_prior_rows(columns: Array, rows: Array) -> Array:

@@ -6,8 +6,8 @@ import numpy as np
 
 from wrist_stiffness.diagnosis.estimates import possible
 from wrist_stiffness.diagnosis.hypotheses import Addition, Hypothesis, addition
-from wrist_stiffness.diagnosis.observations import Array, Labels
-from wrist_stiffness.diagnosis.permutation import rearranged
+from wrist_stiffness.diagnosis.observations import Array
+from wrist_stiffness.diagnosis.permutation import Rearrangements
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.structure import background, lack_of_fit
 from wrist_stiffness.diagnosis.worth import worth_along
@@ -121,9 +121,7 @@ def rank(
     return [each for each in ranked if possible(base, each.hypothesis, scale)]
 
 
-def chance_of_best(
-    base: Base, ranked: list[Ranked], n_components: int, order: Labels, sign: Array
-) -> float:
+def chance_of_best(base: Base, ranked: list[Ranked], rearranged: Rearrangements) -> float:
     """Probability that the best of all candidates looks this good by chance (max-statistic).
 
     Parameters
@@ -132,13 +130,10 @@ def chance_of_best(
         What is refitted first.
     ranked : list of Ranked
         The catalogue against this base, the one in question first.
-    n_components : int
-        Numbers per unit.
-    order, sign : arrays
-        From `rearrangements`.
+    rearranged : Rearrangements
+        Of what the base leaves.
     """
-    moved = rearranged(base.residual, n_components, order, sign)
-    moved -= base.basis @ (base.basis.T @ moved)
+    moved = rearranged.residuals(base)
     everything = np.column_stack([base.residual, moved])
     energy = np.sum(everything**2, axis=0)
     added = [addition(base, each.hypothesis) for each in ranked]

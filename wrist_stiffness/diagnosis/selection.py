@@ -104,8 +104,9 @@ def select(
         ranked = _contest(evidence, base, _others(hypotheses, entered), dimension)
         if not ranked:
             break
-        order, sign = rearrangements(evidence.observations.sessions, settings.permutations, rng)
-        chance = chance_of_best(base, ranked, evidence.observations.n_components, order, sign)
+        sessions = evidence.observations.sessions
+        rearranged = rearrangements(base, sessions, settings.permutations, rng)
+        chance = chance_of_best(base, ranked, rearranged)
         if chance > settings.alpha:
             break
         entered = (*entered, Entered(ranked[0].hypothesis, chance))
