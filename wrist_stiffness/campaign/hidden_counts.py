@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wrist_stiffness.campaign.units import COUNTS, Cut, Labels
+from wrist_stiffness.campaign.units import COUNTS, WINDOW_S, Cut, Labels
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 
@@ -58,7 +58,10 @@ def stands_of(table: Table, cuts: Sequence[Cut]) -> Labels:
 
 
 def _stands(cut: Cut, step: float) -> Labels:
-    """Return the number of the stand in which each unit lies, -1 in motion, (u,)."""
+    """Return the number of the stand in which each unit lies, -1 in motion, (u,).
+
+    A motor that comes to rest shows the count of its rest already, and is not there yet.
+    """
     theta, number = cut.block.theta, np.zeros(len(cut.kept), dtype=np.intp)
     begun = theta[0]
     for moment in range(1, len(theta)):
@@ -70,4 +73,7 @@ def _stands(cut: Cut, step: float) -> Labels:
     first, last = np.full(len(cut.dwell), len(theta)), np.full(len(cut.dwell), -1)
     np.minimum.at(first, unit, number)
     np.maximum.at(last, unit, number)
-    return np.where(first == last, first, -1)
+    moving = np.zeros(len(cut.dwell), dtype=bool)
+    fast = (np.abs(cut.speed[used]) > COUNTS * step / WINDOW_S).any(axis=1)
+    np.logical_or.at(moving, unit, fast)
+    return np.where((first == last) & (cut.dwell | ~moving), first, -1)

@@ -127,7 +127,8 @@ def _answered(
     """Return the answer of a search, the quick one as a rule, and where it was found."""
     place = search.quick()
     result = _asked(place, rng, settings)
-    if _leaves_much(result) or (result.verdict == "none" and search.strained):
+    strained = place.base.strained if result.findings else search.strained
+    if _leaves_much(result) or strained:
         for other in search.thorough():
             again = _asked(other, rng, settings)
             whole = [each.name for each in again.findings if each.name in other.fits]
