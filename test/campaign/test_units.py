@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.hidden_counts import _stands
 from wrist_stiffness.campaign.units import MOST_MOVING, PATH_S, UNIT_S, cut
 from wrist_stiffness.model.block import Block
 
@@ -41,6 +42,23 @@ def test_rests_are_dwells_and_changes_are_not(rate, noise):
     slack = 0.15 + 2.0 / rate
     assert first == pytest.approx([0.0, 5.0, 9.0], abs=slack)
     assert last == pytest.approx([3.0, 8.0, 12.0], abs=slack)
+
+
+@pytest.mark.parametrize("end", [4.9, 5.0, 5.1])
+def test_a_motor_that_comes_to_rest_is_no_stand_yet(end):
+    """Its count shows already what it will be at rest, and hides another part of it."""
+    block = session(rate=10.0)
+    way = np.sin(0.5 * np.pi * ramp(block.time, 3.0, end, 0.0, 1.0))
+    block.theta[:, 0] = STEP * np.round(0.5 * way / STEP)
+    found = cut_all(block)
+    stands = _stands(found, STEP)
+    time = np.array([block.time[found.label == u].mean() for u in range(len(stands))])
+    assert (stands[(time > 3.0) & ~found.dwell & (time < 6.0)] == -1).all()
+    # Load that comes on at rest changes no count.
+    loaded = stands[time > 6.0]
+    assert len(loaded) > 3
+    assert (loaded == loaded[0]).all()
+    assert loaded[0] >= 0
 
 
 def moving_times(block, found):
