@@ -127,7 +127,7 @@ def _answered(
     """Return the answer of a search, the quick one as a rule, and where it was found."""
     place = search.quick()
     result = _asked(place, rng, settings)
-    strained = place.base.strained if result.findings else search.strained
+    strained = search.doubtful if result.findings else search.strained
     if _leaves_much(result) or strained:
         for other in search.thorough():
             again = _asked(other, rng, settings)

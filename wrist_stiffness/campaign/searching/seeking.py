@@ -156,6 +156,14 @@ class Search:
         """Whether the base alone had to go far to explain the sessions."""
         return self._alone.base.strained
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether the base is strained still beside what tangents led to.
+
+        Not where that was large: then nothing else explains as much.
+        """
+        return self._reached.base.strained and not self._first.rough
+
     def quick(self) -> Place:
         """Return where tangents led, and the catalogue there."""
         if self._reached is self._first:
