@@ -126,6 +126,29 @@ def test_a_wander_is_never_less_than_half_the_scatter_of_a_sample(alone):
     assert np.all(size > 0.6 * LEAST_WANDER * session.white)
 
 
+@pytest.mark.slow
+def test_play_beside_something_large_is_found_with_the_whole_base(model, in_the_cell):
+    """Its slopes about a base that bore it say too little; what is left in the end is settled."""
+    settings = CellSettings(
+        rate_hz=10.0,
+        program_seconds=60.0,
+        program_seed=1007,
+        hidden=(
+            HiddenEffect("time_delay", "pose_sensor", "plain", 2e-3, 1),
+            HiddenEffect("joint_clearance", "joint_1", "algebraic", 5e-7, 2),
+        ),
+        base="wrong",
+        base_seed=1007,
+    )
+    session = in_the_cell(model.table, settings, 4)
+    found = diagnose_sessions(model, [session], np.random.default_rng(1))
+    names = [each.name for each in found.diagnosis.findings]
+    assert names == ["time_delay@pose_sensor", "joint_clearance@joint_1"]
+    assert found.diagnosis.verdict == "effect"
+    play = found.effects[1].estimates["clearance_um"].value
+    assert play == pytest.approx(0.5, rel=0.3)
+
+
 def finding(name):
     return Finding((tuple(name.split("@")),), {}, 0.1, 50.0, 0.001, 1.0, {}, "yes", "", "")
 

@@ -104,7 +104,8 @@ def diagnose_sessions(
     if not sessions:
         raise InputError("no session to diagnose")
     units = tuple(as_units(model, session) for session in sessions)
-    place, result = _answered(Search(model, units, progress), rng, settings)
+    search = Search(model, units, progress)
+    place, result = _answered(search, rng, settings)
     base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
     judged = refit(model, base, named, share, saw_all=bool(place.fits))
@@ -118,6 +119,8 @@ def diagnose_sessions(
     ranked = contributions(suspected, {each.name for each in kept})
     observed = base.left(with_extras=False)
     result = sized(valued(result, final), kept)
+    if kept and len(kept) == len(named) and result.verdict == "unknown":
+        result = _settled(result, search, final, rng, settings or Settings())
     return WristDiagnosis(result, observed, kept, final, suspected, ranked, absorbed)
 
 
@@ -137,6 +140,11 @@ def _answered(
                 again = _confirmed(again, whole[0], _asked(beside, rng, settings))
             if _says_more(again, result):
                 return other, again
+    for other in search.further([each.name for each in result.findings]):
+        more = _asked(other, rng, settings)
+        if any(each.name in other.fits for each in more.findings):
+            fitted = [each for each in result.findings if each.name in other.base.extras]
+            return other, _together(replace(result, findings=tuple(fitted)), more)
     return place, result
 
 
@@ -155,11 +163,29 @@ def _confirmed(found: Diagnosis, name: str, beside: Diagnosis) -> Diagnosis:
     (first,) = (each for each in found.findings if each.name == name)
     if not beside.findings and len(found.findings) == 1:
         return found
+    return _together(replace(found, findings=(first,)), beside)
+
+
+def _settled(
+    result: Diagnosis, search: Search, final: BaseFit, rng: np.random.Generator, settings: Settings
+) -> Diagnosis:
+    """Return an answer that says what the laws leave, fitted whole, instead of their slopes."""
+    left = _asked(search.beside(final), rng, settings)
+    if left.findings:
+        return result
+    share = left.unexplained.energy_share * min(final.cost / search.first_cost, 1.0)
+    verdict = "unknown" if share >= settings.unexplained_share else "effect"
+    unexplained = replace(left.unexplained, energy_share=share)
+    return replace(result, verdict=verdict, unexplained=unexplained)
+
+
+def _together(found: Diagnosis, beside: Diagnosis) -> Diagnosis:
+    """Return an answer with what was found and what was found beside it."""
     return replace(
         found,
         verdict="unknown" if beside.verdict == "unknown" else "effect",
         after=beside.after,
-        findings=(first, *beside.findings),
+        findings=(*found.findings, *beside.findings),
         unexplained=beside.unexplained,
     )
 

@@ -6,7 +6,7 @@ After each the earlier ones must still pay, and at the end each must be the best
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -42,6 +42,9 @@ large effect within this share could make draws no further effect in."""
 ROUGH = 10.0
 """Variance of what is left, in units of the noise, from which a fit is also begun from the drawing:
 a base that gave way to a large effect does not find back."""
+
+INEXACT = 1.5
+"""Variance of what is left, in units of the noise, from which more than noise is left."""
 
 MOST_TRIED = 3
 """So many candidates are fitted with the whole base before a step is given up."""
@@ -157,6 +160,11 @@ class Search:
         return self._alone.base.strained
 
     @property
+    def first_cost(self) -> float:
+        """Weighted sum of squares that the base alone leaves."""
+        return self._first.base.cost
+
+    @property
     def doubtful(self) -> bool:
         """Whether the base is strained still beside what tangents led to.
 
@@ -176,27 +184,52 @@ class Search:
         First the base alone, with what each of them changes, base and all, in place of its
         tangents: so they stand side by side as they are.  Then where the best of them leads.
         """
-        alone, model = self._alone, self._model
+        alone = self._alone
         known = self._catalogue if alone is self._first else self._at(alone)
-        tried = PRESSING | LOOSE if alone.rough else PRESSING
-        screen = alone.screen()
-        leaders = [each for each in screen.leaders(known) if each[1].law.id in tried]
-        trials = {}
-        for number, (value, each, shape) in enumerate(leaders):
-            trials[each.name] = _with(model, alone, screen.fitted(each, shape, value))
-            self._progress(number + 1, len(leaders))
+        trials = self._trials(alone, known, PRESSING | LOOSE if alone.rough else PRESSING)
         best = min(trials.values(), key=lambda each: each.total, default=alone)
         if best.total > min(alone.total, self._reached.total + WORTH):
             return
         if len(self._reached.prices) == 1:
             trials |= dict.fromkeys(self._reached.prices, self._reached)
-        catalogue = tuple(
-            _as_fitted(each, alone.base, trials[each.name].base) if each.name in trials else each
-            for each in known
-        )
-        yield Place(alone.base, catalogue, {name: each.base for name, each in trials.items()})
-        found = _extended(model, best, known)
+        yield _as_they_are(alone, known, trials)
+        found = _extended(self._model, best, known)
         yield Place(found.base, self._at(found))
+
+    def further(self, names: Collection[str]) -> Iterator[Place]:
+        """Try play with the whole base beside what was named, where that leaves more than noise.
+
+        Beside what of it the search had fitted: what only slopes named stands to question again.
+        Axes, gaps and weights would be mistaken for each other, play is not.
+
+        Parameters
+        ----------
+        names : collection of str
+            What was named.
+        """
+        begun = self._reached
+        if not begun.prices.keys() & set(names):
+            return
+        for name in begun.prices.keys() - set(names):
+            begun = _without(self._model, begun, name)
+        if begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
+            return
+        known = self.beside(begun.base).candidates
+        trials = self._trials(begun, known, LOOSE)
+        trials = {name: each for name, each in trials.items() if each.total < begun.total}
+        if trials:
+            yield replace(_as_they_are(begun, known, trials), known=True)
+
+    def _trials(
+        self, begun: Reached, known: Candidates, laws: Collection[str]
+    ) -> dict[str, Reached]:
+        """Fit candidates of some laws one by one, with the whole base and what it has."""
+        screen, found = begun.screen(), {}
+        leaders = [each for each in screen.leaders(known) if each[1].law.id in laws]
+        for number, (value, each, shape) in enumerate(leaders):
+            found[each.name] = _with(self._model, begun, screen.fitted(each, shape, value))
+            self._progress(number + 1, len(leaders))
+        return found
 
     def beside(self, base: BaseFit) -> Place:
         """Return the place where everything that was fitted along with a base is known."""
@@ -210,10 +243,18 @@ class Search:
         return wrist_candidates(point_of(reached.base), held, near, self._progress)
 
 
-def _as_fitted(candidate: WristCandidate, alone: BaseFit, fitted: BaseFit) -> WristCandidate:
-    """Return a candidate that stands for a whole fit with it."""
-    change = alone.residual - fitted.residual
-    return candidate.changed_by(change, fitted.strain - alone.strain)
+def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached]) -> Place:
+    """Return a place where candidates that were fitted stand for their whole fits."""
+    alone, fits = begun.base, {name: each.base for name, each in trials.items()}
+    catalogue = tuple(
+        each.changed_by(
+            alone.residual - fits[each.name].residual, fits[each.name].strain - alone.strain
+        )
+        if each.name in fits
+        else each
+        for each in known
+    )
+    return Place(alone, catalogue, fits)
 
 
 def point_of(base: BaseFit, with_extras: bool = False) -> Point:
