@@ -170,7 +170,7 @@ def _settled(
     result: Diagnosis, search: Search, final: BaseFit, rng: np.random.Generator, settings: Settings
 ) -> Diagnosis:
     """Return an answer that says what the laws leave, fitted whole, instead of their slopes."""
-    left = _asked(search.beside(final), rng, settings)
+    left = _asked(search.after(final), rng, settings)
     if left.findings:
         return result
     share = left.unexplained.energy_share * min(final.cost / search.first_cost, 1.0)

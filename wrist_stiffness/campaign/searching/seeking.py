@@ -237,6 +237,14 @@ class Search:
         point = point_of(base, with_extras=True)
         return Place(base, wrist_candidates(point, held, {}, self._progress), known=True)
 
+    def after(self, base: BaseFit) -> Place:
+        """Return the place of a whole fit, to ask whether anything is left.
+
+        With the slopes about the first base: about this one, with play in it, they take a minute.
+        """
+        others = tuple(each for each in self._catalogue if each.name not in base.extras)
+        return Place(base, others, known=True)
+
     def _at(self, reached: Reached) -> Candidates:
         held = {effect.name for effect in reached.base.problem.model.effects}
         near = _near(self._model, reached.effects)
