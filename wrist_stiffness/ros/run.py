@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import signal
 import sys
-import threading
 from collections.abc import Callable
 
 import rclpy
@@ -40,7 +39,7 @@ def run(make_node: Callable[[], Node]) -> int:
     rclpy.init()
     executor = StreamExecutor()
     try:
-        if interrupted.is_set():
+        if interrupted:
             return 0
         executor.add_node(make_node())
         # What a node starts with stays: the collector need not go through it again and again.
@@ -63,7 +62,7 @@ def run(make_node: Callable[[], Node]) -> int:
     return 0
 
 
-def _interrupts_without_raising() -> threading.Event:
+def _interrupts_without_raising() -> list[int]:
     """Let SIGINT end the node as SIGTERM does: by the shutdown of its context, which rclpy sees to.
 
     rclpy calls the handler that was there before its own. Python's raises a KeyboardInterrupt
@@ -71,9 +70,10 @@ def _interrupts_without_raising() -> threading.Event:
 
     Returns
     -------
-    threading.Event
-        Set by a SIGINT, also by one that comes before rclpy listens.
+    list of int
+        Not empty after a SIGINT, also one that comes before rclpy listens. No event: the next
+        signal may come while its lock is held.
     """
-    interrupted = threading.Event()
-    signal.signal(signal.SIGINT, lambda number, frame: interrupted.set())
+    interrupted: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: interrupted.append(number))
     return interrupted
