@@ -15,7 +15,7 @@ import numpy as np
 from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
 from wrist_stiffness.campaign.searching.candidates import SHARE
-from wrist_stiffness.campaign.searching.seeking import LOOSE
+from wrist_stiffness.campaign.searching.seeking import INEXACT, LOOSE
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units
@@ -24,9 +24,6 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
-
-INEXACT = 1.5
-"""Variance of what is left, in units of the noise, from which a law is not taken as exact."""
 
 FAR_BEYOND = 30.0
 """Usual sizes of a parameter that are far beyond the usual: is it this effect, in this unit?"""

@@ -44,7 +44,7 @@ ROUGH = 10.0
 a base that gave way to a large effect does not find back."""
 
 INEXACT = 1.5
-"""Variance of what is left, in units of the noise, from which more than noise is left."""
+"""Variance of what is left, in units of the noise, from which a law is not taken as exact."""
 
 MOST_TRIED = 3
 """So many candidates are fitted with the whole base before a step is given up."""
