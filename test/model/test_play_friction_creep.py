@@ -10,7 +10,7 @@ from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effects.joint_clearance import end_screws
-from wrist_stiffness.model.effects.joint_friction import slip
+from wrist_stiffness.model.effects.joint_friction import pressing, slip
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.memory import lag, play
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
@@ -159,6 +159,20 @@ def test_friction_never_creates_energy(moved, budget):
         assert force[0] @ (later - foot) >= -1e-15
         assert np.linalg.norm(force[0]) <= budget * (1.0 + 1e-12)
         foot = later
+
+
+@pytest.mark.parametrize("joint", PASSIVE_JOINTS)
+def test_force_and_moment_press_a_pin_to_its_sleeve(model, joint):
+    """A force at the middle once, a moment by a force at each end, nothing along the axis."""
+    geometry = model.table.geometry
+    bushing, axis = geometry.bushings[joint], geometry.axes[joint]
+    across = cross_axes(geometry, joint)[0]
+    middle = bushing.radius * axis
+    force = np.concatenate([3.0 * across, np.cross(middle, 3.0 * across)])
+    moment = np.concatenate([np.zeros(3), 0.02 * across])
+    along = np.concatenate([5.0 * axis, 0.1 * axis])
+    found = pressing(geometry, joint, np.array([force, moment, along, force + along]))
+    assert found == pytest.approx([3.0, 2.0 * 0.02 / bushing.length, 0.0, 3.0], abs=1e-12)
 
 
 def test_turning_frees_the_slide():

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.model.effects.joint_clearance import end_screws
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation, lengths
@@ -22,8 +24,8 @@ class JointFriction(Law):
 
     The pin's surface moves along (radius times turn, slide).  It is held by a bristle that bends by
     the pre-sliding distance before it slips, in series with the limb's own flexibility; the force
-    never exceeds coefficient times (radial force + preload).  While the joint turns the budget is
-    spent there and the slide is free; at rest it locks.
+    never exceeds coefficient times (pressing forces + preload).  While the joint turns the budget
+    is spent there and the slide is free; at rest it locks.
     """
 
     id = "joint_friction"
@@ -47,10 +49,8 @@ class JointFriction(Law):
         """Return the friction force and torque; the state is the bristle's foot."""
         geometry = at.table.geometry
         radius = 0.5 * geometry.bushings[place].pin_diameter
-        wrench = at.at_home(place, at.through_place(place))
-        axis = geometry.axes[place]
-        radial = lengths(wrench[:, :3] - (wrench[:, :3] @ axis)[:, None] * axis)
-        budget = values["coefficient"] * (radial + values["preload_N"]) + LEAST_BUDGET
+        pressed = pressing(geometry, place, at.at_home(place, at.through_place(place)))
+        budget = values["coefficient"] * (pressed + values["preload_N"]) + LEAST_BUDGET
         bristle = values["presliding_um"] / budget
         slide, turn = at.slide_flexibility(place)
         moved = np.stack(
@@ -60,6 +60,27 @@ class JointFriction(Law):
         start = moved[0] if state is None else state
         force, foot = slip(moved, compliance, budget, start)
         return at.joint_push(place, -force[:, 1], -radius * force[:, 0]), foot
+
+
+def pressing(geometry: Geometry, joint: str, wrench: Array) -> Array:
+    """Return the sum of the radial forces at both ends of a sleeve; a moment presses both.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Of the wrist.
+    joint : str
+        The joint.
+    wrench : (n, 6) float
+        Carried by the joint, at O in its home frame [N, N m].
+
+    Returns
+    -------
+    (n,) float
+        [N].
+    """
+    ends = wrench @ end_screws(geometry, joint).T
+    return np.asarray(lengths(ends[:, :2]) + lengths(ends[:, 2:]))
 
 
 def slip(moved: Array, compliance: Array, budget: Array, foot: Array) -> tuple[Array, Array]:
