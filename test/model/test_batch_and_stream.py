@@ -226,6 +226,22 @@ def test_past_first_order_is_said(model, make):
         assert len(model.with_effects(off).batch(block).warnings) == said
 
 
+@pytest.mark.parametrize("degrees", [1e9, 1e108, 1e200])
+def test_an_error_that_is_no_error_is_refused_and_forgotten(model, make, degrees):
+    """One number from a broken thermometer must not stop a node or stay in its memory."""
+    loaded = model.with_effects(make.effect("thermal_expansion@link_1"))
+    session = loaded.session()
+    cold = {"ambient": 20.0, "link_1": 21.0}
+    samples = [
+        Sample(float(n), np.zeros(2), Load(np.zeros(6)), temperatures=cold | changed)
+        for n, changed in enumerate([{}, {"link_1": degrees}, {}])
+    ]
+    first = session.advance(samples[0])
+    with pytest.raises(InputError, match="rad, the limit is 1 rad: is a temperature"):
+        session.advance(samples[1])
+    assert np.array_equal(session.advance(samples[2]).twist, first.twist)
+
+
 def test_many_contacts_at_once_are_each_ones_contact():
     rng = np.random.default_rng(0)
     n, m = 200, 9

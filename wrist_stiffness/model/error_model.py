@@ -27,6 +27,9 @@ from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.situation import lengths
 from wrist_stiffness.model.stages import AtHome, Memory, constants_of, share
 
+LARGEST_TURN = 1.0
+"""Turn of the platform that no error makes, but a signal that is no temperature [rad]."""
+
 
 @dataclass(frozen=True)
 class ErrorModel:
@@ -368,6 +371,12 @@ class Session:
         pose = configuration if model.evaluation == "closed_form" else None
         result = evaluate(model, sample.block, memory, pose)
         twist, others = result.twist[0], self._others
+        turn = float(np.abs(twist[3:]).max())
+        if not turn < LARGEST_TURN:
+            raise InputError(
+                f"sample: the predicted error turns by {turn:.3g} rad, the limit is "
+                f"{LARGEST_TURN:g} rad: is a temperature, a covariate or a speed wrong?"
+            )
 
         @cache
         def varied() -> tuple[Array, list[Memory]]:
