@@ -1,17 +1,23 @@
 """Chances by rearrangement are what they say; what a session sets up anew judges nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wrist_stiffness.diagnosis.candidates import Candidate, Parameter
+from wrist_stiffness.diagnosis.discrepancy import find_discrepancy
 from wrist_stiffness.diagnosis.fitted import FittedModel
-from wrist_stiffness.diagnosis.hypotheses import Hypothesis
-from wrist_stiffness.diagnosis.nuisance import Nuisance
+from wrist_stiffness.diagnosis.hypotheses import Hypothesis, all_hypotheses, make_evidence
+from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Observations
 from wrist_stiffness.diagnosis.permutation import rearrangements
 from wrist_stiffness.diagnosis.projection import make_base
 from wrist_stiffness.diagnosis.ranking import chance_of_best, scored
+from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.diagnosis.sealed import held_out
+from wrist_stiffness.diagnosis.selection import select
+from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.whitening import NoiseModel
 
 UNITS = 120
@@ -82,6 +88,50 @@ def test_p_values_of_the_best_are_even_where_nothing_hides():
 def test_a_tolerance_far_beyond_its_prior_is_no_chance():
     """All that speaks for it stands in its prior: the data are explained."""
     assert max(best_by_chance(seed, strain=7.0) for seed in range(10)) == pytest.approx(0.01)
+
+
+def noise_with_blanks(rng, share, elsewhere=0.0):
+    """Noise of known size in two components, of which a share of the units has the first alone.
+
+    The others stand `elsewhere` by so many standard deviations of each condition.
+    """
+    values = rng.normal(size=(100, 2))
+    single = rng.random(100) < share
+    values[single, 1] = np.nan
+    conditions = {name: rng.normal(size=100) + elsewhere * ~single for name in "abcdef"}
+    table = Observations(values, conditions)
+    noise = NoiseModel(np.eye(2), 0.0, 1.0, np.inf, "given")
+    offset = Nuisance("offset", lambda units: np.broadcast_to(np.eye(2), (units.n_units, 2, 2)))
+    return make_evidence(table, noise, nuisance_columns(table, (offset,)))
+
+
+def acts_on_the_second(name):
+    def columns(units, _):
+        return np.stack([np.zeros(units.n_units), units.covariate(name)], axis=1)[:, :, None]
+
+    return Candidate("effect", name, (Parameter("slope", scale=0.3),), columns)
+
+
+def test_what_is_rarely_measured_is_named_no_oftener_by_chance():
+    named, often = 0, replace(Settings(), alpha=0.02)
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        evidence = noise_with_blanks(rng, 0.8)
+        catalogue = all_hypotheses(evidence, tuple(map(acts_on_the_second, "abcdef")))
+        named += bool(select(evidence, catalogue, 6.0, often, rng).entered)
+    # 1.2 of 60 are expected, and more than five one time in a thousand.
+    assert named <= 5
+
+
+def test_chances_of_structure_are_even_where_units_differ_in_what_was_measured():
+    found = []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        evidence = noise_with_blanks(rng, 0.8, elsewhere=8.0)
+        blocks = time_blocks(evidence.observations.sessions, 10)
+        found.append(find_discrepancy(evidence, evidence.base, blocks, 49, 0.001, rng).p_value)
+    # Three standard deviations of 100 draws.
+    assert np.mean(found) == pytest.approx(0.51, abs=3.0 * 0.29 / np.sqrt(100))
 
 
 def test_what_a_session_sets_up_anew_is_no_evidence_on_its_sealed_part():

@@ -49,6 +49,21 @@ def test_time_may_start_again_in_the_next_session():
     assert table.n_units == 4
 
 
+def test_units_of_one_session_with_the_same_components_measured_are_exchangeable():
+    blank = np.array([[0, 0], [0, 1], [0, 0], [0, 0], [0, 1], [0, 1]], bool)
+    values, session = np.where(blank, np.nan, 1.0), np.array([0, 0, 0, 1, 1, 0])
+    group = Observations(values, {}, session=session).exchangeable
+    alike = group[:, None] == group
+    assert [np.flatnonzero(row).tolist() for row in alike] == [
+        [0, 2],
+        [1, 5],
+        [0, 2],
+        [3],
+        [4],
+        [1, 5],
+    ]
+
+
 def test_unknown_covariate_is_named_with_the_known_ones(table):
     with pytest.raises(InputError, match=r"no covariate 'force' in the table, only x, z"):
         table.covariate("force")

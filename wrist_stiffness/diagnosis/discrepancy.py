@@ -132,7 +132,7 @@ def find_discrepancy(
     n, m = evidence.observations.values.shape
     if not names:
         return Discrepancy(0.0, 1.0, ())
-    by_chance = rearrangements(base, evidence.observations.sessions, repeats, rng)
+    by_chance = rearrangements(base, evidence.observations.exchangeable, repeats, rng)
     every = np.column_stack([base.residual, by_chance.residuals(base)])[: n * m].reshape(
         n, m, repeats + 1
     )

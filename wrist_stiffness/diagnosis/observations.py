@@ -153,6 +153,12 @@ class Observations:
         return self.session
 
     @property
+    def exchangeable(self) -> Labels:
+        """Group of each unit, (n,): the others of its session with the same components measured."""
+        alike = np.column_stack([self.sessions, self.measured])
+        return np.asarray(np.unique(alike, axis=0, return_inverse=True)[1])
+
+    @property
     def times(self) -> Array:
         """Time of each unit, (n,) [s], or its number where no time was given."""
         if self.time_s is None:

@@ -3,8 +3,10 @@
 Freedman and Lane (1983): residuals of the reduced model are rearranged, the model is refitted, the
 largest statistic over all candidates is kept.  So a large catalogue pays for its size, whatever
 its members share.  Short stretches of units move together, with a random sign, and never leave
-their session, so that wander which the noise model missed stays in place.  A prior is no unit: how
-far it was strained is evidence, and by chance it is strained as it says itself.
+their session, so that wander which the noise model missed stays in place.  Units change places
+only where the same components were measured: the zero that stands for a blank is no residual.  A
+prior is no unit: how far it was strained is evidence, and by chance it is strained as it says
+itself.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ class Rearrangements:
 
 
 def rearrangements(
-    base: Base, sessions: Labels, repeats: int, rng: np.random.Generator
+    base: Base, groups: Labels, repeats: int, rng: np.random.Generator
 ) -> Rearrangements:
     """Draw rearrangements.
 
@@ -63,17 +65,17 @@ def rearrangements(
     ----------
     base : Base
         Whose residual is rearranged.
-    sessions : (n,) array
-        Session of each unit.
+    groups : (n,) array
+        Units of one group may change places.
     repeats : int
         How many.
     rng : numpy.random.Generator
         Source of chance.
     """
-    n = len(sessions)
+    n = len(groups)
     order, sign = np.empty((repeats, n), dtype=np.int64), np.empty((repeats, n))
-    for session in np.unique(sessions):
-        places = np.flatnonzero(sessions == session)
+    for group in np.unique(groups):
+        places = np.flatnonzero(groups == group)
         count = len(places)
         rolled = (np.arange(count) + rng.integers(STRETCH, size=(repeats, 1))) % count
         piece = np.arange(count) // STRETCH

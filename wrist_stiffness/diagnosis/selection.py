@@ -104,8 +104,8 @@ def select(
         ranked = _contest(evidence, base, _others(hypotheses, entered), dimension)
         if not ranked:
             break
-        sessions = evidence.observations.sessions
-        rearranged = rearrangements(base, sessions, settings.permutations, rng)
+        groups = evidence.observations.exchangeable
+        rearranged = rearrangements(base, groups, settings.permutations, rng)
         chance = chance_of_best(base, ranked, rearranged)
         if chance > settings.alpha:
             break
