@@ -254,6 +254,22 @@ def test_nothing_is_overwritten_unasked(tmp_path, full, table):
     assert full.read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("run.mcap", "a table is no recording; choose another name"),
+        ("run", "is no earlier table: it is not replaced"),
+    ],
+)
+def test_an_export_never_replaces_its_own_recording(tmp_path, full, table, name, reason):
+    import_csv(full, tmp_path / "run.mcap")
+    recording = (tmp_path / "run.mcap").rename(tmp_path / name)
+    before = recording.read_bytes()
+    with pytest.raises(InputError, match=reason):
+        export_csv(recording, recording, table, overwrite=True)
+    assert recording.read_bytes() == before
+
+
 def test_an_export_that_cannot_be_written_leaves_nothing(tmp_path, full, table):
     import_csv(full, tmp_path / "bag")
     with pytest.raises(WristError, match="cannot be written"):

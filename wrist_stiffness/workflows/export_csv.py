@@ -46,6 +46,9 @@ from wrist_stiffness.recording.topics import MOTOR_COMMANDS
 
 ROWS_A_REPORT = 1000
 
+LONGEST_HEAD = 100_000
+"""Bytes in which a table's first line ends; another kind of file may have no line at all."""
+
 
 @dataclass(frozen=True)
 class Exported:
@@ -106,14 +109,13 @@ def export_csv(
     Raises
     ------
     InputError
-        If the output exists or cannot be written.
+        If the output exists, is no table, or cannot be written.
     WristError
         If the recording cannot be read, lacks a topic or has a frame that is not known.
     """
     settings = settings or StreamSettings()
     output = Path(output)
-    if output.exists() and not overwrite and output.is_file():
-        raise InputError(f"{output} exists already and is not overwritten")
+    _require_place(output, overwrite)
     source = open_recording(recording)
     joints = (settings.motors.motor_1, settings.motors.motor_2)
     samples = read_samples(source, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
@@ -157,6 +159,23 @@ def export_csv(
     if len(samples.frame_poses.time_ns):
         remarks = (*remarks, "the frame's poses have no columns: its motion stays in")
     return Exported(output, len(time_ns), remarks)
+
+
+def _require_place(output: Path, overwrite: bool) -> None:
+    """Refuse to replace unasked, or what is no table: the recording itself, a model."""
+    if output.suffix == ".mcap":
+        raise InputError(f"{output}: a table is no recording; choose another name")
+    if not output.is_file():
+        return
+    if not overwrite:
+        raise InputError(f"{output} exists already and is not overwritten")
+    try:
+        with output.open("rb") as old:
+            head = old.readline(LONGEST_HEAD)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be replaced: {error.strerror}") from error
+    if head and TIME.encode() not in head:
+        raise InputError(f"{output} is no earlier table: it is not replaced")
 
 
 def _measured(samples: Samples, frames: Frames) -> tuple[Stamps, Array, tuple[str, ...], int]:
