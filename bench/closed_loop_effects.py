@@ -32,7 +32,6 @@ from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP, commiss
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.searching.candidates import compensable
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
@@ -92,7 +91,6 @@ RECORDED_K, NEW_K = 10.0, 7.0
 much."""
 
 BASE_SEED = 1001
-SETTINGS = Settings(permutations=299)
 SEED = 5
 TARE = "load_bias"
 COMMISSIONED = tuple(law for law, _ in (*SET_UP, *BUILT) if law != TARE)
@@ -238,7 +236,7 @@ class Loop:
     def diagnosed(self, told: Row) -> Row:
         """Return what a diagnosis makes of it."""
         chance = np.random.default_rng(SEED)
-        result = diagnose_sessions(self.known, [self.session], chance, SETTINGS).diagnosis
+        result = diagnose_sessions(self.known, [self.session], chance).diagnosis
         findings = [list(finding.names) for finding in result.findings]
         names = [each[0] for each in findings]
         if names == told["added"]:

@@ -20,13 +20,11 @@ from wrist_stiffness.diagnosis.candidates import Candidate, Parameter
 from wrist_stiffness.diagnosis.diagnose import diagnose
 from wrist_stiffness.diagnosis.nuisance import Nuisance
 from wrist_stiffness.diagnosis.observations import Observations, Quantity
-from wrist_stiffness.diagnosis.settings import Settings
 
 CONDITIONS = (
     *("theta_1", "theta_2", "speed_1", "speed_2", "sense_1", "sense_2"),
     *("fx", "fy", "fz", "mx", "my", "mz", "time", "temperature"),
 )
-PERMUTATIONS = 199
 QUANTITIES = (Quantity("s", "um", (0, 1, 2), 1e6), Quantity("phi", "mdeg", (3, 4, 5), 57295.8))
 
 
@@ -64,7 +62,6 @@ def diagnosis_core(riddle: Riddle, words: Dictionary) -> Answer:
         tuple(candidates),
         tuple(nuisances),
         np.random.default_rng(riddle.case.seed),
-        Settings(permutations=PERMUTATIONS),
     )
     names = tuple(finding.names for finding in result.findings)
     chosen = [word for word in words.searched if word.name in {members[0] for members in names}]

@@ -8,14 +8,12 @@ import pytest
 
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
-QUICK = Settings(permutations=299)
 RECORDINGS = Path(__file__).parents[1] / "data"
 SECONDS = 120.0
 
@@ -39,7 +37,7 @@ def measured(in_the_cell, model, hidden=(), base="wrong", seed=3):
 
 
 def answer(model, session, seed=0):
-    return diagnose_sessions(model, [session], np.random.default_rng(seed), QUICK)
+    return diagnose_sessions(model, [session], np.random.default_rng(seed))
 
 
 @pytest.mark.slow

@@ -277,7 +277,9 @@ def test_of_two_that_explain_alike_the_one_that_strains_the_base_stands_back(rng
     assert named.names == ("fit@easy",)
 
 
-def test_permutations_by_which_nothing_could_be_found_are_refused():
-    with pytest.raises(InputError, match="99 permutations .* at least 199"):
-        Settings(permutations=99)
-    Settings(permutations=199)
+@pytest.mark.parametrize(("alpha", "least"), [(0.005, 999), (0.0003, 3333)])
+def test_permutations_by_which_nothing_could_be_found_are_refused(alpha, least):
+    """Neither an effect at alpha nor structure, of which noise is taken for it once in 1000."""
+    with pytest.raises(InputError, match=f"{least - 1} permutations .* at least {least} are"):
+        Settings(alpha=alpha, permutations=least - 1)
+    Settings(alpha=alpha, permutations=least)

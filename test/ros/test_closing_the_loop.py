@@ -23,7 +23,6 @@ from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.safety import SafetySettings
-from wrist_stiffness.diagnosis import Settings
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, pose_message_stamped
@@ -162,9 +161,7 @@ def test_record_diagnose_extend_reload_and_the_true_error_falls(graph, model, tm
     recording = tmp_path / "recorded.mcap"
     recorded(graph, wrist, model.table, recording)
     session = read_session(recording, model.table)
-    answer = diagnose_sessions(
-        load_model(path), [session], np.random.default_rng(0), Settings(permutations=199)
-    )
+    answer = diagnose_sessions(load_model(path), [session], np.random.default_rng(0))
     assert [finding.name for finding in answer.diagnosis.findings] == ["backlash@motor_1"]
     found = CatalogueEffect(answer.diagnosis.findings[0].name)
     extend_model(path, found, Recordings([recording], {}), extended, Run("test", "2026-01-01"))

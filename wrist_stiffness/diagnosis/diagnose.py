@@ -32,13 +32,8 @@ from wrist_stiffness.diagnosis.selection import (
     base_with,
     select,
 )
-from wrist_stiffness.diagnosis.settings import Settings
-from wrist_stiffness.diagnosis.structure import (
-    CHANCE_OF_STRUCTURE,
-    Excess,
-    effective_dimension,
-    lack_of_fit,
-)
+from wrist_stiffness.diagnosis.settings import CHANCE_OF_STRUCTURE, Settings
+from wrist_stiffness.diagnosis.structure import Excess, effective_dimension, lack_of_fit
 from wrist_stiffness.errors import InputError
 
 NOISE_KNOWN = {

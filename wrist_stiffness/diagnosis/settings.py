@@ -1,8 +1,12 @@
 """What a diagnosis decides by; every threshold in one place."""
 
+import math
 from dataclasses import dataclass
 
 from wrist_stiffness.errors import InputError
+
+CHANCE_OF_STRUCTURE = 0.001
+"""Probability with which noise is taken for structure, in each test that asks for it."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,7 @@ class Settings:
     Raises
     ------
     InputError
-        If the permutations are too few for any effect ever to be significant.
+        If the permutations are too few for any effect or structure ever to be significant.
     """
 
     alpha: float = 0.005
@@ -54,8 +58,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Refuse settings by which nothing can be found."""
-        if (self.permutations + 1) * self.alpha < 1.0:
+        chance = min(self.alpha, CHANCE_OF_STRUCTURE)
+        least = math.ceil(1.0 / chance) - 1
+        if self.permutations < least:
             raise InputError(
-                f"{self.permutations} permutations cannot tell a chance of {self.alpha:g}; "
-                f"at least {round(1.0 / self.alpha) - 1} are needed"
+                f"{self.permutations} permutations cannot tell a chance of {chance:g}; "
+                f"at least {least} are needed"
             )

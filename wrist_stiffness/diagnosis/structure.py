@@ -14,6 +14,7 @@ from scipy.special import chdtrc, fdtrc
 from wrist_stiffness.diagnosis.hypotheses import Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array
 from wrist_stiffness.diagnosis.projection import Base
+from wrist_stiffness.diagnosis.settings import CHANCE_OF_STRUCTURE
 
 
 def effective_dimension(base: Base, hypotheses: list[Hypothesis]) -> float:
@@ -44,10 +45,6 @@ class Excess:
 
     energy: float
     p_value: float
-
-
-CHANCE_OF_STRUCTURE = 0.001
-"""Probability with which noise is taken for structure, in each test that asks for it."""
 
 
 def lack_of_fit(energy: float, freedom: int, noise_dof: float) -> Excess:
