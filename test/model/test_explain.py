@@ -96,7 +96,11 @@ def test_rows_add_up_to_s_and_phi_and_name_the_rest(model_path, loaded):
     pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
     found = explain(model_path, POSE.tolist(), LOAD, measured=pose)
     assert found.measured
-    assert "5.39 um and 0.573 mdeg are not explained, " in found.verdict
+    # The row tells the part along the measured shift, the verdict the whole length.
+    assert found.rows[-1].along[0] < 0.7 * np.linalg.norm(rest[:3])
+    assert found.verdict.startswith(
+        "in all, whatever the direction, 5.39 um and 0.573 mdeg are not explained, "
+    )
     last = found.rows[-1]
     assert last.kind == "rest"
     assert np.allclose(last.twist, rest, atol=1e-12)
@@ -123,6 +127,42 @@ def test_a_rest_within_the_uncertainty_is_no_reason_to_search(model_path, loaded
     assert "no more than the uncertainty" in verdicts[0]
     assert "an effect is missing" in verdicts[1]
     assert explain(model_path, POSE.tolist(), LOAD).verdict == ""
+
+
+def test_where_the_sensor_stands_is_no_reason_why_the_platform_is_off(loaded, make, tmp_path):
+    believed = loaded.with_effects(
+        *loaded.effects,
+        make.effect("measurement_frame@pose_sensor", shift_z_um=(900.0, 20.0)),
+        make.effect("target_mounting@pose_sensor", shift_x_um=560.0, turn_x_mdeg=-170.0),
+    )
+    save_model(believed, tmp_path / "m.yaml")
+    found = explain(tmp_path / "m.yaml", POSE.tolist(), LOAD)
+    prediction = believed.predict(POSE, LOAD)
+    assert np.allclose(found.total, prediction.twist, rtol=1e-9, atol=1e-15)
+    assert not any("pose_sensor" in row.name for row in found.rows)
+    along = np.sum([row.along for row in found.rows], axis=0)
+    assert along[0] == pytest.approx(prediction.shift_norm, rel=1e-6)
+    about = found.total[:3] / np.linalg.norm(found.total[:3])
+    assert found.sigma[0] == pytest.approx(
+        np.sqrt(about @ prediction.covariance[:3, :3] @ about), rel=1e-6
+    )
+    (note,) = (text for text in found.warnings if "pose_sensor" in text)
+    assert "(measurement_frame@pose_sensor, target_mounting@pose_sensor) say where it" in note
+    pose = [0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    measured = explain(tmp_path / "m.yaml", POSE.tolist(), LOAD, measured=pose)
+    assert sum("pose_sensor" in row.name for row in measured.rows) == 2
+    assert not any("pose_sensor" in text for text in measured.warnings)
+
+
+def test_an_effect_with_a_past_is_told_to_be_unknown_at_one_pose(model, make, tmp_path):
+    worn = model.with_effects(
+        make.effect("backlash@motor_2", width_mdeg=80.0),
+        make.effect("joint_clearance@joint_3", clearance_um=8.0),
+        make.effect("gravity@link_3", mass_g=30.0),
+    )
+    save_model(worn, tmp_path / "m.yaml")
+    (note,) = explain(tmp_path / "m.yaml", POSE.tolist(), LOAD).warnings
+    assert note.startswith("effects with a memory (backlash@motor_2) are not known at one pose")
 
 
 def test_command_prints_a_table_and_writes_json(model_path, tmp_path, capsys):

@@ -20,6 +20,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.law import Contribution
 from wrist_stiffness.model.situation import Situation
+from wrist_stiffness.model.stages import Advanced
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,8 @@ class Budget:
         Rotation U -> F of the rigid platform.
     warnings : tuple of str
         Effects that were left out or have left first order.
+    remembering : tuple of str
+        Effects that hang on what was before, of which one sample says nothing.
     """
 
     elastic: tuple[Share, ...]
@@ -73,6 +76,7 @@ class Budget:
     covariance: Array
     platform: Array
     warnings: tuple[str, ...]
+    remembering: tuple[str, ...]
 
 
 def budget(model: ErrorModel, sample: Sample) -> Budget:
@@ -139,7 +143,13 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
         covariance,
         configuration.platform,
         result.warnings,
+        tuple(each.effect.name for each in result.staged.advanced if each and _remembers(each)),
     )
+
+
+def _remembers(done: Advanced) -> bool:
+    """Tell whether an effect leaves a state that would change its answer to the next sample."""
+    return done.after is not None and not done.effect.law.state_is_a_guess
 
 
 def _felt(at: Situation, added: Contribution, closed: NDArray[np.bool_]) -> Array:

@@ -15,6 +15,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.model.block import Load, Sample
 from wrist_stiffness.model.budget import Budget, budget
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.places import BODY
 
@@ -90,7 +91,7 @@ class Explanation:
     sigma : (2,) float
         Standard uncertainty of the prediction along the total [m, rad].
     warnings : tuple of str
-        Effects that were left out or have left first order.
+        Effects that were left out, have left first order, or are not known at one pose.
     verdict : str
         Whether a measured error is explained, in one sentence; empty for a predicted one.
     """
@@ -162,13 +163,31 @@ def explain(
         temperatures=temperatures or {},
         covariates=covariates or {},
     )
+    notes = []
+    if measured is None:
+        # Where a sensor stands moves no platform; what is told is what `predict` says.
+        aside = [effect for effect in error_model.effects if effect.stage == "sensor"]
+        if aside:
+            error_model = error_model.with_effects(
+                *(effect for effect in error_model.effects if effect not in aside)
+            )
+            notes.append(
+                f"effects of the pose sensor ({_listed(aside)}) say where it stands, not where "
+                "the platform is: they count with --measured only"
+            )
     parts = budget(error_model, sample)
+    past = [effect for effect in error_model.effects if effect.name in parts.remembering]
+    if past:
+        notes.append(
+            f"effects with a memory ({_listed(past)}) are not known at one pose: they count as if "
+            "nothing had been before"
+        )
     meanings = {
         effect.name: effect.law.sentence.format(place=effect.component)
         for effect in error_model.effects
     }
     total = parts.measured if measured is None else measured_twist(measured, parts.platform)
-    return _explained(parts, total, measured is not None, meanings)
+    return _explained(parts, total, measured is not None, meanings, notes)
 
 
 def measured_twist(pose: Sequence[float], platform: Array) -> Array:
@@ -211,7 +230,11 @@ def measured_twist(pose: Sequence[float], platform: Array) -> Array:
 
 
 def _explained(
-    parts: Budget, total: Array, measured: bool, meanings: Mapping[str, str]
+    parts: Budget,
+    total: Array,
+    measured: bool,
+    meanings: Mapping[str, str],
+    notes: Sequence[str],
 ) -> Explanation:
     directions = _directions(total)
 
@@ -234,7 +257,11 @@ def _explained(
         rest = total - parts.measured
         rows.append(Row("not explained", "rest", rest, directions @ rest, sigma, ""))
     verdict = _verdict(total - parts.measured, covariance) if measured else ""
-    return Explanation(total, measured, tuple(rows), sigma, parts.warnings, verdict)
+    return Explanation(total, measured, tuple(rows), sigma, (*parts.warnings, *notes), verdict)
+
+
+def _listed(effects: Sequence[Effect]) -> str:
+    return ", ".join(effect.name for effect in effects)
 
 
 def _verdict(rest: Array, covariance: Array) -> str:
@@ -243,7 +270,11 @@ def _verdict(rest: Array, covariance: Array) -> str:
     sizes = directions @ rest
     sigma = np.sqrt(np.einsum("ki,ij,kj->k", directions, covariance, directions))
     ratio = np.divide(sizes, sigma, out=np.where(sizes > 0.0, np.inf, 0.0), where=sigma > 0.0)
-    left = f"{UM * sizes[0]:.3g} um and {MDEG * sizes[1]:.3g} mdeg are not explained"
+    # Whole lengths: the rows count along what was measured, and a rest may stand across it.
+    left = (
+        f"in all, whatever the direction, {UM * sizes[0]:.3g} um and {MDEG * sizes[1]:.3g} mdeg "
+        "are not explained"
+    )
     if ratio.max() <= WITHIN:
         return f"{left}: no more than the uncertainty of the prediction"
     return (
