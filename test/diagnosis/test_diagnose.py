@@ -140,6 +140,20 @@ def test_what_the_base_absorbs_is_not_excited(rng):
     assert [(e.effect, e.needs) for e in result.not_excited] == [("offset", "a reference")]
 
 
+def test_a_catalogue_that_the_data_do_not_excite_leaves_the_base_alone(rng):
+    nothing = diagnose(plain(rng), (line("x", plausible=0.01),), (offset(),), rng, QUICK)
+    assert (nothing.verdict, nothing.findings) == ("none", ())
+    assert [each.component for each in nothing.not_excited] == ["x"]
+
+
+def test_structure_without_any_catalogue_is_unknown(rng):
+    table = plain(rng)
+    table = table.with_values(table.values + np.outer(3 * table.covariate("x"), [1, 1]))
+    found = diagnose(table, (), (offset(),), rng, QUICK)
+    assert (found.verdict, found.not_excited) == ("unknown", ())
+    assert found.unexplained.depends_on[0] == "x"
+
+
 def test_an_effect_too_small_to_be_seen_is_not_excited(rng):
     faint = line("x", plausible=0.01)
     result = diagnose(plain(rng), (faint, line("z")), (offset(),), rng, QUICK)

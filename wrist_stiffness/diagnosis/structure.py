@@ -23,7 +23,8 @@ def effective_dimension(base: Base, hypotheses: list[Hypothesis]) -> float:
     Exponential of the entropy of the eigenvalue shares of the Gram matrix of unit columns
     (Roy and Vetterli 2007).
     """
-    columns = np.hstack([addition(base, each).directions for each in hypotheses])
+    directions = (addition(base, each).directions for each in hypotheses)
+    columns = np.hstack([base.basis[:, :0], *directions])
     if columns.shape[1] == 0:
         return 1.0
     size = np.linalg.eigvalsh(columns.T @ columns)
