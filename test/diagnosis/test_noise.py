@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,25 @@ def test_what_repeats_have_in_common_is_no_scatter_however_they_are_weighted(rng
     noise = estimate_noise(table, np.empty((120, 2, 0)), structure)
     assert noise.source == "replicates"
     assert total_variance(noise, table) == pytest.approx(1.0, rel=0.5)
+
+
+def test_a_component_that_was_never_measured_does_not_change_the_replicate_floor(rng):
+    """What candidates take of the differences is taken from those that were measured."""
+    values = rng.normal(size=(60, 2))
+    table = Observations(values, {}, replicate=np.repeat(np.arange(20), 3))
+    base, structure = np.ones((60, 2, 1)), rng.normal(size=(60, 2, 12))
+    expected = estimate_noise(table, base, structure)
+
+    def beside_blanks(columns, blank=0.0):
+        return np.concatenate([columns, np.full((60, 4, *columns.shape[2:]), blank)], axis=1)
+
+    more = table.with_values(beside_blanks(values, np.nan))
+    found = estimate_noise(
+        replace(more, quantities=()), beside_blanks(base), beside_blanks(structure)
+    )
+    assert found.source == "replicates"
+    assert found.dof == pytest.approx(expected.dof)
+    assert np.diag(found.beyond)[:2] == pytest.approx(np.diag(expected.beyond))
 
 
 @pytest.mark.parametrize(("scatter", "variance"), [(5.0, MOST_BEYOND_STATED), (0.2, 1.0)])

@@ -78,8 +78,8 @@ def replicate_variance(
     original = np.linalg.norm(stacked.reshape(rows.shape), axis=0)
     basis = orthonormal(rows[:, :-1], original[:-1])[:, : int(RICH_SHARE * freedom.sum())]
     left = rows[:, -1] - basis @ (basis.T @ rows[:, -1])
-    freedom = freedom - basis.shape[1] / m
     seen = observations.measured.any(axis=0)
+    freedom = freedom - basis.shape[1] / seen.sum()
     variance = size**2 * np.sum(left.reshape(-1, m) ** 2, axis=0) / np.maximum(freedom, 1)
     return np.where(seen, variance, 1.0), float(freedom[seen].min())
 
@@ -147,7 +147,8 @@ def estimate_noise(observations: Observations, base: Array, structure: Array) ->
     if freedom >= FEWEST_REPLICATE_DOF:
         # 1/s^2 of a scatter s^2 with few degrees of freedom is too large on average.
         repeated = repeated * freedom / (freedom - 2)
-        known, dof = _stated_of_replicates(observations), freedom * measured.shape[1]
+        known = _stated_of_replicates(observations)
+        dof = freedom * int(measured.any(axis=0).sum())
         noise = NoiseModel(np.diag(np.maximum(repeated - known, 0.0)), 0.0, 1.0, dof, "replicates")
         noise = _coloured(noise, base, structure, observations)
         visible = share_inside_groups(observations, noise.colour_share, noise.colour_time)
