@@ -30,7 +30,7 @@ def test_where_the_search_begins_does_not_show(seed, far):
     wanted = play.resting()
     assert not np.allclose(wanted, play._unhindered(), rtol=0.0, atol=1e-3 * RADIAL)
     off = np.random.default_rng(seed + 100).normal(size=4)
-    found = play.resting(wanted[0] + far * RADIAL * off / np.linalg.norm(off))
+    found = play.resting(wanted + far * RADIAL * off / np.linalg.norm(off))
     assert np.abs(found - wanted).max() < ROUNDING
 
 
@@ -43,5 +43,5 @@ def test_a_search_that_begins_near_the_end_is_short(monkeypatch):
     )
     rests = play.resting()
     cold = len(steps)
-    play.resting(rests[0] * (1.0 + 1e-4))
+    play.resting(rests * (1.0 + 1e-4))
     assert len(steps) - cold < 0.5 * cold

@@ -52,8 +52,9 @@ class Law(ABC):
         Whether half a second of motion may go through more than one of its waves, so that no mean
         angle stands for what it did.
     state_is_a_guess : bool
-        Whether its state is only where the search for its answer begins: a moment without its past
-        gives the same answer.
+        Whether its state, (n, ...) at n samples, is only where the search for its answer begins: a
+        moment without its past gives the same answer.  It gets the state of the sample before, or
+        what another model has at the same samples.
     file : path or None
         The Python file of a user's own law.
     """

@@ -56,14 +56,14 @@ class Play:
     opening: Array
     approach: Array
 
-    def resting(self, before: Array | None = None) -> Array:
+    def resting(self, near: Array | None = None) -> Array:
         """Return the displacements of both ends, (n, 4) [m].
 
         Parameters
         ----------
-        before : (4,) float, optional
-            Of the sample before a single one: where the search begins.  The energy is convex, so it
-            changes the cost and not the result beyond rounding [m].
+        near : (n, 4) float, optional
+            Where the search begins.  The energy is convex, so it changes the cost and not the
+            result beyond rounding [m].
 
         Returns
         -------
@@ -74,35 +74,44 @@ class Play:
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
         held = np.flatnonzero((gap < 0.0).any(axis=1))
         if len(held):
-            x[held] = self.take(held)._hindered(x[held], before if len(x) == 1 else None)
+            x[held] = self.take(held)._hindered(x[held], None if near is None else near[held])
         return x
 
-    def _hindered(self, x: Array, before: Array | None) -> Array:
+    def _hindered(self, x: Array, near: Array | None) -> Array:
         """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
-        if before is not None:
-            near, rests = self._newton(before[None], WALLS[-1], FORCE_TOLERANCE)
-            if rests:
-                return self._settled(near)
-        for wall in WALLS[:-1]:
-            x, _ = self._newton(x, wall, ROUGH_TOLERANCE)
-        return self._settled(self._newton(x, WALLS[-1], FORCE_TOLERANCE)[0])
+        found, left = x, np.arange(len(x))
+        active = np.zeros(self.gap.shape, dtype=bool)
+        if near is not None:
+            found, active, rests = self._newton(near, WALLS[-1], FORCE_TOLERANCE)
+            left = np.flatnonzero(~rests)
+        if len(left):
+            part, on_the_way = self.take(left), x[left]
+            for wall in WALLS[:-1]:
+                on_the_way = part._newton(on_the_way, wall, ROUGH_TOLERANCE)[0]
+            found[left], active[left], _ = part._newton(on_the_way, WALLS[-1], FORCE_TOLERANCE)
+        return self._settled(found, active)
 
-    def _settled(self, x: Array) -> Array:
+    def _settled(self, x: Array, active: NDArray[np.bool_]) -> Array:
         """Go one more step from where the pins rest, so that no trace of the way is left."""
-        _, gradient, active = self._state(x, WALLS[-1], None)
+        _, gradient, active = self._state(x, WALLS[-1], active)
         hessian = self._hessian(x, WALLS[-1], active)
         settled: Array = x - np.linalg.solve(hessian, gradient[..., None])[..., 0]
         return settled
 
-    def _newton(self, x: Array, wall: float, tolerance: float) -> tuple[Array, bool]:
-        """Return where the steps end, (n, 4), and whether all pins rest there."""
+    def _newton(
+        self, x: Array, wall: float, tolerance: float
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return where the steps end, (n, 4), the sectors touching there, and which pins rest."""
         x, rows, left = x.copy(), np.arange(len(x)), self
+        rests = np.zeros(len(x), dtype=bool)
         energy, gradient, active = self._state(x, wall, None)
+        touching = active.copy()
         for _ in range(MAX_STEPS):
             bound = tolerance * (1.0 + np.abs(left.force).max(axis=1))
             moving = np.abs(gradient).max(axis=1) > bound
+            rests[rows[~moving]] = True
             if not moving.any():
-                return x, True
+                break
             if not moving.all():
                 rows, left = rows[moving], left.take(moving)
                 energy, gradient, active = energy[moving], gradient[moving], active[moving]
@@ -121,7 +130,8 @@ class Play:
                 if len(far) == 0:
                     break
             x[rows] += size[:, None] * step
-        return x, False
+            touching[rows] = active
+        return x, touching, rests
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Play:
         """Return some of the samples."""

@@ -107,6 +107,12 @@ class Advanced:
     after: Any
     warnings: tuple[str, ...]
 
+    @property
+    def left(self) -> Any:
+        """What the next block gets of the state."""
+        guesses = self.effect.law.state_is_a_guess and self.after is not None
+        return self.after[-1:] if guesses else self.after
+
 
 @dataclass(frozen=True, eq=False)
 class Staged:
@@ -136,6 +142,12 @@ class Staged:
         """What the effects did, by their identities."""
         return {id(each.effect): each for each in self.advanced if each is not None}
 
+    @cached_property
+    def guesses(self) -> dict[str, Any]:
+        """Where the effects whose states are guesses ended, by their names."""
+        guessing = [e for e in self.advanced if e is not None and e.effect.law.state_is_a_guess]
+        return {each.effect.name: each.after for each in guessing}
+
     def added(self, stage: str) -> list[Contribution]:
         """Return what the effects of a stage added."""
         return [e.added for e in self.advanced if e is not None and e.effect.stage == stage]
@@ -143,7 +155,7 @@ class Staged:
     def memory(self, active: NDArray[np.bool_]) -> Memory:
         """Return what is left for the next block, with the contact state (n, m)."""
         block = self.last.block
-        states = tuple(None if each is None else each.after for each in self.advanced)
+        states = tuple(None if each is None else each.left for each in self.advanced)
         return Memory(states, float(block.time[-1]), block.theta[-1], active[-1])
 
 
@@ -183,8 +195,9 @@ def _advanced(effect: Effect, at: Situation, state: Any, like: Staged | None) ->
     known = None if like is None or effect.law.foreign else like.known.get(id(effect))
     if known is not None and known.at is at and known.before is state:
         return known
+    near = None if like is None else like.guesses.get(effect.name)
     try:
-        added, after = _advanced_by(effect, at, state)
+        added, after = _advanced_by(effect, at, state if near is None else near)
     except MissingSignalError as missing:
         lacking = f"{effect.name}: {missing.signal} is missing, left out"
         return Advanced(effect, at, state, NOTHING, state, (lacking,))

@@ -44,14 +44,16 @@ class JointClearance(Law):
         radial = 0.5 * values["clearance_um"]
         if radial == 0.0:
             return NOTHING, None
-        before: Array | None = state
+        near: Array | None = state
+        if near is not None and len(near) != len(at.block):
+            near = None
         ends = end_screws(at.table.geometry, place)
         opening = np.stack([at.carried(at.screw(place, end))[1] for end in ends], axis=-1)
         carried = at.at_home(place, at.through_place(place)) @ ends.T
         flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
         play = Play(radial, carried - flanges, at.free[1], opening, at.operators.approach)
-        resting = play.resting(before)
-        return at.screw(place, resting @ ends), resting[-1]
+        resting = play.resting(near)
+        return at.screw(place, resting @ ends), resting
 
 
 def end_screws(geometry: Geometry, joint: str) -> Array:
