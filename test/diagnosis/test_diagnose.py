@@ -211,13 +211,40 @@ def test_the_result_is_plain_json(rng):
 @pytest.mark.parametrize(
     ("n", "candidates", "message"),
     [
-        (8, (line("x"),), "8 units are too few"),
+        (8, (line("x"),), "8 units are too few .* of the 6 that are left it needs 12"),
+        (14, (line("x"),), "14 units are too few .* 3 are put aside .* of the 11"),
         (40, (line("x"), line("x")), "line@x is listed twice"),
     ],
 )
 def test_unusable_questions_are_refused(rng, n, candidates, message):
     with pytest.raises(InputError, match=message):
         diagnose(plain(rng, n), candidates, (offset(),), rng)
+
+
+def test_a_short_first_session_is_refused(rng):
+    table = replace(plain(rng, 40), session=np.repeat([0, 1], [2, 38]))
+    with pytest.raises(InputError, match="38 are put aside to judge by, and of the 2"):
+        diagnose(table, (line("x"),), (offset(),), rng)
+
+
+@pytest.mark.parametrize("columns", [24, 30])
+def test_a_base_that_fits_every_number_is_refused(rng, columns):
+    """Twelve units of two components teach."""
+    flexible = Nuisance("flexible", lambda t: rng.normal(size=(*t.values.shape, columns)))
+    with pytest.raises(InputError, match="24 measured numbers .* the base alone fits 24"):
+        diagnose(plain(rng, 15), (line("x"),), (flexible,), rng)
+
+
+@pytest.mark.parametrize("aside", [3, 6, 11])
+def test_of_a_few_sealed_units_none_is_lost(aside):
+    """A rich model follows most of them, and what it does not follow looks far off."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        table = plain(rng, 40 + aside)
+        table = replace(table, session=np.repeat([0, 1], [40, aside]))
+        steps = Nuisance("steps", lambda t: np.eye(2)[None] * np.ones((t.n_units, 1, 1)))
+        found = diagnose(table, tuple(map(line, "xzw")), (steps,), rng)
+        assert found.lost_units == 0
 
 
 def test_a_table_of_blanks_is_refused(rng):

@@ -22,7 +22,7 @@ from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Array, Observations
 from wrist_stiffness.diagnosis.outliers import lost_units
-from wrist_stiffness.diagnosis.projection import Base
+from wrist_stiffness.diagnosis.projection import Base, orthonormal
 from wrist_stiffness.diagnosis.ranking import evidence_of
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, NotExcited, Unexplained
@@ -32,7 +32,7 @@ from wrist_stiffness.diagnosis.selection import (
     base_with,
     select,
 )
-from wrist_stiffness.diagnosis.settings import CHANCE_OF_STRUCTURE, Settings
+from wrist_stiffness.diagnosis.settings import CHANCE_OF_STRUCTURE, FEWEST_UNITS, Settings
 from wrist_stiffness.diagnosis.structure import Excess, effective_dimension, lack_of_fit
 from wrist_stiffness.errors import InputError
 
@@ -42,9 +42,6 @@ NOISE_KNOWN = {
     "residual": "estimated from what is left itself",
 }
 """Where the size of the noise is known from, in words."""
-
-FEWEST_UNITS = 12
-"""Fewer units cannot be split into a part to learn from and a part to be judged by."""
 
 
 def diagnose(
@@ -77,7 +74,7 @@ def diagnose(
     Raises
     ------
     InputError
-        If there are too few units, two candidates of one name, or unusable columns.
+        If there are too few units or numbers, two candidates of one name, or unusable columns.
     """
     settings = settings or Settings()
     _refuse_unusable(observations, candidates)
@@ -85,6 +82,7 @@ def diagnose(
     original = {candidate.name: candidate for candidate in candidates}
     candidates = tuple(remembered(candidate, observations) for candidate in candidates)
     aside = sealed_units(observations, settings.sealed_share)
+    _refuse_too_few(int(np.sum(~aside)), int(np.sum(aside)))
     training, n_lost = _cleaned(observations.take(~aside), candidates, nuisances, settings)
     evidence = _gather(training, candidates, nuisances)
     testable, silent = excited(evidence.base, all_hypotheses(evidence, candidates))
@@ -153,9 +151,13 @@ def _refuse_unusable(observations: Observations, candidates: tuple[Candidate, ..
         raise InputError(f"candidate {sorted(twice)[0]} is listed twice")
     if not observations.measured.any():
         raise InputError("nothing was measured: every value is NaN")
-    if observations.n_units < FEWEST_UNITS:
+
+
+def _refuse_too_few(left: int, aside: int) -> None:
+    if left < FEWEST_UNITS:
         raise InputError(
-            f"{observations.n_units} units are too few for a diagnosis, it needs {FEWEST_UNITS}"
+            f"{left + aside} units are too few for a diagnosis: {aside} are put aside to judge by, "
+            f"and of the {left} that are left it needs {FEWEST_UNITS}"
         )
 
 
@@ -172,7 +174,9 @@ def _cleaned(
     nuisances: tuple[Nuisance, ...],
     settings: Settings,
 ) -> tuple[Observations, int]:
-    """Observations without lost units, and how many were lost."""
+    """Observations without lost units, and how many were lost; of few units none can be told."""
+    if observations.n_units < FEWEST_UNITS:
+        return observations, 0
     everything = np.concatenate(
         [
             nuisance_columns(observations, nuisances).columns,
@@ -188,6 +192,14 @@ def _gather(
     training: Observations, candidates: tuple[Candidate, ...], nuisances: tuple[Nuisance, ...]
 ) -> Evidence:
     nuisance = nuisance_columns(training, nuisances)
+    measured = training.measured
+    seen = np.where(measured[:, :, None], nuisance.columns, 0.0).reshape(measured.size, -1)
+    refitted = orthonormal(seen).shape[1]
+    if measured.sum() <= refitted:
+        raise InputError(
+            f"{measured.sum()} measured numbers are too few for a diagnosis: "
+            f"the base alone fits {refitted}"
+        )
     noise = estimate_noise(training, nuisance.columns, _structure(training, candidates))
     return make_evidence(training, noise, nuisance)
 

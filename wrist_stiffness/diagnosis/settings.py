@@ -8,6 +8,9 @@ from wrist_stiffness.errors import InputError
 CHANCE_OF_STRUCTURE = 0.001
 """Probability with which noise is taken for structure, in each test that asks for it."""
 
+FEWEST_UNITS = 12
+"""From fewer units noise cannot be told from error, nor a lost beam from a good one."""
+
 
 @dataclass(frozen=True)
 class Settings:

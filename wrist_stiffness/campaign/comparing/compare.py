@@ -16,13 +16,11 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
 from wrist_stiffness.campaign.observing import Observed, as_units, predict_units, tabulate
 from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 
 Progress = Callable[[int, int], None]
-
-FEWEST_UNITS = 12
-"""From fewer dwells and moments the registrations alone could be anything."""
 
 
 def compare_models(

@@ -13,6 +13,7 @@ from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
 from wrist_stiffness.campaign.fitting.shims import GAP, Shims
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
 from wrist_stiffness.diagnosis.observations import Observations
+from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -28,9 +29,6 @@ MOST_KNOWN = 4096
 
 Progress = Callable[[int, int], None]
 Values = tuple[tuple[str, float], ...]
-
-FEWEST_UNITS = 12
-"""Dwells and moments in motion from which a fit can tell noise from error."""
 
 STEP = 1e-2
 """Step of the difference quotients, in standard deviations of the prior."""
