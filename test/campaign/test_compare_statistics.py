@@ -140,6 +140,32 @@ def test_slow_conditions_of_a_short_recording_are_not_told_from_wander():
     assert "10 minutes" in found.sentences[-1]
 
 
+@pytest.mark.parametrize("beside", [0.0, 2e-3], ids=["a sentence", "named only"])
+def test_a_topic_is_too_short_to_be_told_or_told_and_never_both(beside):
+    """The swing of an angle grows with time; the temperature does as well and says no more."""
+
+    def growing(c):
+        large = along(0, beside * np.sin(c["theta_2"]))
+        return large + along(1, 20e-6 * (c["T_link_1"] - 20.0) * np.sin(c["theta_1"]))
+
+    found = told(table(np.random.default_rng(4), growing, n=150))
+    assert set(found.too_short) == {"temperature", "temperature lag", "time in the session"}
+    topics = {each.condition.topic for each in found.statements}
+    assert not set(found.too_short) & (topics | set(found.minor) | found.silent.keys())
+    assert not any("temperature" in text for text in found.sentences[:-1])
+
+
+def test_of_a_topic_that_is_slow_in_part_the_rest_is_told():
+    def law(c):
+        c["theta_2"] = np.linspace(-0.8, 0.8, len(c["theta_2"]))
+        return along(0, 20e-6 * np.cos(c["theta_1"]))
+
+    found = told(table(np.random.default_rng(4), law, n=100))
+    assert found.statements[0].condition.name.startswith("angle of motor 1")
+    assert "motor angle" not in found.too_short
+    assert "angle of motor 2, once a turn" in found.too_short
+
+
 def test_a_process_learns_a_law_of_pose_and_load_down_to_the_noise():
     def law(c):
         return along(2, 4e-6 * c["fz"] * np.cos(c["theta_1"]) + 3e-6 * np.sin(2 * c["theta_2"]))

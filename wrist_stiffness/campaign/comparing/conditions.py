@@ -47,6 +47,8 @@ class Condition:
         What a picture shows it against, with unit.
     along : (n,) float, optional
         Its values; the first column where None.
+    factor : (n,) float, optional
+        What the columns are a wave times of: as slow as this is what they tell.
     """
 
     topic: str
@@ -57,6 +59,7 @@ class Condition:
     swings: bool = False
     axis: str = ""
     along: Array | None = None
+    factor: Array | None = None
 
 
 def conditions(observations: Observations) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
@@ -254,6 +257,7 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator
                 swings=True,
                 axis=axis,
                 along=column,
+                factor=column,
             )
         # In a shorter session the lag of a thermometer's step is a drift and nothing else.
         for lag in (lag for lag in LAGS_S if lag <= longest):

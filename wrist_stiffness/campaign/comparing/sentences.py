@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,7 +171,7 @@ class Told:
         Topics of which these recordings say nothing.
     too_short : tuple of str
         Topics that change so slowly that the recordings are too short to tell them from the
-        wander of the instrument.
+        wander of the instrument; of a topic that is told of nevertheless, only the slow conditions.
     """
 
     statements: tuple[Statement, ...]
@@ -233,14 +234,17 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     trend = np.hstack([constant, _slow_motions(observations.times, sessions)])
     variance = np.maximum(floor.variance, np.finfo(float).tiny)
     total = noise_energy(observations.values, variance, constant)
-    slow = _which_are_slow(asked, constant, trend)
+    slow = _which_are_slow([each.columns for each in asked], constant, trend)
     span = _span(observations.times, sessions)
     slow_blocks = int(span / SLOW_BLOCK_S)
-    too_short: dict[str, None] = {}
+    too_slow: tuple[Condition, ...] = ()
     if slow_blocks < FEWEST_SLOW_BLOCKS:
-        too_short = dict.fromkeys(asked[which].topic for which in np.flatnonzero(slow))
-        asked = tuple(asked[which] for which in np.flatnonzero(~slow))
-        slow = slow[~slow]
+        # A temperature times an angle is as fast as the angle, and wanders with the temperature.
+        factors = [e.columns if e.factor is None else e.factor[:, None] for e in asked]
+        left_out = slow | _which_are_slow(factors, constant, trend)
+        too_slow = tuple(asked[which] for which in np.flatnonzero(slow))
+        asked = tuple(asked[which] for which in np.flatnonzero(~left_out))
+        slow = slow[~left_out]
 
     def answer(chosen: Labels, base: Array, blocks: int) -> Dependences:
         columns = [asked[which].columns for which in chosen]
@@ -269,6 +273,7 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     minor = {each.condition.topic for each in statements} - told
     told |= minor
     statements = [each for each in statements if each.share >= LEAST_SHARE]
+    too_short = dict.fromkeys(e.name if e.topic in told else e.topic for e in too_slow)
     silent: dict[str, float] = {}
     for condition, p_value in zip(asked, chances.tolist(), strict=True):
         if condition.topic not in told | too_short.keys() and np.isfinite(p_value):
@@ -310,10 +315,10 @@ FEWEST_PER_MOTION = 6
 """Units for each slow motion that is taken out."""
 
 
-def _which_are_slow(asked: tuple[Condition, ...], constant: Array, trend: Array) -> Mask:
-    """Tell which conditions change no faster than the wander, (k,)."""
-    every = np.hstack([np.empty((len(constant), 0)), *(each.columns for each in asked)])
-    owner = np.repeat(np.arange(len(asked)), [each.columns.shape[1] for each in asked])
+def _which_are_slow(asked: Sequence[Array], constant: Array, trend: Array) -> Mask:
+    """Tell which conditions, by their columns (n, q), change no faster than the wander, (k,)."""
+    every = np.hstack([np.empty((len(constant), 0)), *asked])
+    owner = np.repeat(np.arange(len(asked)), [columns.shape[1] for columns in asked])
     whole, fast = (
         np.bincount(owner, np.sum(beyond(base, every) ** 2, axis=0), len(asked))
         for base in (constant, trend)
