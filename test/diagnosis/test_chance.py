@@ -11,7 +11,7 @@ from wrist_stiffness.diagnosis.fitted import FittedModel
 from wrist_stiffness.diagnosis.hypotheses import Hypothesis, all_hypotheses, make_evidence
 from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Observations
-from wrist_stiffness.diagnosis.permutation import rearrangements
+from wrist_stiffness.diagnosis.permutation import rearranged_residuals
 from wrist_stiffness.diagnosis.projection import make_base
 from wrist_stiffness.diagnosis.ranking import chance_of_best, scored
 from wrist_stiffness.diagnosis.resampling import time_blocks
@@ -74,7 +74,7 @@ def best_by_chance(seed, strain=None):
         for number in range(PRIORS)
     ]
     ranked = scored(base, hypotheses, 10.0, np.inf)
-    rearranged = rearrangements(base, np.zeros(UNITS, dtype=np.int64), 99, rng)
+    rearranged = rearranged_residuals(base, np.zeros(UNITS, dtype=np.int64), 99, rng)
     return chance_of_best(base, ranked, rearranged)
 
 
@@ -118,7 +118,7 @@ def test_what_is_rarely_measured_is_named_no_oftener_by_chance():
         rng = np.random.default_rng(seed)
         evidence = noise_with_blanks(rng, 0.8)
         catalogue = all_hypotheses(evidence, tuple(map(acts_on_the_second, "abcdef")))
-        named += bool(select(evidence, catalogue, 6.0, often, rng).entered)
+        named += bool(select(evidence, catalogue, 6.0, often, rng))
     # 1.2 of 60 are expected, and more than five one time in a thousand.
     assert named <= 5
 

@@ -27,11 +27,7 @@ from wrist_stiffness.diagnosis.ranking import evidence_of
 from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, NotExcited, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut, held_out, refuted, sealed_units
-from wrist_stiffness.diagnosis.selection import (
-    Entered,
-    base_with,
-    select,
-)
+from wrist_stiffness.diagnosis.selection import Entered, base_with, select
 from wrist_stiffness.diagnosis.settings import CHANCE_OF_STRUCTURE, FEWEST_UNITS, Settings
 from wrist_stiffness.diagnosis.structure import Excess, effective_dimension, lack_of_fit
 from wrist_stiffness.errors import InputError
@@ -87,10 +83,10 @@ def diagnose(
     evidence = _gather(training, candidates, nuisances)
     testable, silent = excited(evidence.base, all_hypotheses(evidence, candidates))
     dimension = effective_dimension(evidence.base, testable)
-    chosen = select(evidence, testable, dimension, settings, rng)
+    entered = select(evidence, testable, dimension, settings, rng)
 
     sealed, n_lost_aside = _cleaned(observations.take(aside), candidates, nuisances, settings)
-    kept, stages, broken = _opened(evidence, chosen.entered, sealed, nuisances)
+    kept, stages, broken = _opened(evidence, entered, sealed, nuisances)
     blocks = time_blocks(training.sessions, settings.blocks)
     model = Model(evidence, testable, kept, tuple(stages), blocks, dimension, settings)
     findings = tuple(describe(model, which, rng) for which in range(len(kept)))

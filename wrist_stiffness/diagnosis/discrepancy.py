@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist
 
 from wrist_stiffness.diagnosis.hypotheses import Evidence
 from wrist_stiffness.diagnosis.observations import Array, Labels
-from wrist_stiffness.diagnosis.permutation import rearrangements
+from wrist_stiffness.diagnosis.permutation import rearranged_residuals
 from wrist_stiffness.diagnosis.projection import Base
 
 LANDMARKS = 60
@@ -132,10 +132,8 @@ def find_discrepancy(
     n, m = evidence.observations.values.shape
     if not names:
         return Discrepancy(0.0, 1.0, ())
-    by_chance = rearrangements(base, evidence.observations.exchangeable, repeats, rng)
-    every = np.column_stack([base.residual, by_chance.residuals(base)])[: n * m].reshape(
-        n, m, repeats + 1
-    )
+    by_chance = rearranged_residuals(base, evidence.observations.exchangeable, repeats, rng)
+    every = np.column_stack([base.residual, by_chance])[: n * m].reshape(n, m, repeats + 1)
 
     def best(columns: Array) -> Array:
         energies = []

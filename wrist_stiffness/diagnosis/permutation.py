@@ -9,10 +9,6 @@ prior is no unit: how far it was strained is evidence, and by chance it is strai
 itself.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 
 from wrist_stiffness.diagnosis.observations import Array, Labels
@@ -22,49 +18,15 @@ STRETCH = 3
 """Units that move together."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rearrangements:
-    """Random rearrangements of units, and random strains of priors.
-
-    Parameters
-    ----------
-    order : (repeats, n) array of int
-        Which unit comes to each place.
-    sign : (repeats, n) array
-        With which sign.
-    strain : (repeats, p) array
-        Of each prior, in its standard deviations.
-    """
-
-    order: Labels
-    sign: Array
-    strain: Array
-
-    def residuals(self, base: Base) -> Array:
-        """Return what a base leaves of a rearrangement of what it left, (N, repeats).
-
-        Parameters
-        ----------
-        base : Base
-            Refitted to each of them.
-        """
-        repeats, n = self.order.shape
-        data = len(base.residual) - self.strain.shape[1]
-        units = base.residual[:data].reshape(n, -1)
-        moved = (units[self.order] * self.sign[:, :, None]).reshape(repeats, data)
-        rows = np.hstack([moved, self.strain]).T
-        return np.asarray(rows - base.basis @ (base.basis.T @ rows))
-
-
-def rearrangements(
+def rearranged_residuals(
     base: Base, groups: Labels, repeats: int, rng: np.random.Generator
-) -> Rearrangements:
-    """Draw rearrangements.
+) -> Array:
+    """Return what a base leaves of random rearrangements of what it left, (N, repeats).
 
     Parameters
     ----------
     base : Base
-        Whose residual is rearranged.
+        Refitted to each of them.
     groups : (n,) array
         Units of one group may change places.
     repeats : int
@@ -72,8 +34,8 @@ def rearrangements(
     rng : numpy.random.Generator
         Source of chance.
     """
-    n = len(groups)
-    order, sign = np.empty((repeats, n), dtype=np.int64), np.empty((repeats, n))
+    n, data = len(groups), len(base.residual) - base.n_priors
+    order, sign = np.empty((repeats, n), dtype=np.int64), np.empty((repeats, n, 1))
     for group in np.unique(groups):
         places = np.flatnonzero(groups == group)
         count = len(places)
@@ -82,7 +44,10 @@ def rearrangements(
         key, flip = rng.random((2, repeats, piece[-1] + 1))
         moved = np.argsort(key[:, piece], axis=1, kind="stable")
         order[:, places] = places[np.take_along_axis(rolled, moved, axis=1)]
-        sign[:, places] = np.where(
+        sign[:, places, 0] = np.where(
             np.take_along_axis(flip[:, piece], moved, axis=1) < 0.5, -1.0, 1.0
         )
-    return Rearrangements(order, sign, rng.standard_normal((repeats, base.n_priors)))
+    units = base.residual[:data].reshape(n, -1)
+    strain = rng.standard_normal((repeats, base.n_priors))
+    rows = np.hstack([(units[order] * sign).reshape(repeats, data), strain]).T
+    return np.asarray(base.beyond(rows))

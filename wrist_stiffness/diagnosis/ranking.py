@@ -7,7 +7,6 @@ import numpy as np
 from wrist_stiffness.diagnosis.estimates import possible
 from wrist_stiffness.diagnosis.hypotheses import Addition, Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array
-from wrist_stiffness.diagnosis.permutation import Rearrangements
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.structure import background, lack_of_fit
 from wrist_stiffness.diagnosis.worth import worth_along
@@ -121,7 +120,7 @@ def rank(
     return [each for each in ranked if possible(base, each.hypothesis, scale)]
 
 
-def chance_of_best(base: Base, ranked: list[Ranked], rearranged: Rearrangements) -> float:
+def chance_of_best(base: Base, ranked: list[Ranked], rearranged: Array) -> float:
     """Probability that the best of all candidates looks this good by chance (max-statistic).
 
     Parameters
@@ -130,17 +129,16 @@ def chance_of_best(base: Base, ranked: list[Ranked], rearranged: Rearrangements)
         What is refitted first.
     ranked : list of Ranked
         The catalogue against this base, the one in question first.
-    rearranged : Rearrangements
-        Of what the base leaves.
+    rearranged : (N, repeats) array
+        From `rearranged_residuals`.
     """
-    moved = rearranged.residuals(base)
-    everything = np.column_stack([base.residual, moved])
+    everything = np.column_stack([base.residual, rearranged])
     energy = np.sum(everything**2, axis=0)
     added = [addition(base, each.hypothesis) for each in ranked]
     # All columns at once: each hypothesis by itself has too few to keep the processor busy.
     parts = [[each.directions, *(each.sized or ())[:1]] for each in added]
     moments = np.hstack([columns for part in parts for columns in part]).T @ everything
-    own, by_chance = 0.0, np.full(moved.shape[1], -np.inf)
+    own, by_chance = 0.0, np.full(rearranged.shape[1], -np.inf)
     start = 0
     for number, (each, part) in enumerate(zip(added, parts, strict=True)):
         found = []

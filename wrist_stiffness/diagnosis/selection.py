@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import f
 
 from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition, refined
-from wrist_stiffness.diagnosis.permutation import rearrangements
+from wrist_stiffness.diagnosis.permutation import rearranged_residuals
 from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.ranking import Ranked, chance_of_best, rank
 from wrist_stiffness.diagnosis.settings import Settings
@@ -49,25 +49,6 @@ class Entered:
         return self.hypothesis.candidate.name
 
 
-@dataclass(frozen=True, eq=False)
-class Selection:
-    """The model after the search.
-
-    Parameters
-    ----------
-    entered : tuple of Entered
-        In the order in which they entered.
-    chance : float
-        Probability that the last rejected candidate was chance.
-    dimension : float
-        Independent chances of structure.
-    """
-
-    entered: tuple[Entered, ...]
-    chance: float
-    dimension: float
-
-
 def base_with(base: Base, effects: tuple[Entered, ...]) -> Base:
     """Return the base with effects in it."""
     if not effects:
@@ -81,8 +62,8 @@ def select(
     dimension: float,
     settings: Settings,
     rng: np.random.Generator,
-) -> Selection:
-    """Search the catalogue.
+) -> tuple[Entered, ...]:
+    """Return the effects that a search of the catalogue leaves in the model.
 
     Parameters
     ----------
@@ -98,20 +79,19 @@ def select(
         For the permutations.
     """
     entered: tuple[Entered, ...] = ()
-    chance = 1.0
     while len(entered) < settings.most_findings:
         base = base_with(evidence.base, entered)
         ranked = _contest(evidence, base, _others(hypotheses, entered), dimension)
         if not ranked:
             break
         groups = evidence.observations.exchangeable
-        rearranged = rearrangements(base, groups, settings.permutations, rng)
+        rearranged = rearranged_residuals(base, groups, settings.permutations, rng)
         chance = chance_of_best(base, ranked, rearranged)
         if chance > settings.alpha:
             break
         entered = (*entered, Entered(ranked[0].hypothesis, chance))
         entered = _swapped(evidence, hypotheses, entered, dimension)
-    return Selection(_pruned(evidence, hypotheses, entered, dimension, settings), chance, dimension)
+    return _pruned(evidence, hypotheses, entered, dimension, settings)
 
 
 def rivals_of(
