@@ -1,5 +1,6 @@
 """A sign, unit or name that a cell got wrong is told, and nothing else is taken for one."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,40 @@ def test_positions_in_millimetres_are_told(model):
     sentence = told(model, replace(points, shift=1e3 * points.shift))
     assert "with positions divided by 1000" in sentence
     assert "are they in mm?" in sentence
+
+
+@pytest.mark.parametrize("pointed", [True, False], ids=["pose", "points"])
+def test_positions_in_metres_where_millimetres_belong_are_told(model, pointed):
+    measured = session(model)
+    if not pointed:
+        measured = replace(measured, rotation=np.full((POSES, 3, 3), np.nan))
+    metres = replace(measured, shift=1e-3 * measured.shift, covariance=None)
+    sentence = told(model, metres)
+    # In micrometres it grows: the noise is a thousand times as large as well.
+    fall = re.search(r"positions times 1000 the error falls from (\S+) to (\S+) x the no", sentence)
+    assert float(fall[1]) > 2.0 * float(fall[2])
+    assert "are they in m where mm belong" in sentence
+
+
+def test_positions_in_metres_are_told_of_a_wrist_that_was_never_calibrated(model):
+    axis = Effect(find_law("axis_misalignment"), "joint_2").with_values({"tilt_u_mdeg": 100.0})
+    measured = session(model, (axis,))
+    metres = replace(measured, shift=1e-3 * measured.shift, covariance=None)
+    assert "with positions times 1000" in told(model, metres)
+
+
+def test_a_wrist_stiffer_than_its_model_is_no_mistake(model):
+    """Positions times 1000 would hide what the model says too much."""
+    soft = model.with_effects(
+        *(
+            Effect(find_law("bushing_stiffness"), joint).with_values({"flexibility_percent": 900.0})
+            for joint in ("joint_1", "joint_2", "joint_3")
+        )
+    )
+    points = replace(session(model), rotation=np.full((POSES, 3, 3), np.nan))
+    found = compare_models([("m", soft)], [points], np.random.default_rng(0))
+    assert found.over_floor(found.models[0]) > 2.0
+    assert found.mistake == ""
 
 
 def test_swapped_motors_are_told_where_no_rotation_names_them(model):

@@ -28,6 +28,10 @@ CLEAR = 0.5
 GROWN = 1.05
 """A mistake is none if s or phi without it is more than that times as large."""
 
+LARGER = 10.0
+"""A mistake is none if s or phi without it is more than that times as large in its own unit: where
+a larger unit hides the model, nothing fits better."""
+
 
 @dataclass(frozen=True)
 class Mistake:
@@ -84,6 +88,11 @@ MISTAKES = (
         lambda block: replace(block, theta=block.theta[:, ::-1]),
     ),
     Mistake("positions divided by 1000", "are they in mm? A recording has m", shift_factor=1e-3),
+    Mistake(
+        "positions times 1000",
+        "are they in m where mm belong, as in the _mm columns of a table?",
+        shift_factor=1e3,
+    ),
 )
 
 
@@ -116,10 +125,15 @@ def told_mistake(
     best = (CLEAR, "")
     for mistake in MISTAKES:
         after = _without(mistake, model, sessions, calibrated)
-        share = _share(over, _over(after, floor, mistake.shift_factor))
+        if any(after[key] > LARGER * before[key] for key in after):
+            continue
+        over_after = _over(after, floor, mistake.shift_factor)
+        share = _share(over, over_after)
         if share < best[0]:
             fall = " and ".join(
-                f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
+                f"from {_times(over[q.key])} to {_times(over_after[q.key])} the noise of {q.name}"
+                if q.key == "s_um" and mistake.shift_factor > 1.0
+                else f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
                 for q in left.reported
             )
             best = (
@@ -128,6 +142,11 @@ def told_mistake(
                 f"{mistake.check}",
             )
     return best[1]
+
+
+def _times(ratio: float) -> str:
+    """Return a ratio with three digits and no exponent."""
+    return f"{float(f'{ratio:.3g}'):g} x"
 
 
 def _over(
