@@ -6,7 +6,7 @@ import pytest
 from wrist_stiffness.diagnosis import Candidate, Observations, Parameter
 from wrist_stiffness.diagnosis.discrepancy import predicted_energy
 from wrist_stiffness.diagnosis.hypotheses import all_hypotheses, make_evidence
-from wrist_stiffness.diagnosis.nuisance import nuisance_columns
+from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.resampling import BlockGrams
 from wrist_stiffness.diagnosis.whitening import NoiseModel
 
@@ -23,7 +23,8 @@ def explained(columns, values):
 def setting(rng):
     table = Observations(rng.normal(size=(UNITS, COMPONENTS)), {}, None, np.arange(UNITS * 1.0))
     noise = NoiseModel(np.eye(COMPONENTS), 0.3, 4.0, np.inf, "given")
-    evidence = make_evidence(table, noise, nuisance_columns(table, ()))
+    level = Nuisance("level", lambda units: np.ones((UNITS, COMPONENTS, 1)), (0.1,))
+    evidence = make_evidence(table, noise, nuisance_columns(table, (level,)))
 
     def candidate(name, size):
         columns = rng.normal(size=(UNITS, COMPONENTS, size))
@@ -39,8 +40,9 @@ def test_blocks_count_as_often_as_they_are_drawn(setting):
     base = evidence.base.extended(first.columns)
     blocks = np.arange(UNITS) // 10
     drawn = np.array([2.0, 0.0, 1.0, 1.0])
-    grams = BlockGrams(evidence, base, rest, blocks)
-    rows = np.sqrt(drawn[blocks[evidence.unit_of_row]])
+    grams = BlockGrams(base, rest, blocks)
+    # A prior counts once, whatever is drawn.
+    rows = np.sqrt(np.append(drawn[np.repeat(blocks, COMPONENTS)], 1.0))
     # The resample knows what the base left of all units, and refits the base to it.
     values, own = rows * base.residual, rows[:, None] * base.basis
     wanted = [

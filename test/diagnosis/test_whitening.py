@@ -55,6 +55,14 @@ def test_coupled_components_become_independent(rng):
     np.testing.assert_allclose(np.cov(white.T), np.eye(3), atol=0.04)
 
 
+def test_numbers_of_the_variance_of_a_model_come_out_with_unit_scatter(rng):
+    table = Observations(np.zeros((30, 2)), {}, rng.uniform(1, 9, (30, 1, 1)) * np.eye(2))
+    noise = NoiseModel(np.diag([2.0, 3.0]), 0.0, 1.0, np.inf, "given", scale=4.0)
+    sizes = np.sqrt(noise.variance(table))
+    white = noise.whiten(table, sizes[:, :, None])
+    assert white == pytest.approx(1.0)
+
+
 def test_unmeasured_components_are_left_out_of_the_coupling():
     covariance = np.array([[[4.0, 1.0], [1.0, 9.0]]])
     factor = component_factors(covariance, np.array([[True, False]]))

@@ -258,9 +258,8 @@ def _unexplained(
 
 
 def _floor(evidence: Evidence) -> dict[str, float]:
-    inverse = np.linalg.inv(evidence.noise.factors(evidence.observations))
     measured = evidence.observations.measured
-    variance = np.einsum("nij,nij->ni", inverse, inverse)
+    variance = evidence.noise.variance(evidence.observations)
     variance = np.sum(variance * measured, axis=0) / np.maximum(measured.sum(axis=0), 1)
     return {
         q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si

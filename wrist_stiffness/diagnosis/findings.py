@@ -127,7 +127,7 @@ def _stability(
     for each in ranked:
         first.setdefault(each.name, each)
     best = list(first.values())
-    grams = BlockGrams(model.evidence, others, [each.hypothesis for each in best], model.blocks)
+    grams = BlockGrams(others, [each.hypothesis for each in best], model.blocks)
     inside = np.array([name in members for name in first])
     return stability(grams, inside, np.array([each.price for each in best]), rng)
 

@@ -71,14 +71,6 @@ class Evidence:
         columns = candidate.evaluate(self.observations, shape)
         return Hypothesis(candidate, shape, self.whiten(columns))
 
-    @property
-    def unit_of_row(self) -> Array:
-        """Unit of each row, (N,); -1 for the priors."""
-        n, m = self.observations.values.shape
-        unit = np.full(self.base.residual.size, -1)
-        unit[: n * m] = np.repeat(np.arange(n), m)
-        return unit
-
 
 class Addition:
     """What a hypothesis adds to a base, worked out when first asked for.

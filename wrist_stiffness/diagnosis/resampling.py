@@ -6,7 +6,7 @@ again costs nothing in the number of units.
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition
+from wrist_stiffness.diagnosis.hypotheses import Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array, Labels, Mask
 from wrist_stiffness.diagnosis.projection import Base
 
@@ -33,8 +33,6 @@ class BlockGrams:
 
     Parameters
     ----------
-    evidence : Evidence
-        Table and noise.
     base : Base
         What is refitted in every resample.
     hypotheses : list of Hypothesis
@@ -43,22 +41,16 @@ class BlockGrams:
         Block of each unit.
     """
 
-    def __init__(
-        self, evidence: Evidence, base: Base, hypotheses: list[Hypothesis], blocks: Labels
-    ) -> None:
+    def __init__(self, base: Base, hypotheses: list[Hypothesis], blocks: Labels) -> None:
         beyond = [addition(base, each).beyond for each in hypotheses]
         stacked = np.hstack([base.basis, *beyond, base.residual[:, None]])
         norm = np.linalg.norm(stacked, axis=0)
         stacked = stacked / np.where(norm > 0, norm, 1.0)
-        unit = evidence.unit_of_row
-        self._grams = np.array(
-            [
-                stacked[np.isin(unit, np.flatnonzero(blocks == block))].T
-                @ stacked[np.isin(unit, np.flatnonzero(blocks == block))]
-                for block in np.unique(blocks)
-            ]
-        )
-        self._priors = stacked[unit < 0].T @ stacked[unit < 0]
+        data = len(stacked) - base.n_priors
+        block = np.repeat(blocks, data // len(blocks))
+        own = [stacked[:data][block == each] for each in np.unique(blocks)]
+        self._grams = np.array([rows.T @ rows for rows in own])
+        self._priors = stacked[data:].T @ stacked[data:]
         sizes = [each.shape[1] for each in beyond]
         starts = np.cumsum([0, *sizes])[:-1]
         self._members = [slice(a, a + k) for a, k in zip(starts, sizes, strict=True)]

@@ -46,10 +46,10 @@ class NoiseModel:
     all_wanders: bool = True
     scale: float = 1.0
 
-    def factors(self, observations: Observations) -> Array:
-        """Inverse factors that bring each unit by itself to unit scatter, (n, m, m)."""
+    def variance(self, observations: Observations) -> Array:
+        """Variance of each component of each unit by itself, (n, m)."""
         covariance = self.scale * (stated_covariance(observations) + self.beyond)
-        return component_factors(covariance, observations.measured)
+        return np.diagonal(covariance, axis1=1, axis2=2)
 
     def wandering(self, observations: Observations) -> Array:
         """Part of each variance that wanders slowly, (n, m)."""
