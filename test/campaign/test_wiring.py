@@ -77,7 +77,7 @@ def test_positions_in_metres_where_millimetres_belong_are_told(model, pointed):
     metres = replace(measured, shift=1e-3 * measured.shift, covariance=None)
     sentence = told(model, metres)
     # In micrometres it grows: the noise is a thousand times as large as well.
-    fall = re.search(r"positions times 1000 the error falls from (\S+) to (\S+) x the no", sentence)
+    fall = re.search(r"positions times 1000 the error falls from (\S+) x to (\S+) x", sentence)
     assert float(fall[1]) > 2.0 * float(fall[2])
     assert "are they in m where mm belong" in sentence
 
