@@ -267,10 +267,39 @@ def test_a_result_replaces_no_recording_and_no_model(option, refused, tmp_path):
         assert path.read_bytes() == content
 
 
-def test_an_earlier_result_is_replaced(tmp_path):
+def test_an_earlier_result_is_replaced_and_said_to_be_written(tmp_path, capsys):
     path = tmp_path / "pose.json"
     for _ in range(2):
         assert main(["predict", "--angles", "0", "0", "--json", str(path)]) == 0
+        assert capsys.readouterr().out.splitlines()[-1] == f"written: {path}"
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["compare", "monday", "--report", "x", "--json", "./x"], "--report and --json"),
+        (["diagnose", "monday", "--report", "x", "--json", "x"], "--report and --json"),
+        (["calibrate", "--fit", "monday", "-o", "x", "--json", "x"], "--output and --json"),
+        (["simulate", "-o", "x", "--json", "x"], "--output and --json"),
+        (
+            ["plan", "--diagnosis", "x", "--loads", "l", "-o", "p", "--json", "x"],
+            "--diagnosis and --json",
+        ),
+    ],
+)
+def test_two_results_in_one_file_are_refused_before_the_work(
+    options, named, refused, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert f"{named} name the same file" in refused(*options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_device_takes_two_results(refused, capsys):
+    both = ["--report", os.devnull, "--json", os.devnull]
+    assert "none.mcap does not exist" in refused("compare", "none.mcap", *both)
+    assert main(["predict", "--angles", "0", "0", "--json", os.devnull]) == 0
+    assert "written" not in capsys.readouterr().out
 
 
 def test_a_size_without_an_effect_to_have_it_is_refused(refused):

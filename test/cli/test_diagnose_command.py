@@ -18,6 +18,7 @@ def test_the_verdict_comes_first_and_the_file_says_the_same(capsys, tmp_path):
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "Missing in the model: backlash@motor_2."
     assert any("measurement_frame@pose_sensor" in line for line in lines)
+    assert lines[-2:] == [f"written: {page}", f"written: {result}"]
     values = json.loads(result.read_text())
     assert values["schema"] == 1
     assert values["verdict"] == "effect"

@@ -34,8 +34,8 @@ def test_summary_is_told_to_people_and_programs(recording, capsys):
     assert main(["replay", recording, "-o", "out", "--json", "out.json"]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "8 predictions for 10 joint states, 10 of 10 commands corrected"
-    assert shown[-2].startswith("2 refused, the first: /joint_states: motor angles (170.000,")
-    assert shown[-1] == "written: out"
+    assert shown[-3].startswith("2 refused, the first: /joint_states: motor angles (170.000,")
+    assert shown[-2:] == ["written: out", "written: out.json"]
     with open("out.json", encoding="utf-8") as file:
         told = json.load(file)
     (reason,) = told.pop("refused")

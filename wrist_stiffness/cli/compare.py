@@ -87,7 +87,6 @@ def _run(arguments: argparse.Namespace) -> int:
         from wrist_stiffness.workflows.report.page import write_page
 
         write_page(arguments.report, report_of_comparison(found))
-        print(f"\nwritten: {arguments.report}")
     if arguments.json:
         write_json(arguments.json, values)
     return 0

@@ -63,7 +63,6 @@ def _run(arguments: argparse.Namespace) -> int:
         from wrist_stiffness.workflows.report.page import write_page
 
         write_page(arguments.report, found.report())
-        print(f"\nwritten: {arguments.report}")
     if arguments.json:
         write_json(arguments.json, found.as_values())
     return 0

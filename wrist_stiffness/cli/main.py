@@ -62,6 +62,9 @@ EXTRA_OF = {
 RESULTS = {"report": b"<", "json": b"{["}
 """Options that name a file to write a result to, and how such a file begins."""
 
+PLACES = ("output", "record", "diagnosis", *RESULTS)
+"""Options that name what is written, or a result that is read: each needs a place of its own."""
+
 
 class CommandModule(Protocol):
     """What a module of this folder offers to become a command.
@@ -142,8 +145,13 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     try:
         for option, begins in RESULTS.items():
             _require_place(getattr(arguments, option, None), option, begins)
+        _require_places_apart(arguments)
         with cleaned_up_on_sigterm():
             code: int = arguments.run(arguments)
+        for option in RESULTS:
+            path = getattr(arguments, option, None)
+            if path is not None and Path(path).is_file():  # A pipe has its reader.
+                print(f"written: {path}")
         if sys.stdout is not None:  # None where the caller closed it
             sys.stdout.flush()
     except WristError as error:
@@ -187,6 +195,20 @@ def _require_place(path: str | None, option: str, begins: bytes) -> None:
             raise InputError(f"{path}: cannot be replaced: {error.strerror}") from error
         if first and first not in begins:
             raise InputError(f"{path} is no earlier result of --{option}: it is not replaced")
+
+
+def _require_places_apart(arguments: argparse.Namespace) -> None:
+    """Refuse two results in one file, of which the last one written would be left."""
+    named: dict[Path, str] = {}
+    for option in PLACES:
+        path = getattr(arguments, option, None)
+        if path is None or (Path(path).exists() and not Path(path).is_file()):
+            continue  # A device takes everything.
+        other = named.setdefault(Path(path).resolve(), option)
+        if other != option:
+            raise InputError(
+                f"{path}: --{other} and --{option} name the same file; give each its own"
+            )
 
 
 def _refuse(reason: str) -> int:
