@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.noise import MOST_BEYOND_STATED, estimate_noise
+from wrist_stiffness.diagnosis.noise import (
+    MOST_BEYOND_STATED,
+    estimate_noise,
+    replicate_variance,
+    share_inside_groups,
+)
 
 NOTHING = (60, 2, 0)
 
@@ -138,3 +143,56 @@ def test_replicates_close_in_time_are_corrected_for_the_wander_they_share(rng, s
         ratios.append(total_variance(noise, table)[0])
     # Without the correction neighbours show 0.42 of the variance.
     assert np.median(ratios) == pytest.approx(1.0, abs=0.25)
+
+
+def test_of_a_wander_beside_what_is_stated_all_is_found_however_soon_replicates_follow():
+    """Rows that repeat are long means: they state little, and differ by a part of the wander."""
+    n, found = 240, []
+    label = np.where(np.arange(n) % 4 < 2, np.arange(n) // 4, -1)
+    stated = np.where(label >= 0, 0.02, 2.0)[:, None]
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        values = wander(rng, n, 4)[:, None] + rng.normal(0, np.sqrt(stated))
+        table = Observations(values, {}, stated[:, :, None], replicate=label)
+        noise = estimate_noise(table, np.ones((n, 1, 1)), np.empty((n, 1, 0)))
+        if not noise.all_wanders:
+            found.append(noise.beyond[0, 0])
+    assert len(found) > 4
+    # Without the correction neighbours show 0.22 of the variance.
+    assert np.median(found) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_floor_from_few_replicates_weighs_as_much_as_the_true_one_on_average():
+    weights = []
+    for seed in range(40):
+        values = np.random.default_rng(seed).normal(size=(24, 6))
+        table = Observations(values, {}, replicate=np.repeat(np.arange(12), 2))
+        noise = estimate_noise(table, np.empty((24, 6, 0)), np.empty((24, 6, 0)))
+        assert (noise.source, noise.dof) == ("replicates", 72)
+        weights.append(1 / noise.variance(table)[0])
+    # 12 degrees of freedom: 1/s^2 scatters by a half; uncorrected it is 1.2.
+    assert np.mean(weights) == pytest.approx(1.0, abs=3 * 0.5 / np.sqrt(240))
+
+
+def two_sessions(rng):
+    """The same labels at the same times in two sessions, the second far off."""
+    label, session = np.tile(np.repeat(np.arange(10), 3), 2), np.repeat([0, 1], 30)
+    values = rng.normal(size=(60, 1)) + 1e3 * session[:, None]
+    return Observations(
+        values, {}, time_s=np.tile(np.arange(30.0), 2), session=session, replicate=label
+    )
+
+
+def test_replicates_of_two_sessions_are_not_compared(rng):
+    table = two_sessions(rng)
+    variance, freedom = replicate_variance(table.values, np.empty((60, 1, 0)), table)
+    assert freedom == 40
+    # 40 degrees of freedom: the variance is known to 22 %.
+    assert variance == pytest.approx(1.0, abs=0.66)
+
+
+def test_the_share_inside_groups_is_that_of_each_session(rng):
+    table = two_sessions(rng)
+    alone = share_inside_groups(table.take(table.sessions == 0), 0.8, 4.0)
+    assert alone < 0.5
+    assert share_inside_groups(table, 0.8, 4.0) == pytest.approx(alone)

@@ -67,3 +67,36 @@ def test_unmeasured_components_are_left_out_of_the_coupling():
     covariance = np.array([[[4.0, 1.0], [1.0, 9.0]]])
     factor = component_factors(covariance, np.array([[True, False]]))
     np.testing.assert_allclose(factor[0], [[0.5, 0], [0, 1]])
+
+
+@pytest.fixture
+def two_sessions(rng):
+    """Units that state different scatter each, in two sessions."""
+    stated = rng.uniform(0.1, 4.0, (12, 1, 1))
+    times, sessions = np.cumsum(rng.uniform(0.2, 3, 12)), np.repeat([0, 1], [7, 5])
+    return Observations(rng.normal(size=(12, 1)), {}, stated, times, sessions)
+
+
+@pytest.mark.parametrize("all_wanders", [True, False])
+def test_whitening_is_the_inverse_cholesky_factor_of_what_wanders_and_what_does_not(
+    two_sessions, all_wanders
+):
+    noise = NoiseModel(np.array([[1.5]]), 0.6, TIME, np.inf, "given", all_wanders)
+    stated = two_sessions.covariance[:, 0]
+    slow = 0.6 * (stated + 1.5 if all_wanders else np.full((12, 1), 1.5))
+    size = np.sqrt(stated + 1.5)
+    covariance = size * size.T
+    covariance *= covariance_in_time(two_sessions.times, two_sessions.sessions, slow / size**2)
+    white = noise.whiten(two_sessions, two_sessions.values[:, :, None])
+    expected = np.linalg.solve(np.linalg.cholesky(covariance), two_sessions.values)
+    np.testing.assert_allclose(white, expected, atol=1e-12)
+
+
+def test_features_are_filtered_in_time_like_the_residual(rng, two_sessions):
+    noise = NoiseModel(np.array([[1.5]]), 0.6, TIME, np.inf, "given")
+    features, shares = rng.normal(size=(12, 3)), np.full((12, 1), 0.6)
+    factor = np.linalg.cholesky(
+        covariance_in_time(two_sessions.times, two_sessions.sessions, shares)
+    )
+    expected = np.linalg.solve(factor, features)
+    np.testing.assert_allclose(noise.filtered(two_sessions, features), expected, atol=1e-12)
