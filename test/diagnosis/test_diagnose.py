@@ -271,6 +271,20 @@ def test_a_crowd_of_lookalikes_names_nothing(rng):
     assert len(named.names) == 3
 
 
+def test_what_fails_without_the_doubted_effect_beside_it_is_told(rng):
+    """Fitted alone, the slope over z stands for x, which goes with z in the first session only."""
+    session, z = np.repeat([0, 1], [100, 40]), rng.uniform(-1, 1, 140)
+    x = np.where(session == 0, z + rng.uniform(-0.3, 0.3, 140), 0.0)
+    values = rng.normal(size=(140, 2)) + (12 * x - 6 * z)[:, None]
+    table = Observations(values, {"x": x, "z": z}, session=session)
+    twins = tuple(replace(line("x"), effect=f"line_{number}") for number in range(4))
+    few = Settings(most_members=3)
+    found = diagnose(table, (line("z"), *twins), (offset(),), rng, few)
+    assert (found.verdict, found.findings) == ("unknown", ())
+    assert "3 others explain it about as well as line_" in found.unexplained.evidence
+    assert "line@z fitted here makes the sealed part worse" in found.unexplained.evidence
+
+
 def test_what_resamples_do_not_choose_again_is_not_named(rng):
     table = plain(rng)
     table = table.with_values(table.values + np.outer(table.covariate("x"), [1, 1]))

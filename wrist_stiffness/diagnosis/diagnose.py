@@ -94,7 +94,9 @@ def diagnose(
     while doubt := _first_doubt(findings, settings):
         which, sentence = doubt
         doubts.append(sentence)
-        kept, stages, _ = _opened(evidence, kept[:which] + kept[which + 1 :], sealed, nuisances)
+        rest = kept[:which] + kept[which + 1 :]
+        kept, stages, more = _opened(evidence, rest, sealed, nuisances)
+        broken += more
         model = replace(model, effects=kept, stages=tuple(stages))
         findings = tuple(describe(model, which, rng) for which in range(len(kept)))
     base = base_with(evidence.base, kept)

@@ -1,4 +1,7 @@
-"""The sealed part: put aside before looking, opened once, after the last decision.
+"""The sealed part: put aside before looking, opened when the search is over.
+
+It names nothing and only takes away.  Whenever an effect goes, those that are left are judged by it
+again, for they are fitted anew.
 
 Held out means another session where there is one: inside a session a badly excited parameter
 improves every cross-validation and fails the day after.
