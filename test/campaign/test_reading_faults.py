@@ -38,6 +38,33 @@ def test_an_absent_topic_is_named_with_those_that_are_there(
         assert topic in str(caught.value)
 
 
+def flipped(whole):
+    """Every chunk damaged; the summary still names the topics."""
+    data = bytearray(whole)
+    data[len(data) // 3] ^= 0x10
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("damaged", "reason"),
+    [
+        (lambda whole: whole[:2000], r"damaged or cut within .*; 0 messages stand before that"),
+        (flipped, "does not match its checksum"),
+    ],
+    ids=["cut", "flipped"],
+)
+def test_where_damage_took_a_topic_nobody_is_told_to_rename_it(
+    tmp_path, complete, table, damaged, reason
+):
+    complete.entries = complete.entries[:300]
+    path = complete.written(tmp_path / "day.mcap")
+    path.write_bytes(damaged(path.read_bytes()))
+    with pytest.raises(RecordingError, match=reason) as caught:
+        read_session(path, table)
+    assert "nothing on /joint_states can be read: " in str(caught.value)
+    assert "--topic" not in str(caught.value)
+
+
 def test_another_clock_is_found_taken_out_and_reported(tmp_path, campaign, table):
     campaign.with_joints().with_loads().with_poses(late_ns=1_730_000_000)
     session = read_session(campaign.written(tmp_path / "bag"), table)

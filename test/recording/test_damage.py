@@ -63,6 +63,17 @@ def test_a_cut_file_gives_a_prefix_and_says_so(tmp_path, small):
     assert len(found_lengths) > 10
 
 
+def test_of_a_recording_cut_in_half_about_half_is_there(tmp_path, timeline, written):
+    """Three minutes of a slow sensor: 30 joint states a second."""
+    entries = list(timeline(5400))
+    path = written(tmp_path / "cut.mcap", entries)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    found = list(open_recording(path).messages())
+    assert found == entries[: len(found)]
+    assert 0.3 * len(entries) < len(found) < 0.6 * len(entries)
+
+
 @pytest.mark.parametrize("channels_first", [True, False], ids=["before chunks", "in chunks"])
 def test_a_cut_between_the_indexes_of_a_chunk_loses_no_topic(
     tmp_path, channels_first, timeline, written

@@ -139,6 +139,14 @@ def test_truncated_recording_gives_what_is_there(tmp_path):
     assert np.array_equal(part, whole[: len(part)])
 
 
+def test_recording_whose_only_chunk_is_damaged_says_so(tmp_path):
+    content = bytearray(write(tmp_path / "in.mcap", TIMELINE[:40]).read_bytes())
+    content[200] ^= 0x10
+    (tmp_path / "in.mcap").write_bytes(content)
+    with pytest.raises(RecordingError, match="the first reason: .*does not match its checksum"):
+        replay(tmp_path / "in.mcap", MODEL, tmp_path / "out.mcap")
+
+
 def test_recording_cut_in_its_first_chunk_says_so(tmp_path):
     source = write(tmp_path / "in.mcap", TIMELINE)
     (tmp_path / "cut.mcap").write_bytes(source.read_bytes()[:300])

@@ -208,7 +208,7 @@ def replay(
             except WristError as error:
                 summary.refuse(topic, error)
         if not summary.predictions:
-            reason = next(iter(summary.refused), "there is none")
+            reason = next(iter(summary.refused), source.damage or "there is none")
             raise RecordingError(
                 f"{source.path}: none of {summary.joint_states} joint states could be predicted; "
                 f"the first reason: {reason}"

@@ -235,21 +235,30 @@ def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
 
 
 def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, str]) -> None:
-    """Refuse a recording that lacks angles, loads or measured poses, and name what is there."""
-    present = ", ".join(topic.name for topic in recording.topics) or "none"
+    """Refuse a recording that lacks angles, loads or measured poses, and say why."""
+    there = [topic.name for topic in recording.topics if topic.count]
     needed = {
-        JOINT_STATES: len(samples.joints.time_ns),
-        LOAD_ESTIMATE: len(samples.loads.time_ns),
-        f"{PLATFORM_POSE} or {PLATFORM_MARKERS}": len(samples.poses.time_ns)
+        (JOINT_STATES,): len(samples.joints.time_ns),
+        (LOAD_ESTIMATE,): len(samples.loads.time_ns),
+        (PLATFORM_POSE, PLATFORM_MARKERS): len(samples.poses.time_ns)
         + len(samples.markers.time_ns),
     }
-    for topic, count in needed.items():
-        if count == 0:
-            damage = f"; {recording.damage}" if recording.damage else ""
+    for topics, count in needed.items():
+        if count:
+            continue
+        wanted = [remaps.get(topic, topic) for topic in topics]
+        names = " or ".join(wanted)
+        # A topic that was recorded and cannot be read has no other name.
+        if recording.damage and (not there or not set(wanted).isdisjoint(there)):
             raise RecordingError(
-                f"{recording.path}: nothing on {remaps.get(topic, topic)} (topics that are there: "
-                f"{present}){damage}; name another with --topic STANDARD:=ACTUAL"
+                f"{recording.path}: nothing on {names} can be read: {recording.damage}; copy the "
+                "recording again, or record anew"
             )
+        damage = f"; {recording.damage}" if recording.damage else ""
+        raise RecordingError(
+            f"{recording.path}: nothing on {names} (topics that are there: "
+            f"{', '.join(there) or 'none'}){damage}; name another with --topic STANDARD:=ACTUAL"
+        )
 
 
 def _require_overlap(angles_ns: Stamps, poses_ns: Stamps) -> None:
