@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wrist_stiffness.campaign.fitting.result import FAR
 from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
 from wrist_stiffness.campaign.searching.candidates import SHARE
@@ -24,9 +25,6 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
-
-FAR_BEYOND = 30.0
-"""Usual sizes of a parameter that are far beyond the usual: is it this effect, in this unit?"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +177,7 @@ def sized(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
         by_size = {p.key: _usual_sizes(effect, p) for p in effect.parameters}
         key = max(by_size, key=lambda each: by_size[each])
         sentence = finding.evidence
-        if by_size[key] > FAR_BEYOND:
+        if by_size[key] > FAR:
             value = effect.estimates[key].value
             sentence += f"; far beyond its usual size: {key} = {value:.3g}"
         told.append(replace(finding, evidence=sentence))

@@ -1,0 +1,44 @@
+"""One limit says what is far beyond the usual, whether a fault is named or added."""
+
+import pytest
+
+from wrist_stiffness.campaign.fitting.result import Fitted
+from wrist_stiffness.campaign.searching.refit import sized
+from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.registry import find_law
+
+USUAL, KEY = 500.0, "compliance_mdeg_per_Nm"
+
+
+def named(value):
+    """Return what a diagnosis says of a compliance of that value [mdeg/(N m)]."""
+    finding = Finding(
+        (("drive_compliance", "motor_1"),),
+        {KEY: (value, 10.0)},
+        0.9,
+        50.0,
+        1e-3,
+        1.0,
+        {"s_um": (2.0, 0.1)},
+        "yes",
+        "",
+        "",
+    )
+    error = {"s_um": 1.0}
+    rest = Unexplained((), 0.02, "")
+    answer = Diagnosis("effect", "dwell", error, error, error, (), (finding,), rest, (), 0, "one")
+    effect = Effect(find_law("drive_compliance"), "motor_1").with_values({KEY: value})
+    return sized(answer, [effect]).findings[0].evidence
+
+
+def added(value):
+    """Return whether `extend` warns of it."""
+    name = "drive_compliance@motor_1"
+    return Fitted(name, KEY, None, value, 10.0, 0.0, USUAL, USUAL, False, ()).far
+
+
+@pytest.mark.parametrize("sizes", [2.9, 3.1, 3.9, 29.0, 31.0])
+def test_what_is_named_is_far_beyond_the_usual_where_what_is_added_is(sizes):
+    told = "far beyond its usual size: compliance_mdeg_per_Nm" in named(sizes * USUAL)
+    assert told == added(sizes * USUAL) == (sizes > 3.0)
