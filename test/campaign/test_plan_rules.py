@@ -222,8 +222,10 @@ def test_exact_twins_get_no_plan_but_a_clear_answer(model):
 
 
 def test_too_short_a_time_and_loads_out_of_range_are_refused(model):
+    begun = []
     with pytest.raises(InputError, match=r"plan: 2 minutes are less than the \d.\d that warm-up"):
-        plan(model, rivals(), conditions(model, minutes=2.0))
+        plan(model, rivals(), conditions(model, minutes=2.0), progress=lambda *_: begun.append(1))
+    assert not begun, "the laws were evaluated before"
     far = Weight("far", 0.1, np.array([0.2, 0.2, 0.0]), 1.0)
     with pytest.raises(LoadRangeError, match="load far: beyond the table's range of 5 N and 0.1"):
         plan(model, rivals(), conditions(model, sources=(far,)))

@@ -180,6 +180,13 @@ def plan(
         settings += [moved_outward(setting, workspace) for setting in settings]
     order = rng.permutation(2 * len(settings))
     pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
+    seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
+    least_s = pool.arranged([], rng).duration_s
+    if least_s > seconds:
+        raise InputError(
+            f"plan: {seconds / 60.0:g} minutes are less than the {least_s / 60.0:.1f} that "
+            "warm-up, reference poses and two long holds take"
+        )
     agree = bool(earlier and question.alike)
     stage = _Stages(progress, 2 + len(earlier) + agree)
     if agree:
@@ -220,13 +227,6 @@ def plan(
         each = zip(aimed, by_truth(gram, layout, aimed), strict=True)
         return all(np.mean(d >= needed(goal)) >= LIKELY for goal, d in each)
 
-    seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
-    least_s = pool.arranged([], rng).duration_s
-    if least_s > seconds:
-        raise InputError(
-            f"plan: {seconds / 60.0:g} minutes are less than the {least_s / 60.0:.1f} that "
-            "warm-up, reference poses and two long holds take"
-        )
     chosen = choose(
         pool.by_unit(grams),
         pool.cost_s,
