@@ -200,6 +200,25 @@ def test_friction_is_a_closed_loop_that_vanishes_with_its_coefficient(free_model
     assert np.abs(make.added(free_model, smooth, block)).max() < 1e-6 * size
 
 
+@pytest.mark.parametrize("joint", PASSIVE_JOINTS)
+def test_a_bristle_gives_way_by_a_distance_and_by_so_much_a_newton(free_model, make, joint):
+    """Under half the budget the first one is half as soft, the second one as soft as before."""
+    theta = np.radians([20.0, -10.0]) + np.array([[0.0, 0.0], [1e-7, 1e-7]])
+    block = Block(np.arange(2.0), theta, np.zeros((2, 6)))
+
+    def moved(**values):
+        # Nothing slips: so tiny a move bends the bristle alone.
+        rubbing = make.effect(f"joint_friction@{joint}", coefficient=1.0, **values)
+        return np.abs(make.added(free_model, rubbing, block)).max()
+
+    by_distance = [moved(preload_N=p, presliding_um=200.0) for p in (100.0, 50.0)]
+    by_newton = [
+        moved(preload_N=p, presliding_um=0.01, bristle_um_per_N=1000.0) for p in (100.0, 50.0)
+    ]
+    assert by_distance[1] == pytest.approx(0.5 * by_distance[0], rel=0.1)
+    assert by_newton[1] == pytest.approx(by_newton[0], rel=0.01)
+
+
 def test_slide_locks_when_the_load_comes_at_rest(free_model, make):
     """A stiff bristle with a large budget holds the slide that a load at rest would make."""
     joint, number = "joint_3", 1

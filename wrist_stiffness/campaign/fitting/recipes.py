@@ -279,8 +279,8 @@ SPECIAL: dict[str, Maker] = {
     ),
     "joint_friction": shares(
         "coefficient",
-        {"coefficient": (0.03, 0.15, 0.6), "presliding_um": (1.0, 8.0)},
-        {"preload_N": 0.0},
+        {"coefficient": (0.03, 0.15, 0.6), "bristle_um_per_N": (0.0, 30.0)},
+        {"preload_N": 0.0, "presliding_um": 3.0},
     ),
 }
 

@@ -22,8 +22,10 @@ LEAST_BUDGET = 1e-9
 class JointFriction(Law):
     """One Coulomb budget shared by turn and slide, with pre-sliding.
 
-    The pin's surface moves along (radius times turn, slide).  It is held by a bristle that bends by
-    the pre-sliding distance before it slips, in series with the limb's own flexibility; the force
+    The pin's surface moves along (radius times turn, slide).  It is held by a bristle before it
+    slips, in series with the limb's own flexibility.  The bristle bends by a distance, as rough
+    surfaces do whose contacts grow with the load (Greenwood and Williamson), and by so much a
+    newton, as a lining does and the bristles of Dahl and LuGre of one stiffness; the force
     never exceeds coefficient times (pressing forces + preload).  While the joint turns the budget
     is spent there and the slide is free; at rest it locks.
     """
@@ -36,11 +38,12 @@ class JointFriction(Law):
     excited_by = "approaches from both sides, and loads applied at rest against carried through"
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return coefficient, preload and pre-sliding distance."""
+        """Return coefficient, preload, pre-sliding distance and flexibility of the bristle."""
         return (
             Parameter("coefficient", 0.0, 2.0, 0.1, linear=False),
             Parameter("preload_N", 0.0, 100.0, 1.0, linear=False),
             Parameter("presliding_um", 0.01, 200.0, 5.0, mean=5.0, linear=False),
+            Parameter("bristle_um_per_N", 0.0, 1000.0, 10.0, linear=False),
         )
 
     def advance(
@@ -51,7 +54,7 @@ class JointFriction(Law):
         radius = 0.5 * geometry.bushings[place].pin_diameter
         pressed = pressing(geometry, place, at.at_home(place, at.through_place(place)))
         budget = values["coefficient"] * (pressed + values["preload_N"]) + LEAST_BUDGET
-        bristle = values["presliding_um"] / budget
+        bristle = values["presliding_um"] / budget + values["bristle_um_per_N"]
         slide, turn = at.slide_flexibility(place)
         moved = np.stack(
             [radius * at.turn(place), at.slides[:, PASSIVE_JOINTS.index(place)]], axis=1
