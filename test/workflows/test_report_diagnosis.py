@@ -1,5 +1,6 @@
 """The page of a diagnosis made by hand: everything of the result is on it, in words."""
 
+import re
 from dataclasses import replace
 from html import unescape
 
@@ -87,6 +88,7 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         assert words in page, words
     # The fall, and the residual against its condition.
     assert page.count("data:image/svg+xml") == 2
+    assert re.search(r"evidence \(2 ln Bayes factor\)\W+td\W+td\W+123", page)
 
 
 def test_nothing_missing_is_said_first(observations):

@@ -19,7 +19,10 @@ class Finding:
     heldout_rmse_ratio : float
         Whitened residual on sealed units with the effect over without it.
     delta_bic : float
-        Information criterion without the effect minus with it: positive speaks for the effect.
+        Evidence for the effect, above zero if it speaks for it: twice the logarithm of the Bayes
+        factor, with the width of the prior that suits it best, against noise and the structure
+        that is left.  Where a parameter has no usual size, the Bayesian information criterion
+        stands for that.
     p_value : float
         Chance that the best of all candidates looks as good without any effect.
     stability : float

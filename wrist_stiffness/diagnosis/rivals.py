@@ -6,7 +6,7 @@ from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.structure import background
 
 DECISIVE = 6.0
-"""Difference of the Bayesian information criterion that counts as strong (Kass, Raftery 1995)."""
+"""Twice the logarithm of a Bayes factor that counts as strong (Kass, Raftery 1995)."""
 
 MISFIT_RATIO = 2.0
 """A rival may leave this much more structure than the best one, if both laws are inexact."""

@@ -196,7 +196,7 @@ def _finding_lines(place: int, finding: Finding) -> list[str]:
     out.append(f"   brings {bought}; {correction_of(finding)}")
     out.append(
         f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
-        f"BIC falls by {finding.delta_bic:.3g}"
+        f"evidence (2 ln Bayes factor) {finding.delta_bic:.3g}"
     )
     return out
 

@@ -181,7 +181,7 @@ def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
             )
     rows += [
         ("residual with it over without it", number(finding.heldout_rmse_ratio)),
-        ("information criterion (BIC) falls by", number(finding.delta_bic)),
+        ("evidence (2 ln Bayes factor)", number(finding.delta_bic)),
         ("p", f"{finding.p_value:.2g}"),
         ("stability", f"{100.0 * finding.stability:.0f} %"),
         ("correction", correction_of(finding)),
