@@ -46,7 +46,7 @@ def best_by_chance(seed, strain=None):
         tolerances[0] = strain
     values = rng.normal(size=UNITS) + columns[:, :PRIORS] @ tolerances
     prior_std = np.append(np.ones(PRIORS), np.full(3, np.inf))
-    base = make_base(columns, prior_std, values, UNITS)
+    base = make_base(np.column_stack([columns, values]), prior_std, UNITS)
     hypotheses = [
         Hypothesis(
             Candidate(

@@ -6,7 +6,7 @@ from wrist_stiffness.diagnosis.projection import leading_directions, make_base, 
 
 def test_a_prior_row_shrinks_like_bayes(rng):
     column, values, prior = rng.normal(size=(20, 1)), rng.normal(size=20), 0.3
-    base = make_base(column, np.array([prior]), values, 20)
+    base = make_base(np.column_stack([column, values]), np.array([prior]), 20)
     precision = column[:, 0] @ column[:, 0] + prior**-2
     mean = column[:, 0] @ values / precision
     np.testing.assert_allclose(base.residual[:20], values - column[:, 0] * mean)
@@ -18,7 +18,7 @@ def test_a_prior_row_shrinks_like_bayes(rng):
 
 def test_a_column_inside_the_base_adds_nothing(rng):
     columns = rng.normal(size=(30, 3))
-    base = make_base(columns, np.full(3, np.inf), rng.normal(size=30), 30)
+    base = make_base(np.column_stack([columns, rng.normal(size=30)]), np.full(3, np.inf), 30)
     assert base.directions(columns @ rng.normal(size=(3, 2))).shape[1] == 0
 
 
@@ -30,8 +30,9 @@ def test_scale_of_a_column_does_not_matter(rng):
 
 def test_extending_equals_fitting_at_once(rng):
     columns, values = rng.normal(size=(30, 5)), rng.normal(size=30)
-    step = make_base(columns[:, :2], np.full(2, np.inf), values, 30).extended(columns[:, 2:])
-    once = make_base(columns, np.full(5, np.inf), values, 30)
+    first = make_base(np.column_stack([columns[:, :2], values]), np.full(2, np.inf), 30)
+    step = first.extended(columns[:, 2:])
+    once = make_base(np.column_stack([columns, values]), np.full(5, np.inf), 30)
     np.testing.assert_allclose(step.residual, once.residual, atol=1e-12)
     assert step.freedom == once.freedom == 25
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition
 from wrist_stiffness.diagnosis.observations import Array
-from wrist_stiffness.diagnosis.projection import Base, least_squares
+from wrist_stiffness.diagnosis.projection import Base, augmented, least_squares
 
 SHAPE_STEP = 0.02
 """Step of the difference quotient, as a share of the range of a shape parameter."""
@@ -98,15 +98,13 @@ def joint_fit(evidence: Evidence, hypotheses: list[Hypothesis]) -> tuple[Array, 
         Linear parameters of each effect.
     """
     nuisance = evidence.nuisance
-    proper = np.isfinite(nuisance.prior_std)
-    p = len(proper)
-    raw = evidence.noise.whiten(
+    p = len(nuisance.prior_std)
+    white = evidence.noise.whiten(
         evidence.observations,
         np.concatenate([nuisance.columns, evidence.observations.values[:, :, None]], axis=2),
     )
-    priors = np.diag(1 / nuisance.prior_std)[proper]
-    columns = np.hstack([np.vstack([raw[:, :-1], priors]), *(h.columns for h in hypotheses)])
-    target = np.concatenate([raw[:, -1], np.zeros(len(priors))])
-    parameters = least_squares(columns, target, np.linalg.norm(columns, axis=0))[0]
+    rows = augmented(white, nuisance.prior_std)
+    columns = np.hstack([rows[:, :-1], *(h.columns for h in hypotheses)])
+    parameters = least_squares(columns, rows[:, -1], np.linalg.norm(columns, axis=0))[0]
     ends = np.cumsum([p] + [h.columns.shape[1] for h in hypotheses])
     return parameters[:p], [parameters[a:b] for a, b in zip(ends, ends[1:], strict=False)]

@@ -10,6 +10,7 @@ from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, make_evid
 from wrist_stiffness.diagnosis.noise import estimate_noise
 from wrist_stiffness.diagnosis.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.diagnosis.observations import Array, Observations
+from wrist_stiffness.diagnosis.projection import augmented
 from wrist_stiffness.diagnosis.whitening import NoiseModel
 
 
@@ -62,12 +63,10 @@ class FittedModel:
         white = self.noise.whiten(
             observations, np.concatenate([columns, residual[:, :, None]], axis=2)
         )
-        proper = np.isfinite(prior_std)
-        rows = np.vstack([white[:, :-1], np.diag(1 / prior_std)[proper]])
-        target = np.concatenate([white[:, -1], np.zeros(proper.sum())])
-        norm = np.linalg.norm(rows, axis=0)
+        rows = augmented(white, prior_std)
+        norm = np.linalg.norm(rows[:, :-1], axis=0)
         norm = np.where(norm > 0, norm, 1.0)
-        return np.linalg.lstsq(rows / norm, target, rcond=1e-10)[0] / norm
+        return np.linalg.lstsq(rows[:, :-1] / norm, rows[:, -1], rcond=1e-10)[0] / norm
 
 
 def fit_to(

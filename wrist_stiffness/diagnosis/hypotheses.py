@@ -138,9 +138,7 @@ def make_evidence(
     white = noise.whiten(
         observations, np.concatenate([nuisance.columns, observations.values[:, :, None]], axis=2)
     )
-    base = make_base(
-        white[:, :-1], nuisance.prior_std, white[:, -1], int(observations.measured.sum())
-    )
+    base = make_base(white, nuisance.prior_std, int(observations.measured.sum()))
     return Evidence(observations, noise, nuisance, base)
 
 

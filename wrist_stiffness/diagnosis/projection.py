@@ -123,30 +123,35 @@ class Base:
         )
 
 
-def make_base(columns: Array, prior_std: Array, values: Array, n_measured: int) -> Base:
+def make_base(white: Array, prior_std: Array, n_measured: int) -> Base:
     """Put data and priors together and refit.
 
     Parameters
     ----------
-    columns : (n, p) array
-        Whitened nuisance columns.
+    white : (n, p + 1) array
+        Whitened nuisance columns, the observations last.
     prior_std : (p,) array
         Infinite for free parameters.
-    values : (n,) array
-        Whitened observations.
     n_measured : int
-        How many of them were measured.
+        How many of the observations were measured.
     """
-    proper = np.isfinite(prior_std)
-    basis = orthonormal(with_prior_rows(columns, np.diag(1 / prior_std)[proper]))
-    padded = np.concatenate([values, np.zeros(proper.sum())])
-    priors = int(proper.sum())
-    return Base(basis, padded - basis @ (basis.T @ padded), n_measured + priors, priors)
+    rows = augmented(white, prior_std)
+    basis, values, priors = orthonormal(rows[:, :-1]), rows[:, -1], len(rows) - len(white)
+    return Base(basis, values - basis @ (basis.T @ values), n_measured + priors, priors)
 
 
-def with_prior_rows(columns: Array, rows: Array) -> Array:
-    """Columns of data above rows of priors."""
-    return np.vstack([columns, rows])
+def augmented(white: Array, prior_std: Array) -> Array:
+    """Return rows of data above a row for each proper prior, (N, p + 1).
+
+    Parameters
+    ----------
+    white : (n, p + 1) array
+        Whitened columns, the observations last.
+    prior_std : (p,) array
+        Infinite for free parameters.
+    """
+    priors = np.diag(1 / prior_std)[np.isfinite(prior_std)]
+    return np.vstack([white, np.pad(priors, ((0, 0), (0, 1)))])
 
 
 def least_squares(columns: Array, target: Array, reference: Array) -> tuple[Array, Array]:

@@ -83,7 +83,7 @@ def held_out(model: FittedModel, sealed: Observations) -> HeldOut:
     again = nuisance_columns(sealed, own)
     columns = np.concatenate([again.columns, residual[:, :, None]], axis=2)
     white = model.noise.whiten(sealed, columns)
-    base = make_base(white[:, :-1], again.prior_std, white[:, -1], int(sealed.measured.sum()))
+    base = make_base(white, again.prior_std, int(sealed.measured.sum()))
     return HeldOut(residual, base.residual)
 
 
