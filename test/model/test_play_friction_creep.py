@@ -217,6 +217,7 @@ def test_a_bristle_gives_way_by_a_distance_and_by_so_much_a_newton(free_model, m
     ]
     assert by_distance[1] == pytest.approx(0.5 * by_distance[0], rel=0.1)
     assert by_newton[1] == pytest.approx(by_newton[0], rel=0.01)
+    assert by_newton[0] < 0.5 * moved(preload_N=100.0, presliding_um=0.01)
 
 
 def test_slide_locks_when_the_load_comes_at_rest(free_model, make):
