@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.planning import plan as planning
 from wrist_stiffness.campaign.planning import pool
 from wrist_stiffness.campaign.planning import question as design_question
 from wrist_stiffness.campaign.planning.information import MeasurementNoise
@@ -70,6 +71,27 @@ def longer(model):
 
 def test_the_duration_is_kept_and_used(longer):
     assert 22.0 * 60.0 < longer.timeline.duration_s <= 25.0 * 60.0
+
+
+def test_the_shortest_plan_is_arranged_twice_at_most(model, monkeypatch):
+    """Without visits only the warm-up can be drawn again, which may always be too long."""
+    lasted, arranged = [], planning._Pool.arranged
+
+    def told(*of_visits):
+        timeline = arranged(*of_visits)
+        lasted.append(timeline.duration_s)
+        return timeline
+
+    monkeypatch.setattr(planning._Pool, "arranged", told)
+    for seed in range(2):
+        with pytest.raises(InputError, match="minutes are less than the"):
+            plan(model, rivals(), conditions(model, minutes=1.0, seed=seed))
+        most = lasted.pop() + 0.01
+        found = plan(model, rivals(), conditions(model, minutes=most / 60.0, seed=seed))
+        assert found.visits == ()
+        assert found.timeline.duration_s <= most
+        assert len(lasted) <= 2
+        lasted.clear()
 
 
 def test_moves_keep_to_speed_joint_limits_and_domain(model, longer):

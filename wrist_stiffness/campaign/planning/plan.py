@@ -181,10 +181,11 @@ def plan(
     order = rng.permutation(2 * len(settings))
     pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
     seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
-    least_s = pool.arranged([], rng).duration_s
-    if least_s > seconds:
+    shortest = pool.arranged([], rng)
+    if shortest.duration_s > seconds:
         raise InputError(
-            f"plan: {seconds / 60.0:g} minutes are less than the {least_s / 60.0:.1f} that "
+            f"plan: {seconds / 60.0:g} minutes are less than the "
+            f"{shortest.duration_s / 60.0:.1f} that "
             "warm-up, reference poses and two long holds take"
         )
     agree = bool(earlier and question.alike)
@@ -231,7 +232,7 @@ def plan(
         pool.by_unit(grams),
         pool.cost_s,
         start + pool.fixed_gram(grams),
-        seconds - least_s,
+        seconds - shortest.duration_s,
         utility,
         enough,
         rng,
@@ -242,7 +243,8 @@ def plan(
     timeline = pool.arranged(visits, rng)
     while timeline.duration_s > seconds:
         visits = visits[: -pool.in_unit]
-        timeline = pool.arranged(visits, rng)
+        # Arranged anew without visits, it might get a longer warm-up.
+        timeline = pool.arranged(visits, rng) if visits else shortest
     final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
     reached = discrimination(start + truths.of(final.total), layout, goals)
     answers = [
