@@ -17,9 +17,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.problem import silent
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.searching.base_fit import Fitter
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.campaign.searching.seeking import Search
 from wrist_stiffness.model.model_file import load_model
@@ -42,7 +42,7 @@ def main(path: str) -> None:
     mark(f"read {len(session)} measurements")
     units = as_units(model, session)
     mark(f"cut into {len(units.cut.dwell)} units, {len(units.cut.kept)} moments kept")
-    Search(model, (units,), silent).quick()
+    Search(Fitter(model), (units,)).quick()
     mark("base fitted, catalogue evaluated, leaders fitted")
     diagnose_sessions(model, [session], np.random.default_rng(0))
     mark("the whole diagnosis, from measurements")

@@ -7,7 +7,7 @@ import pytest
 
 from wrist_stiffness.campaign.observing import QUANTITIES, as_units
 from wrist_stiffness.campaign.searching import refit as refitting
-from wrist_stiffness.campaign.searching.base_fit import fit_base
+from wrist_stiffness.campaign.searching.base_fit import Fitter, fit_base
 from wrist_stiffness.campaign.searching.refit import (
     blanked,
     refit,
@@ -66,7 +66,7 @@ def width(fitted):
 def test_a_named_effect_gets_the_value_of_its_own_law(model, lost_motion):
     base = fit_base(model, (as_units(model, lost_motion),))
     # A tangent may be half as long again as the law.
-    fitted = refit(model, base, [backlash(1.5e3 * np.degrees(WIDTH_RAD))], SHARE).base
+    fitted = refit(Fitter(model), base, [backlash(1.5e3 * np.degrees(WIDTH_RAD))], SHARE).base
     assert fitted.extras == ("backlash@motor_1",)
     assert width(fitted) == pytest.approx(1e3 * np.degrees(WIDTH_RAD), rel=0.1)
     assert fitted.cost < 0.5 * base.cost
@@ -81,7 +81,7 @@ def test_an_effect_that_fails_on_unseen_units_is_withdrawn(model, in_the_cell, l
         rotation=np.where(late[:, None, None], mended.rotation, lost_motion.rotation),
     )
     base = fit_base(model, (as_units(model, both),))
-    fitted = refit(model, base, [backlash(1e3 * np.degrees(WIDTH_RAD))], SHARE).base
+    fitted = refit(Fitter(model), base, [backlash(1e3 * np.degrees(WIDTH_RAD))], SHARE).base
     assert fitted.extras == ()
 
 
@@ -92,7 +92,7 @@ def test_what_fits_to_all_units_chose_is_judged_however_little_it_leaves(
     """The part put aside was in those fits: that nothing is left is no proof."""
     base = fit_base(model, (as_units(model, lost_motion),))
     named = [backlash(1e3 * np.degrees(WIDTH_RAD))]
-    fitted = refit(model, base, named, SHARE).base
+    fitted = refit(Fitter(model), base, named, SHARE).base
     assert fitted.cost < refitting.INEXACT * 6 * base.problem.table.n_units
     asked = []
     judge = refitting.unseen
@@ -102,7 +102,7 @@ def test_what_fits_to_all_units_chose_is_judged_however_little_it_leaves(
         return asked[-1]
 
     monkeypatch.setattr(refitting, "unseen", counted)
-    again = refit(model, base, named, SHARE, saw_all)
+    again = refit(Fitter(model), base, named, SHARE, saw_all)
     assert again.base.extras == ("backlash@motor_1",)
     assert again.stages == tuple(asked)
     assert len(asked) == (2 if saw_all else 0)
@@ -117,7 +117,7 @@ def test_errors_that_are_told_are_of_fits_that_had_not_seen_the_part(model, lost
     named, told = [backlash(1e3 * np.degrees(WIDTH_RAD))], []
     for session in (lost_motion, moved):
         base = fit_base(model, (as_units(model, session),))
-        told.append(refit(model, base, named, SHARE, saw_all=True).stages)
+        told.append(refit(Fitter(model), base, named, SHARE, saw_all=True).stages)
     for before, after in zip(*told, strict=True):
         change = np.median(after.residual - before.residual, axis=0)
         np.testing.assert_allclose(change[:3], more, atol=2e-7)
@@ -148,7 +148,7 @@ def test_a_base_beside_play_is_fitted_as_it_is(model, in_the_cell):
     base = fit_base(model, (as_units(model, loose),))
     play = Effect(find_law("joint_clearance"), "joint_3", {"clearance_um": Estimate(12.0)})
     quick = fit_base(model, base.problem.sessions, [play])
-    found = refit(model, base, [play], SHARE).base
+    found = refit(Fitter(model), base, [play], SHARE).base
     assert found.extras == ("joint_clearance@joint_3",)
     assert found.cost < 0.8 * quick.cost
 

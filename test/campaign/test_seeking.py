@@ -8,7 +8,7 @@ import pytest
 from wrist_stiffness.campaign.fitting.recipes import effect_at
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching import seeking
-from wrist_stiffness.campaign.searching.base_fit import fit_base
+from wrist_stiffness.campaign.searching.base_fit import Fitter, fit_base
 from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.seeking import Reached, point_of
@@ -68,7 +68,7 @@ def reached(model, units, alone, *extras):
 @pytest.fixture(scope="module")
 def both(model, alone, candidates):
     """Where the search arrives from the base alone."""
-    return seeking._extended(model, Reached(alone, {}, alone.cost), candidates)
+    return seeking._extended(Fitter(model), Reached(alone, {}, alone.cost), candidates)
 
 
 @pytest.mark.slow
@@ -85,7 +85,7 @@ def test_what_does_not_pay_beside_the_others_is_taken_out(model, units, alone):
     idle = effect("time_delay@load_sensor", delay_ms=1.0)
     width = effect("backlash@motor_1", width_mdeg=40.0)
     late = effect("time_delay@motor_2", delay_ms=8.0)
-    thinned = seeking._thinned(model, reached(model, units, alone, idle, width, late))
+    thinned = seeking._thinned(Fitter(model), reached(model, units, alone, idle, width, late))
     assert thinned.prices.keys() == {"backlash@motor_1", "time_delay@motor_2"}
 
 
@@ -94,11 +94,11 @@ def test_the_place_of_a_wrong_effect_goes_to_the_right_one(model, units, alone, 
     wrong = effect("time_delay@pose_sensor", delay_ms=1.0)
     width = effect("backlash@motor_1", width_mdeg=40.0)
     start = reached(model, units, alone, wrong, width)
-    swapped = seeking._contested(model, start, wrong.name, candidates)
+    swapped = seeking._contested(Fitter(model), start, wrong.name, candidates)
     assert swapped.prices.keys() == {"backlash@motor_1", "time_delay@motor_2"}
     assert swapped.base.cost < start.base.cost
     # The right one keeps its place.
-    assert seeking._contested(model, swapped, width.name, candidates) is swapped
+    assert seeking._contested(Fitter(model), swapped, width.name, candidates) is swapped
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """What no tangent shows: axes that moved after the flanges were shimmed, beside whole fits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,13 @@ def test_a_base_is_strained_where_it_stood_in_for_an_effect(model, alone):
     assert alone.strained
     told = fit_base(model, alone.problem.sessions, [axis(shift_u_um=5.0)], alone)
     assert not told.strained
+
+
+def test_what_is_set_up_anew_is_no_strain(alone):
+    """Each further session would add to it, and a sound wrist be searched for a fault."""
+    anew = np.array([unknown.session is not None for unknown in alone.problem.unknowns])
+    assert replace(alone, z=alone.z + 10.0 * anew).strain == alone.strain
+    assert replace(alone, z=alone.z + 10.0 * ~anew).strain > alone.strain + 100.0
 
 
 def test_gaps_follow_the_axis_as_built_and_not_what_came_on_top(model, alone):

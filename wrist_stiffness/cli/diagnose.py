@@ -46,18 +46,20 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.cli.progress import Progress, Status
     from wrist_stiffness.cli.this_run import this_run
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.diagnose import diagnose_recordings
     from wrist_stiffness.workflows.json_file import write_json
 
-    found = diagnose_recordings(
-        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
-        recordings_named(arguments.recordings, arguments),
-        this_run(),
-        Progress,
-    )
+    with Status() as status:
+        found = diagnose_recordings(
+            arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+            recordings_named(arguments.recordings, arguments),
+            this_run(),
+            Progress,
+            status,
+        )
     print("\n".join(found.lines()))
     if arguments.report:
         from wrist_stiffness.workflows.report.page import write_page

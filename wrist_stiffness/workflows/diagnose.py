@@ -130,6 +130,7 @@ def diagnose_recordings(
     recordings: Recordings,
     run: Run,
     progress: Callable[[str], Progress] = lambda label: lambda done, total: None,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> Diagnosed:
     """Find the effects that a model misses in recordings of one wrist.
 
@@ -143,6 +144,8 @@ def diagnose_recordings(
         For the report.
     progress : callable
         From a label to a function that is told steps done and in all.
+    tell : callable
+        Told what is being done.
 
     Returns
     -------
@@ -158,9 +161,7 @@ def diagnose_recordings(
     sessions = read_sessions(recordings, loaded.table, progress("reading"))
     known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
     rng = np.random.default_rng(SEED)
-    answer = diagnose_sessions(
-        known, list(sessions.values()), rng, progress=progress("trying effects")
-    )
+    answer = diagnose_sessions(known, list(sessions.values()), rng, tell=tell)
     hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
     return Diagnosed(
         answer,

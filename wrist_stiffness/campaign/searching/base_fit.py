@@ -6,7 +6,7 @@ fit repeats Gauss-Newton steps on the model itself, and only what is left is tak
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -46,7 +46,13 @@ SMALLEST_STEP = 1.0 / 16.0
 WANDER = np.repeat([0.5e-6, 5e-6], 3)
 """Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
 
+Tell = Callable[[str], None]
+
 MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
+
+
+def silent(text: str) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,16 +167,20 @@ class BaseFit:
         return found
 
     @property
+    def tolerances(self) -> Mask:
+        """Which unknowns are tolerances of the wrist, (p,) bool; the rest is set up anew."""
+        of_wrist = np.array([unknown.session is None for unknown in self.problem.unknowns])
+        return self.of_base & of_wrist & (self.problem.weights == 1.0)
+
+    @property
     def strain(self) -> float:
-        """Sum of squares of the priors of the base."""
-        return float(np.sum((self.problem.weights * self.z)[self.of_base] ** 2))
+        """Sum of squares of the tolerances, in their standard deviations."""
+        return float(np.sum(self.z[self.tolerances] ** 2))
 
     @property
     def strained(self) -> bool:
         """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
-        known = self.of_base & (self.problem.weights == 1.0)
-        own = np.array([unknown.session is None for unknown in self.problem.unknowns])
-        return bool(chi2.sf(self.strain, np.count_nonzero(known & own)) < 0.05)
+        return bool(chi2.sf(self.strain, np.count_nonzero(self.tolerances)) < 0.05)
 
     def covariance(self) -> Array:
         """Return the covariance of all unknowns in steps, to first order, (p, p)."""
@@ -249,26 +259,25 @@ def fit_base(
     start : BaseFit, optional
         Where the base begins.
     beside : bool
-        Whether the base's columns are taken beside the extras; else as if these were not there,
-        which is far quicker and leads nearly as far, but for play.
+        Whether the base's columns are taken beside play too; else as if no play were there, which
+        is far quicker and leads nearly as far.
     """
     free, held = free_base(model)
     added = {effect.name: effect for effect in extras}
     usual = {each.effect.name for each in free}
-    ordered = sorted(added.values(), key=lambda each: each.name not in usual)
+    # Those on top of the base follow it, and play comes last.
+    ordered = sorted(added.values(), key=lambda e: (e.law.state_is_a_guess, e.name not in usual))
     more = [_about_zero(each) for each in ordered]
-    on_base = sum(each.name in usual for each in ordered)
+    firm = len(ordered) if beside else sum(not each.law.state_is_a_guess for each in ordered)
     whole = model.with_effects(*held)
     if start is not None and start.bare.whole is model and start.bare.sessions is sessions:
         alone = start.bare
     else:
         alone = BaseProblem(whole, sessions, free, model)
-    bare = alone
-    if on_base:
-        bare = BaseProblem(whole, sessions, (*free, *more[:on_base]), model)
     problem = BaseProblem(whole, sessions, (*free, *more), model)
-    if beside:
-        bare = problem
+    bare = problem if firm == len(more) else alone
+    if 0 < firm < len(more):
+        bare = BaseProblem(whole, sessions, (*free, *more[:firm]), model)
     z = _start(problem, start, added)
     lower, upper = problem.bounds
     weights = problem.weights
@@ -299,11 +308,38 @@ def fit_base(
     return BaseFit(problem, z, residual, columns, tuple(added), cost, alone)
 
 
-def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
-    """Return the columns of the base, as if no other effect were there, and those of the others.
+@dataclass(frozen=True)
+class Fitter:
+    """Fits the base of a model, alone or along with effects, and says so.
 
-    What these do to the base's columns is of second order; play and friction would be solved
-    again for each of them.
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    tell : callable, optional
+        Told what is being done.
+    """
+
+    model: ErrorModel
+    tell: Tell = silent
+
+    def __call__(
+        self,
+        sessions: tuple[UnitSession, ...],
+        extras: Sequence[Effect] = (),
+        start: BaseFit | None = None,
+        beside: bool = False,
+    ) -> BaseFit:
+        """Fit as `fit_base`."""
+        names = ", ".join(each.name for each in extras)
+        self.tell(f"fitting the wrist with {names}" if extras else "fitting the wrist as it is")
+        return fit_base(self.model, sessions, extras, start, beside)
+
+
+def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
+    """Return the columns of one problem, and of what another has on top of it.
+
+    Play would be solved again for each column of the base.
     """
     of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
     of_extras = tuple(n for n, u in enumerate(problem.unknowns) if u.free >= len(bare.free))

@@ -10,7 +10,6 @@ import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import SET_UP, TOLERATED
-from wrist_stiffness.campaign.fitting.problem import Progress, silent
 from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
@@ -219,7 +218,7 @@ class Point:
         names = [set(each.session.block.temperatures) for each in self.models]
         return frozenset(set.intersection(*names))
 
-    def changes(self, trials: Sequence[Trial], progress: Progress = silent) -> Array:
+    def changes(self, trials: Sequence[Trial]) -> Array:
         """Return the change of the predictions by each trial, (t, u, 6) [m, rad].
 
         Parameters
@@ -227,15 +226,12 @@ class Point:
         trials : sequence of (Law, str, dict)
             A law at a place with values of its parameters; an effect that the base has already
             gets these values on top of its own.
-        progress : callable, optional
-            Told (done, total).
         """
         blocks = []
-        for number, (model, rows) in enumerate(zip(self.models, self.used, strict=True)):
+        for model, rows in zip(self.models, self.used, strict=True):
             sets = [_with(model.effects, *trial) for trial in trials]
             found = np.stack(model.changes(sets)) if sets else np.empty((0, len(rows), 6))
             blocks.append(np.nan_to_num(found[:, rows]))
-            progress(number + 1, len(self.models))
         return np.concatenate(blocks, axis=1)
 
     @property
@@ -258,7 +254,6 @@ def wrist_candidates(
     point: Point,
     absent: Collection[str],
     near: Mapping[str, Mapping[str, float]],
-    progress: Progress = silent,
 ) -> tuple[WristCandidate, ...]:
     """Evaluate the whole catalogue about a point.
 
@@ -270,8 +265,6 @@ def wrist_candidates(
         Effects that cannot be candidates: the model has them, and they are no part of the base.
     near : dict of str to dict
         Values of some effects, by name, about which their columns are wanted.
-    progress : callable
-        Told (done, total).
     """
     plans = [
         (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
@@ -296,7 +289,7 @@ def wrist_candidates(
                 index(law, place, column.trial)
                 if column.origin:
                     index(law, place, column.origin)
-    changes, normal = point.changes(listed, progress), point.normal
+    changes, normal = point.changes(listed), point.normal
     found = []
     for law, place, own in plans:
         if law.id == WAVE:

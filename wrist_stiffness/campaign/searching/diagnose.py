@@ -6,16 +6,15 @@ sought first, by fits of the leading candidates with their own laws, the base al
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from wrist_stiffness.campaign.fitting.problem import Progress, silent
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, as_units
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, Fitter, Tell, silent
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
 from wrist_stiffness.campaign.searching.refit import (
@@ -45,6 +44,8 @@ FOUND = ", found"
 
 MUCH = 0.25
 """Share of the excess over the noise that is much to be left beside what was named."""
+
+Ask = Callable[[Place], Diagnosis]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,7 @@ def diagnose_sessions(
     sessions: Sequence[MeasuredSession],
     rng: np.random.Generator,
     settings: Settings | None = None,
-    progress: Progress = silent,
+    tell: Tell = silent,
 ) -> WristDiagnosis:
     """Find the effects of the catalogue that a model misses.
 
@@ -98,50 +99,57 @@ def diagnose_sessions(
         Source of chance.
     settings : Settings, optional
         Thresholds.
-    progress : callable, optional
-        Told (done, total) while the catalogue is evaluated.
+    tell : callable, optional
+        Told what is being done, every few seconds.
     """
     if not sessions:
         raise InputError("no session to diagnose")
     units = tuple(as_units(model, session) for session in sessions)
-    search = Search(model, units, progress)
-    place, result = _answered(search, rng, settings)
+    fitter = Fitter(model, tell)
+    search = Search(fitter, units)
+
+    def ask(place: Place) -> Diagnosis:
+        tell("asking chance and resamples")
+        return _asked(place, rng, settings)
+
+    place, result = _answered(search, ask)
     base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
-    judged = refit(model, base, named, share, saw_all=bool(place.fits))
+    judged = refit(fitter, base, named, share, saw_all=bool(place.fits))
     final = judged.base
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
     result = rejudged(withdrawn(result, len(effects)), judged.stages)
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
-    suspected = _with_all(model, base, named)
+    suspected = _with_all(fitter, base, named)
     ranked = contributions(suspected, {each.name for each in kept})
     observed = base.left(with_extras=False)
     result = sized(valued(result, final), kept)
     if kept and len(kept) == len(named) and result.verdict == "unknown":
-        result = _settled(result, search, final, rng, settings or Settings())
+        limit = (settings or Settings()).unexplained_share
+        result = _settled(result, search, final, ask, limit)
     return WristDiagnosis(result, observed, kept, final, suspected, ranked, absorbed)
 
 
-def _answered(
-    search: Search, rng: np.random.Generator, settings: Settings | None
-) -> tuple[Place, Diagnosis]:
+def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     """Return the answer of a search, the quick one as a rule, and where it was found."""
     place = search.quick()
-    result = _asked(place, rng, settings)
+    result = ask(place)
     strained = search.doubtful if result.findings else search.strained
-    if _leaves_much(result) or strained:
+    # What slopes name and whole fits did not find, or the other way round, is asked as it is.
+    otherwise = search.found != {each.name for each in result.findings}
+    if _leaves_much(result) or strained or otherwise:
         for other in search.thorough():
-            again = _asked(other, rng, settings)
+            again = ask(other)
             whole = [each.name for each in again.findings if each.name in other.fits]
             if whole:
                 beside = search.beside(other.fits[whole[0]])
-                again = _confirmed(again, whole[0], _asked(beside, rng, settings))
+                again = _confirmed(again, whole[0], ask(beside))
             if _says_more(again, result):
                 return other, again
     for other in search.further([each.name for each in result.findings]):
-        more = _asked(other, rng, settings)
+        more = ask(other)
         if any(each.name in other.fits for each in more.findings):
             fitted = [each for each in result.findings if each.name in other.base.extras]
             return other, _together(replace(result, findings=tuple(fitted)), more)
@@ -167,14 +175,14 @@ def _confirmed(found: Diagnosis, name: str, beside: Diagnosis) -> Diagnosis:
 
 
 def _settled(
-    result: Diagnosis, search: Search, final: BaseFit, rng: np.random.Generator, settings: Settings
+    result: Diagnosis, search: Search, final: BaseFit, ask: Ask, limit: float
 ) -> Diagnosis:
     """Return an answer that says what the laws leave, fitted whole, instead of their slopes."""
-    left = _asked(search.after(final), rng, settings)
+    left = ask(search.after(final))
     if left.findings:
         return result
     share = left.unexplained.energy_share * min(final.cost / search.first_cost, 1.0)
-    verdict = "unknown" if share >= settings.unexplained_share else "effect"
+    verdict = "unknown" if share >= limit else "effect"
     unexplained = replace(left.unexplained, energy_share=share)
     return replace(result, verdict=verdict, unexplained=unexplained)
 
@@ -218,12 +226,12 @@ def _says_more(one: Diagnosis, other: Diagnosis) -> bool:
     )
 
 
-def _with_all(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
+def _with_all(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
     """Return the base fitted along with what the search found and what was named."""
     more = [each for each in named if each.name not in base.extras]
     if not more:
         return base
-    return fit_base(model, base.problem.sessions, [*base.beyond().values(), *more], base)
+    return fitter(base.problem.sessions, [*base.beyond().values(), *more], base)
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
@@ -237,15 +245,9 @@ def _table(place: Place) -> Observations:
     So the priors of the statistics, which lie about zero, are the priors of the wrist.
     """
     base = place.base
-    own = np.isfinite(base.prior_std) & _of_wrist(base)
-    if not place.known:
-        own |= base.on_base
+    own = base.tolerances if place.known else base.tolerances | base.on_base
     left = base.left(with_extras=place.known).observations
     return left.with_values(left.values - base.columns[:, :, own] @ base.z[own])
-
-
-def _of_wrist(base: BaseFit) -> np.ndarray:
-    return np.array([unknown.session is None for unknown in base.problem.unknowns])
 
 
 def _nuisances(base: BaseFit, with_extras: bool = False) -> tuple[Nuisance, ...]:

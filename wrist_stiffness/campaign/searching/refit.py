@@ -14,14 +14,13 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.result import FAR
 from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, Fitter
 from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.campaign.searching.seeking import INEXACT, LOOSE
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
@@ -45,7 +44,7 @@ class Refitted:
 
 
 def refit(
-    model: ErrorModel,
+    fitter: Fitter,
     base: BaseFit,
     named: Sequence[Effect],
     sealed_share: float,
@@ -58,8 +57,8 @@ def refit(
 
     Parameters
     ----------
-    model : ErrorModel
-        What was known beforehand.
+    fitter : Fitter
+        Knows the model as it was.
     base : BaseFit
         From the search: where the fit begins.
     named : sequence of Effect
@@ -70,45 +69,45 @@ def refit(
         Whether fits to all units chose what was named: then it is judged however little it leaves.
     """
     kept = list(named)
-    fitted = _along(model, base, kept)
+    fitted = _along(fitter, base, kept)
     if not kept or (_variance(fitted) < INEXACT and not saw_all):
         return Refitted(fitted)
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
     seen = blanked(sessions, aside)
-    alone = unseen(fit_base(model, seen), sessions, aside, fitted)
+    alone = unseen(fitter(seen), sessions, aside, fitted)
     while kept:
-        trial = unseen(fit_base(model, seen, kept, fitted), sessions, aside, fitted)
+        trial = unseen(fitter(seen, kept, fitted), sessions, aside, fitted)
         if trial.energy < alone.energy:
             break
         kept.pop()
-        fitted = _along(model, base, kept)
+        fitted = _along(fitter, base, kept)
     if not saw_all:
         return Refitted(fitted)
     stages = [alone]
     for count in range(1, len(kept)):
-        part = fit_base(model, seen, kept[:count], fitted)
+        part = fitter(seen, kept[:count], fitted)
         stages.append(unseen(part, sessions, aside, fitted))
     return Refitted(fitted, (*stages, trial) if kept else ())
 
 
-def _along(model: ErrorModel, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
+def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
     sessions = base.problem.sessions
     if not named:
         if not base.extras:
             return base
         # What is not named may have drawn the base along, or out of a wrong flange's hold.
         starts = (None, base)
-        return min((fit_base(model, sessions, (), each) for each in starts), key=_cost)
+        return min((fitter(sessions, (), each) for each in starts), key=_cost)
     same = {each.name for each in named} == set(base.extras)
-    fitted = base if same else fit_base(model, sessions, named, base)
+    fitted = base if same else fitter(sessions, named, base)
     if _variance(fitted) >= INEXACT:
         # Flanges and play let a base that took up a large effect not find back: from the drawing.
-        fitted = min(fitted, fit_base(model, sessions, named), key=_cost)
+        fitted = min(fitted, fitter(sessions, named), key=_cost)
     if any(each.law.id in LOOSE for each in named):
         # Where a pin is free, the base does something else than without play.
         extras = list(fitted.beyond().values())
-        fitted = min(fitted, fit_base(model, sessions, extras, fitted, beside=True), key=_cost)
+        fitted = min(fitted, fitter(sessions, extras, fitted, beside=True), key=_cost)
     return fitted
 
 

@@ -6,13 +6,14 @@ After each the earlier ones must still pay, and at the end each must be the best
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from wrist_stiffness.campaign.fitting.problem import Progress
+import numpy as np
+
 from wrist_stiffness.campaign.observing import UnitSession
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, free_base
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, Fitter, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.searching.screening import Fitted, Screen
 from wrist_stiffness.model.effect import Effect
@@ -53,8 +54,11 @@ PRESSING = frozenset(("axis_misalignment", "flange_contact", "gravity"))
 """Laws that press and open flanges: where the base took up a part of one, other flanges touch, and
 its columns there say little of what it would explain."""
 
+RUBBING = frozenset(("joint_friction", "cable_wrench"))
+"""Laws that stick before they slip: tried likewise, as the base takes up what holds it."""
+
 LOOSE = frozenset(("joint_clearance",))
-"""Laws with gaps of their own: tried likewise, where a fit is begun from the drawing."""
+"""Laws with gaps of their own: tried likewise, as slopes about no play say next to nothing."""
 
 MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
@@ -130,29 +134,32 @@ class Search:
 
     Parameters
     ----------
-    model : ErrorModel
-        What is known of the wrist.
+    fitter : Fitter
+        Knows the model.
     sessions : tuple of UnitSession
         In the order of time.
-    progress : callable
-        Told (done, total) while the catalogue is evaluated, and while whole fits are made.
     """
 
-    def __init__(self, model: ErrorModel, sessions: Sessions, progress: Progress) -> None:
-        self._model, self._progress = model, progress
-        base = fit_base(model, sessions)
+    def __init__(self, fitter: Fitter, sessions: Sessions) -> None:
+        self._fitter = fitter
+        base = self._fitter(sessions)
         self._first = Reached(base, {}, base.cost)
         self._catalogue = self._at(self._first)
-        self._reached = _extended(model, self._first, self._catalogue)
+        self._reached = _extended(self._fitter, self._first, self._catalogue)
 
     @cached_property
     def _alone(self) -> Reached:
         """The base alone, from where the search led: a wrong flange may have caught it before."""
         sessions = self._first.base.problem.sessions
-        again = fit_base(self._model, sessions, (), self._reached.base)
+        again = self._fitter(sessions, (), self._reached.base)
         if again.cost > self._first.base.cost - WORTH:
             return self._first
         return Reached(again, {}, again.cost)
+
+    @property
+    def found(self) -> Collection[str]:
+        """Names of the effects to which tangents led, each fitted whole."""
+        return self._reached.prices.keys()
 
     @property
     def strained(self) -> bool:
@@ -186,14 +193,16 @@ class Search:
         """
         alone = self._alone
         known = self._catalogue if alone is self._first else self._at(alone)
-        trials = self._trials(alone, known, PRESSING | LOOSE if alone.rough else PRESSING)
+        tried = [e for e in known if e.law.id in PRESSING | RUBBING | LOOSE or e.name in self.found]
+        trials = self._trials(alone, tried)
         best = min(trials.values(), key=lambda each: each.total, default=alone)
         if best.total > min(alone.total, self._reached.total + WORTH):
             return
+        best = self._finished(trials)
         if len(self._reached.prices) == 1:
             trials |= dict.fromkeys(self._reached.prices, self._reached)
         yield _as_they_are(alone, known, trials)
-        found = _extended(self._model, best, known)
+        found = _extended(self._fitter, best, known)
         yield Place(found.base, self._at(found))
 
     def further(self, names: Collection[str]) -> Iterator[Place]:
@@ -210,32 +219,44 @@ class Search:
         begun = self._reached
         if not begun.prices.keys() & set(names):
             return
-        for name in begun.prices.keys() - set(names):
-            begun = _without(self._model, begun, name)
+        for name in [each for each in begun.prices if each not in names]:
+            begun = _without(self._fitter, begun, name)
         if begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
             return
         known = self.beside(begun.base).candidates
-        trials = self._trials(begun, known, LOOSE)
+        trials = self._trials(begun, [each for each in known if each.law.id in LOOSE])
         trials = {name: each for name, each in trials.items() if each.total < begun.total}
         if trials:
+            self._finished(trials)
             yield replace(_as_they_are(begun, known, trials), known=True)
 
-    def _trials(
-        self, begun: Reached, known: Candidates, laws: Collection[str]
-    ) -> dict[str, Reached]:
-        """Fit candidates of some laws one by one, with the whole base and what it has."""
+    def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
+        """Fit candidates one by one, with the whole base and what it has."""
         screen, found = begun.screen(), {}
-        leaders = [each for each in screen.leaders(known) if each[1].law.id in laws]
-        for number, (value, each, shape) in enumerate(leaders):
-            found[each.name] = _with(self._model, begun, screen.fitted(each, shape, value))
-            self._progress(number + 1, len(leaders))
+        leaders = screen.leaders(tried)
+        for value, each, shape in leaders:
+            found[each.name] = _with(self._fitter, begun, screen.fitted(each, shape, value))
         return found
+
+    def _finished(self, trials: dict[str, Reached]) -> Reached:
+        """Fit the best of some to its end, and put it in its place.
+
+        What play leaves where the base's slopes do not know of it would be taken for an effect.
+        """
+        name, best = min(trials.items(), key=lambda each: each[1].total)
+        extras = list(best.effects.values())
+        if any(effect.law.id in LOOSE for effect in extras):
+            sessions = best.base.problem.sessions
+            base = self._fitter(sessions, extras, best.base, beside=True)
+            best = min(best, replace(best, base=base), key=lambda each: each.total)
+            trials[name] = best
+        return best
 
     def beside(self, base: BaseFit) -> Place:
         """Return the place where everything that was fitted along with a base is known."""
         held = {effect.name for effect in base.problem.model.effects} | set(base.extras)
         point = point_of(base, with_extras=True)
-        return Place(base, wrist_candidates(point, held, {}, self._progress), known=True)
+        return Place(base, self._evaluated(point, held, {}), known=True)
 
     def after(self, base: BaseFit) -> Place:
         """Return the place of a whole fit, to ask whether anything is left.
@@ -247,8 +268,14 @@ class Search:
 
     def _at(self, reached: Reached) -> Candidates:
         held = {effect.name for effect in reached.base.problem.model.effects}
-        near = _near(self._model, reached.effects)
-        return wrist_candidates(point_of(reached.base), held, near, self._progress)
+        near = _near(self._fitter.model, reached.effects)
+        return self._evaluated(point_of(reached.base), held, near)
+
+    def _evaluated(
+        self, point: Point, held: Collection[str], near: Mapping[str, Mapping[str, float]]
+    ) -> Candidates:
+        self._fitter.tell("trying every effect of the catalogue")
+        return wrist_candidates(point, held, near)
 
 
 def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached]) -> Place:
@@ -256,7 +283,9 @@ def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached
     alone, fits = begun.base, {name: each.base for name, each in trials.items()}
     catalogue = tuple(
         each.changed_by(
-            alone.residual - fits[each.name].residual, fits[each.name].strain - alone.strain
+            # What was not measured has no residual.
+            np.nan_to_num(alone.residual - fits[each.name].residual),
+            fits[each.name].strain - alone.strain,
         )
         if each.name in fits
         else each
@@ -282,20 +311,20 @@ def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[
     }
 
 
-def _extended(model: ErrorModel, reached: Reached, candidates: Candidates) -> Reached:
+def _extended(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reached:
     """Add effects while they pay, and let each of them hold its place."""
     while len(reached.prices) < MOST_EXTRAS:
-        more = _one_more(model, reached, candidates)
+        more = _one_more(fitter, reached, candidates)
         if more is None:
             break
-        reached = _thinned(model, more)
+        reached = _thinned(fitter, more)
     if len(reached.prices) > 1:
         for name in reached.prices:
-            reached = _contested(model, reached, name, candidates)
+            reached = _contested(fitter, reached, name, candidates)
     return reached
 
 
-def _one_more(model: ErrorModel, reached: Reached, candidates: Candidates) -> Reached | None:
+def _one_more(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reached | None:
     """Add the effect that gains most with its own law, if it pays."""
     screen = reached.screen()
     leaders = screen.leaders([each for each in candidates if each.name not in reached.prices])
@@ -307,7 +336,7 @@ def _one_more(model: ErrorModel, reached: Reached, candidates: Candidates) -> Re
     hopeful = hopeful[:MOST_TRIED]
     while hopeful:
         close = [each for each in hopeful if each.gain > CLOSE * hopeful[0].gain][:MOST_REFITTED]
-        trials = [_with(model, reached, each) for each in close]
+        trials = [_with(fitter, reached, each) for each in close]
         best = min(trials, key=lambda each: each.total)
         if reached.total - best.total > least - WORTH:
             return best
@@ -315,17 +344,17 @@ def _one_more(model: ErrorModel, reached: Reached, candidates: Candidates) -> Re
     return None
 
 
-def _thinned(model: ErrorModel, reached: Reached) -> Reached:
+def _thinned(fitter: Fitter, reached: Reached) -> Reached:
     """Take out effects that do not pay any more beside the newest."""
     for name in list(reached.prices)[:-1]:
         lost = reached.screen(without=name).energy - reached.screen().energy
         if lost < WORTH + reached.prices[name]:
-            less = _without(model, reached, name)
+            less = _without(fitter, reached, name)
             reached = less if less.total < reached.total else reached
     return reached
 
 
-def _contested(model: ErrorModel, reached: Reached, name: str, candidates: Candidates) -> Reached:
+def _contested(fitter: Fitter, reached: Reached, name: str, candidates: Candidates) -> Reached:
     """Give the place of one effect to another where that explains more beside all the others."""
     screen = reached.screen(without=name)
     others = reached.prices.keys() - {name}
@@ -336,26 +365,26 @@ def _contested(model: ErrorModel, reached: Reached, name: str, candidates: Candi
     kept = screen.energy - reached.screen().energy - reached.prices[name]
     if rival.gain < kept:
         return reached
-    swapped = _with(model, reached, rival, instead_of=name)
+    swapped = _with(fitter, reached, rival, instead_of=name)
     return swapped if swapped.total < reached.total else reached
 
 
 def _with(
-    model: ErrorModel, reached: Reached, added: Fitted, instead_of: str | None = None
+    fitter: Fitter, reached: Reached, added: Fitted, instead_of: str | None = None
 ) -> Reached:
     prices = {name: price for name, price in reached.prices.items() if name != instead_of}
     extras = [reached.effects[name] for name in prices] + [added.effect]
     sessions = reached.base.problem.sessions
-    base = fit_base(model, sessions, extras, reached.base)
+    base = fitter(sessions, extras, reached.base)
     found = replace(reached, base=base, prices={**prices, added.candidate.name: added.price})
     if found.rough:
-        afresh = replace(found, base=fit_base(model, sessions, extras))
+        afresh = replace(found, base=fitter(sessions, extras))
         found = min(found, afresh, key=lambda each: each.total)
     return found
 
 
-def _without(model: ErrorModel, reached: Reached, name: str) -> Reached:
+def _without(fitter: Fitter, reached: Reached, name: str) -> Reached:
     prices = {own: price for own, price in reached.prices.items() if own != name}
     extras = [reached.effects[own] for own in prices]
-    base = fit_base(model, reached.base.problem.sessions, extras, reached.base)
+    base = fitter(reached.base.problem.sessions, extras, reached.base)
     return replace(reached, base=base, prices=prices)
