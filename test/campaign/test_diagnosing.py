@@ -81,3 +81,12 @@ def test_a_recording_of_something_outside_the_catalogue_is_unknown(model):
 def test_no_session_is_refused(model):
     with pytest.raises(InputError, match="no session to diagnose"):
         diagnose_sessions(model, [], np.random.default_rng(0))
+
+
+def test_a_session_without_a_measured_pose_is_named(model, in_the_cell):
+    session = measured(in_the_cell, model, base="exact")
+    nothing = np.full_like(session.shift, np.nan), np.full_like(session.rotation, np.nan)
+    blank = replace(session, name="tuesday", shift=nothing[0], rotation=nothing[1])
+    for sessions in ([session, blank], [blank, session]):
+        with pytest.raises(InputError, match="tuesday: no measured pose"):
+            diagnose_sessions(model, sessions, np.random.default_rng(0))

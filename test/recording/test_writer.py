@@ -139,6 +139,18 @@ def test_what_cannot_be_written_is_refused(tmp_path, topic, message, time_ns, re
     assert len(list(open_recording(tmp_path / "bag", strict=True).messages())) == 1
 
 
+@pytest.mark.parametrize("name", ["file.mcap", "folder"])
+def test_a_signal_before_the_first_message_leaves_nothing_behind(tmp_path, monkeypatch, name):
+    def interrupted(*_, **__):
+        assert list(tmp_path.iterdir()) != []
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("wrist_stiffness.recording.writer.Writer.start", interrupted)
+    with pytest.raises(KeyboardInterrupt), RecordingWriter(tmp_path / name):
+        raise AssertionError("never begun")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_missing_parent_folder_is_named(tmp_path):
     with (
         pytest.raises(RecordingError, match="nowhere does not exist"),

@@ -78,10 +78,14 @@ class RecordingWriter:
             if self._is_folder:
                 self._partial.mkdir()
             self._stream = self._storage_path.open("xb")
-        except OSError as error:
-            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
-        self._mcap = Writer(self._stream, CHUNK_BYTES, CompressionType.ZSTD)
-        self._mcap.start(profile="ros2", library="wrist_stiffness")
+            self._mcap = Writer(self._stream, CHUNK_BYTES, CompressionType.ZSTD)
+            self._mcap.start(profile="ros2", library="wrist_stiffness")
+        except BaseException as error:
+            # A signal may end the program here, before the `with` block has begun.
+            self.__exit__(type(error), error, error.__traceback__)
+            if isinstance(error, OSError):
+                raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+            raise
         return self
 
     def write(self, topic: str, message: Message, log_time_ns: int) -> None:

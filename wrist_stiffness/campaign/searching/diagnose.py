@@ -104,6 +104,9 @@ def diagnose_sessions(
     """
     if not sessions:
         raise InputError("no session to diagnose")
+    for session in sessions:
+        if not (np.isfinite(session.shift).any() or np.isfinite(session.rotation).any()):
+            raise InputError(f"{session.name}: no measured pose in the whole session")
     units = tuple(as_units(model, session) for session in sessions)
     fitter = Fitter(model, tell)
     search = Search(fitter, units)
