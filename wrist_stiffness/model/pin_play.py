@@ -22,14 +22,14 @@ SMALL_FORCE = 1e-2
 """An end that carries less radial force than this does not reach its wall altogether [N]."""
 
 WALLS = (1e6, 1e7, 1e8)
-"""Stiffness of the walls [N/m], from soft ones to find the way to the last, into which 1 N presses
-an end by 10 nm."""
+"""Stiffness of the walls [N/m]: into the last one 1 N presses an end by 10 nm; softer ones lead there
+where it is not found at once."""
 
 FORCE_TOLERANCE, ROUGH_TOLERANCE = 1e-8, 1e-2
 """Force out of balance at which a pin rests, against the largest on it and 1 N; the second one on
 the way, between softer walls."""
 
-MAX_STEPS, MAX_HALVINGS, ARMIJO = 60, 40, 1e-4
+MAX_STEPS, MAX_HALVINGS, ARMIJO = 30, 40, 1e-4
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,9 @@ class Play:
 
     def _hindered(self, x: Array, near: Array | None) -> Array:
         """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
-        found, left = x, np.arange(len(x))
-        active = np.zeros(self.gap.shape, dtype=bool)
-        if near is not None:
-            found, active, rests = self._newton(near, WALLS[-1], FORCE_TOLERANCE)
-            left = np.flatnonzero(~rests)
+        begin = x if near is None else near
+        found, active, rests = self._newton(begin, WALLS[-1], FORCE_TOLERANCE)
+        left = np.flatnonzero(~rests)
         if len(left):
             part, on_the_way = self.take(left), x[left]
             for wall in WALLS[:-1]:
