@@ -22,8 +22,8 @@ SMALL_FORCE = 1e-2
 """An end that carries less radial force than this does not reach its wall altogether [N]."""
 
 WALLS = (1e6, 1e7, 1e8)
-"""Stiffness of the walls [N/m]: into the last one 1 N presses an end by 10 nm; softer ones lead there
-where it is not found at once."""
+"""Stiffness of the walls [N/m]: into the last one 1 N presses an end by 10 nm, and softer ones lead
+there where rest is not found at once."""
 
 FORCE_TOLERANCE, ROUGH_TOLERANCE = 1e-8, 1e-2
 """Force out of balance at which a pin rests, against the largest on it and 1 N; the second one on
