@@ -143,20 +143,27 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     # What slopes name and whole fits did not find, or the other way round, is asked as it is.
     otherwise = search.found != {each.name for each in result.findings}
     if _leaves_much(result) or strained or otherwise:
-        for other in search.thorough():
-            again = ask(other)
-            whole = [each.name for each in again.findings if each.name in other.fits]
-            if whole:
-                beside = search.beside(other.fits[whole[0]])
-                again = _confirmed(again, whole[0], ask(beside))
+        other = search.thorough()
+        if other is not None:
+            again = _with_the_first(search, other, ask)
             if _says_more(again, result):
                 return other, again
-    for other in search.further([each.name for each in result.findings]):
+    other = search.further([each.name for each in result.findings])
+    if other is not None:
         more = ask(other)
         if any(each.name in other.fits for each in more.findings):
             fitted = [each for each in result.findings if each.name in other.base.extras]
             return other, _together(replace(result, findings=tuple(fitted)), more)
     return place, result
+
+
+def _with_the_first(search: Search, place: Place, ask: Ask) -> Diagnosis:
+    """Return what a place of whole fits says, asked again beside the first that it names."""
+    found = ask(place)
+    whole = [each.name for each in found.findings if each.name in place.fits]
+    if not whole:
+        return found
+    return _confirmed(found, whole[0], ask(search.beside(place.fits[whole[0]])))
 
 
 def _asked(place: Place, rng: np.random.Generator, settings: Settings | None) -> Diagnosis:

@@ -6,7 +6,7 @@ After each the earlier ones must still pay, and at the end each must be the best
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -185,27 +185,25 @@ class Search:
             return Place(self._first.base, self._catalogue)
         return Place(self._reached.base, self._at(self._reached))
 
-    def thorough(self) -> Iterator[Place]:
-        """Try what no tangent shows, each with the whole base; yield where that led.
+    def thorough(self) -> Place | None:
+        """Fit what no tangent shows one by one with the whole base; return all side by side.
 
-        First the base alone, with what each of them changes, base and all, in place of its
-        tangents: so they stand side by side as they are.  Then where the best of them leads.
+        Each with what it changes, base and all, in place of its tangents.  None where nothing comes
+        as far as the base alone, or as what tangents led to.
         """
         alone = self._alone
         known = self._catalogue if alone is self._first else self._at(alone)
         tried = [e for e in known if e.law.id in PRESSING | RUBBING | LOOSE or e.name in self.found]
         trials = self._trials(alone, tried)
-        best = min(trials.values(), key=lambda each: each.total, default=alone)
-        if best.total > min(alone.total, self._reached.total + WORTH):
-            return
-        best = self._finished(trials)
+        least = min((each.total for each in trials.values()), default=np.inf)
+        if least > min(alone.total, self._reached.total + WORTH):
+            return None
+        self._finish(trials)
         if len(self._reached.prices) == 1:
             trials |= dict.fromkeys(self._reached.prices, self._reached)
-        yield _as_they_are(alone, known, trials)
-        found = _extended(self._fitter, best, known)
-        yield Place(found.base, self._at(found))
+        return _as_they_are(alone, known, trials)
 
-    def further(self, names: Collection[str]) -> Iterator[Place]:
+    def further(self, names: Collection[str]) -> Place | None:
         """Try play with the whole base beside what was named, where that leaves more than noise.
 
         Beside what of it the search had fitted: what only slopes named stands to question again.
@@ -218,17 +216,18 @@ class Search:
         """
         begun = self._reached
         if not begun.prices.keys() & set(names):
-            return
+            return None
         for name in [each for each in begun.prices if each not in names]:
             begun = _without(self._fitter, begun, name)
         if begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
-            return
+            return None
         known = self.beside(begun.base).candidates
         trials = self._trials(begun, [each for each in known if each.law.id in LOOSE])
         trials = {name: each for name, each in trials.items() if each.total < begun.total}
-        if trials:
-            self._finished(trials)
-            yield replace(_as_they_are(begun, known, trials), known=True)
+        if not trials:
+            return None
+        self._finish(trials)
+        return replace(_as_they_are(begun, known, trials), known=True)
 
     def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
         """Fit candidates one by one, with the whole base and what it has."""
@@ -238,7 +237,7 @@ class Search:
             found[each.name] = _with(self._fitter, begun, screen.fitted(each, shape, value))
         return found
 
-    def _finished(self, trials: dict[str, Reached]) -> Reached:
+    def _finish(self, trials: dict[str, Reached]) -> None:
         """Fit the best of some to its end, and put it in its place.
 
         What play leaves where the base's slopes do not know of it would be taken for an effect.
@@ -248,9 +247,7 @@ class Search:
         if any(effect.law.id in LOOSE for effect in extras):
             sessions = best.base.problem.sessions
             base = self._fitter(sessions, extras, best.base, beside=True)
-            best = min(best, replace(best, base=base), key=lambda each: each.total)
-            trials[name] = best
-        return best
+            trials[name] = min(best, replace(best, base=base), key=lambda each: each.total)
 
     def beside(self, base: BaseFit) -> Place:
         """Return the place where everything that was fitted along with a base is known."""
