@@ -1,0 +1,232 @@
+"""From the places of a search to an answer: which of them are asked, and which is believed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.searching.diagnose import (
+    MUCH,
+    _answered,
+    _confirmed,
+    _says_more,
+    _settled,
+    _table,
+)
+from wrist_stiffness.campaign.searching.seeking import Place
+from wrist_stiffness.diagnosis import Diagnosis
+from wrist_stiffness.diagnosis.result import Finding, Unexplained
+
+AXIS, DELAY, PLAY = "axis_misalignment@joint_4", "time_delay@pose_sensor", "joint_clearance@joint_1"
+LITTLE, MORE = 0.5 * MUCH, 2.0 * MUCH
+
+
+def finding(name):
+    return Finding((tuple(name.split("@")),), {}, 0.1, 50.0, 0.001, 1.0, {}, "yes", "", "")
+
+
+def answer(verdict, *names, share=0.0, after=3.0):
+    left = Unexplained((), share, "of " + verdict)
+    found, error = tuple(finding(name) for name in names), {"s_um": after}
+    return Diagnosis(verdict, "dwell", {}, {"s_um": 9.0}, error, (), found, left, (), 0, "")
+
+
+def names(result):
+    return [each.name for each in result.findings]
+
+
+def place(*extras, fits=()):
+    """Return a place whose base was fitted along with some effects, and what was fitted whole."""
+    whole = {name: SimpleNamespace(extras=(*extras, name)) for name in fits}
+    return Place(SimpleNamespace(extras=extras), (), whole)
+
+
+class Asked:
+    """Stands for a search and for the statistics, which answer each of its places as is listed."""
+
+    def __init__(self, quick, thorough=None, further=None, beside=None, found=(), **strains):
+        self.found = set(found)
+        self.strained = strains.get("strained", False)
+        self.doubtful = strains.get("doubtful", False)
+        self.places = {
+            "quick": place(*found),
+            "thorough": place(fits=[AXIS]) if thorough else None,
+            "further": place(*found, fits=[PLAY]) if further else None,
+            "beside": place(AXIS),
+        }
+        self.answers = {"quick": quick, "thorough": thorough, "further": further, "beside": beside}
+        self.asked, self.begun = [], []
+
+    def quick(self):
+        return self.places["quick"]
+
+    def thorough(self):
+        self.begun.append("thorough")
+        return self.places["thorough"]
+
+    def further(self, names):
+        self.begun.append("further")
+        return self.places["further"]
+
+    def beside(self, base):
+        assert base is self.places["thorough"].fits[AXIS]
+        return self.places["beside"]
+
+    def ask(self, place):
+        (name,) = (name for name, each in self.places.items() if each is place)
+        self.asked.append(name)
+        return self.answers[name]
+
+    def answered(self):
+        place, result = _answered(self, self.ask)
+        (name,) = (name for name, each in self.places.items() if each is place)
+        return name, result
+
+
+@pytest.mark.parametrize(
+    ("quick", "search", "thorough"),
+    [
+        (answer("none"), {}, False),
+        (answer("effect", DELAY), {"found": [DELAY]}, False),
+        # Much is left, and nothing that is named explains most of it.
+        (answer("unknown", share=LITTLE), {}, True),
+        (answer("unknown", DELAY, share=MORE), {"found": [DELAY]}, True),
+        (answer("unknown", DELAY, share=LITTLE), {"found": [DELAY]}, False),
+        # The base had to go far: alone where nothing is named, and beside what is.
+        (answer("none"), {"strained": True}, True),
+        (answer("none"), {"doubtful": True}, False),
+        (answer("effect", DELAY), {"found": [DELAY], "doubtful": True}, True),
+        (answer("effect", DELAY), {"found": [DELAY], "strained": True}, False),
+        # Slopes and whole fits see different things.
+        (answer("effect", DELAY), {"found": []}, True),
+        (answer("effect", DELAY), {"found": [DELAY, PLAY]}, True),
+        (answer("none"), {"found": [DELAY]}, True),
+    ],
+)
+def test_whole_fits_are_made_where_the_quick_answer_may_be_wrong(quick, search, thorough):
+    """They take minutes; but a base that stands in for an effect looks like a sound wrist."""
+    search = Asked(quick, **search)
+    where, result = search.answered()
+    assert ("thorough" in search.begun) == thorough
+    assert where == "quick"
+    assert result is quick
+
+
+def test_an_answer_of_whole_fits_that_says_more_is_taken():
+    whole = answer("effect", AXIS)
+    search = Asked(answer("unknown", share=0.5), whole, beside=answer("none"))
+    where, result = search.answered()
+    assert where == "thorough"
+    assert result is whole
+    assert "further" not in search.begun
+
+
+def test_an_answer_of_whole_fits_that_says_no_more_is_not_taken():
+    """Slopes about the first base name the effect; among whole fits it got lost."""
+    quick = answer("effect", DELAY)
+    search = Asked(quick, answer("none"), found=[DELAY, PLAY])
+    assert search.answered() == ("quick", quick)
+    assert search.asked == ["quick", "thorough"]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "more"),
+    [
+        (answer("none"), answer("unknown", share=0.5), False),
+        (answer("unknown", share=0.2), answer("unknown", share=0.5), False),
+        (answer("effect", AXIS), answer("effect", DELAY), True),
+        (answer("unknown", AXIS, share=0.4), answer("unknown", DELAY, share=0.5), True),
+        (answer("unknown", AXIS, share=0.5), answer("unknown", DELAY, share=0.4), False),
+        (answer("unknown", AXIS, share=0.5), answer("unknown", share=0.4), True),
+    ],
+)
+def test_an_answer_says_more_that_names_something_and_leaves_less(one, other, more):
+    assert _says_more(one, other) == more
+
+
+def test_beside_a_whole_fit_everything_is_asked_again():
+    """Flanges stand otherwise beside it: what slopes about the base alone named is forgotten."""
+    whole, beside = answer("effect", AXIS, DELAY), answer("effect", PLAY, after=1.0)
+    search = Asked(answer("unknown", share=0.5), whole, beside=beside)
+    where, result = search.answered()
+    assert where == "thorough"
+    assert search.asked == ["quick", "thorough", "beside"]
+    assert names(result) == [AXIS, PLAY]
+
+
+def test_what_is_left_is_what_is_left_beside_everything_named():
+    """Else the technician is told an error from which the second effect was not taken yet."""
+    beside = answer("unknown", PLAY, share=0.3, after=1.0)
+    result = _confirmed(answer("effect", AXIS, after=3.0), AXIS, beside)
+    assert result.verdict == "unknown"
+    assert result.before == {"s_um": 9.0}
+    assert result.after == {"s_um": 1.0}
+    assert result.unexplained == beside.unexplained
+
+
+def test_play_that_is_found_beside_what_was_named_joins_it():
+    """What only slopes named was not in that fit: it stood in for the play."""
+    quick = answer("effect", DELAY, AXIS, share=0.1)
+    more = answer("effect", PLAY, after=1.0)
+    search = Asked(quick, further=more, found=[DELAY])
+    where, result = search.answered()
+    assert where == "further"
+    assert names(result) == [DELAY, PLAY]
+    assert result.after == {"s_um": 1.0}
+
+
+def test_where_play_is_not_named_the_quick_answer_stands():
+    quick = answer("effect", DELAY)
+    search = Asked(quick, further=answer("effect", AXIS), found=[DELAY])
+    assert search.answered() == ("quick", quick)
+    assert search.asked == ["quick", "further"]
+
+
+@pytest.mark.parametrize(
+    ("cost", "share", "verdict"),
+    [(250.0, 0.1, "effect"), (1e3, 0.4, "unknown"), (2e3, 0.4, "unknown")],
+)
+def test_what_laws_leave_is_a_share_of_what_the_base_alone_left(cost, share, verdict):
+    """Statistics know only what they are asked: a large share of nearly nothing is little."""
+    left = answer("unknown", share=0.4)
+    search = SimpleNamespace(after=lambda base: base, first_cost=1e3)
+    result = _settled(
+        answer("unknown", DELAY, share=0.9), search, SimpleNamespace(cost=cost), lambda _: left, 0.2
+    )
+    assert result.verdict == verdict
+    assert result.unexplained.energy_share == pytest.approx(share)
+    assert result.unexplained.evidence == left.unexplained.evidence
+    assert names(result) == [DELAY]
+
+
+def test_where_more_is_named_beside_whole_laws_nothing_is_settled():
+    """An answer that knows of one more effect has not explained what is left."""
+    result = answer("unknown", DELAY, share=0.9)
+    search = SimpleNamespace(after=lambda base: base, first_cost=1e3)
+    more = answer("effect", PLAY)
+    assert _settled(result, search, SimpleNamespace(cost=1.0), lambda _: more, 0.2) is result
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_statistics_see_tolerances_about_their_means(known):
+    """Of an axis that moved after it was built all is still to be found, where it is not known."""
+    registration, built, moved, play = np.array([5.0, 2.0, 3.0, 7.0])
+    columns = np.arange(1.0, 49.0).reshape(2, 6, 4)
+    left = np.full((2, 6), 0.5)
+    asked = []
+
+    def table(with_extras):
+        asked.append(with_extras)
+        within = SimpleNamespace(values=left, with_values=lambda values: values)
+        return SimpleNamespace(observations=within)
+
+    base = SimpleNamespace(
+        tolerances=np.array([False, True, False, False]),
+        on_base=np.array([False, False, True, False]),
+        columns=columns,
+        z=np.array([registration, built, moved, play]),
+        left=table,
+    )
+    own = built * columns[:, :, 1] + (0.0 if known else moved * columns[:, :, 2])
+    np.testing.assert_allclose(_table(Place(base, (), known=known)), left - own)
+    assert asked == [known]
