@@ -16,6 +16,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.pin_play import Play
 from wrist_stiffness.model.registry import catalogue
 
 PLACED = [(law.id, place) for law in catalogue().values() for place in law.places]
@@ -240,6 +241,34 @@ def test_an_error_that_is_no_error_is_refused_and_forgotten(model, make, degrees
     with pytest.raises(InputError, match="rad, the limit is 1 rad: is a temperature"):
         session.advance(samples[1])
     assert np.array_equal(session.advance(samples[2]).twist, first.twist)
+
+
+@pytest.mark.parametrize("chunk", [batch.CHUNK, 7])
+def test_pins_begin_where_they_rested_last(model, make, monkeypatch, chunk):
+    """Beside another model, or before at the same block: it costs less and changes nothing."""
+    monkeypatch.setattr(batch, "CHUNK", chunk)
+    loaded = model.with_effects(make.effect("joint_clearance@joint_4", clearance_um=8.0))
+    block, steps = make.block(40), []
+    bent = make.effect("link_stiffness@link_1", flexibility_percent=0.5)
+    monkeypatch.setattr(
+        Play,
+        "_hessian",
+        lambda self, *a, own=Play._hessian: steps.append(len(a[0])) or own(self, *a),
+    )
+
+    def cost(predict):
+        steps.clear()
+        return predict(), sum(steps)
+
+    (cold,), at_first = cost(lambda: loaded.batch_with(block, [()]))
+    (warm,), again = cost(lambda: loaded.batch_with(block, [()], cold.guesses))
+    (_, beside), both = cost(lambda: loaded.batch_with(block, [(), (bent,)], cold.guesses))
+    (alone,), apart = cost(lambda: loaded.batch_with(block, [(bent,)]))
+    assert again < 0.5 * at_first
+    assert both - again < 0.8 * apart
+    scale = np.abs(cold.twist).max(axis=0)
+    assert np.all(np.abs(warm.twist - cold.twist) <= 1e-12 * scale)
+    assert np.all(np.abs(beside.twist - alone.twist) <= 1e-12 * scale)
 
 
 def test_many_contacts_at_once_are_each_ones_contact():

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.prediction import BlockPrediction
 
 Effects = tuple[Effect, ...]
 
@@ -63,12 +65,22 @@ class SessionModel:
         In motion the mean of a pose is not the pose at the mean angles: a target a millimetre off
         bends that by micrometres.
         """
-        bare = self.model.with_effects()
         return [
             self.session.mean(found.measured)
             for start in range(0, len(trials), AT_A_TIME)
-            for found in bare.batch_with(self.session.block, trials[start : start + AT_A_TIME])
+            for found in self._batch(trials[start : start + AT_A_TIME], on_path=True)
         ]
+
+    def _batch(self, trials: Sequence[Effects], on_path: bool) -> list[BlockPrediction]:
+        """Predict trials on the path or at mean moments; pins begin where they rested last."""
+        block = self.session.block if on_path else self.session.still
+        found = self.model.with_effects().batch_with(block, trials, self._rests.get(on_path, ()))
+        self._rests[on_path] = found[0].guesses
+        return found
+
+    @cached_property
+    def _rests(self) -> dict[bool, tuple[Mapping[str, Any], ...]]:
+        return {}
 
     def predicted(
         self, trials: Sequence[Effects], along: Sequence[bool] | None = None
@@ -82,15 +94,13 @@ class SessionModel:
         along : sequence of bool, optional
             Which of them are evaluated on the path; by default those that remember.
         """
-        bare = self.model.with_effects()
         path = [self.remembers(trial) for trial in trials] if along is None else along
         out: list[Array] = [np.empty(0)] * len(trials)
         for needs_path in (False, True):
             chosen = [i for i, own in enumerate(path) if own == needs_path]
             for start in range(0, len(chosen), AT_A_TIME):
                 part = chosen[start : start + AT_A_TIME]
-                block = self.session.block if needs_path else self.session.still
-                found = bare.batch_with(block, [trials[i] for i in part])
+                found = self._batch([trials[i] for i in part], needs_path)
                 for i, each in zip(part, found, strict=True):
                     out[i] = self.session.mean(each.measured) if needs_path else each.measured
         return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain, repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside, seen_by
 from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
-from wrist_stiffness.model.stages import Evaluable, Memory
+from wrist_stiffness.model.stages import NO_GUESSES, Evaluable, Guesses, Memory
 
 CHUNK = 2048
 """Samples evaluated at a time: about 150 MB of operators with 24 flange sectors."""
@@ -22,7 +23,10 @@ STACK = 8192
 
 
 def predicted(
-    models: Sequence[Evaluable], block: Block, accepted: NDArray[np.bool_]
+    models: Sequence[Evaluable],
+    block: Block,
+    accepted: NDArray[np.bool_],
+    near: Sequence[Guesses] = (),
 ) -> list[BlockPrediction]:
     """Predict a recording with models that share their table.
 
@@ -34,6 +38,8 @@ def predicted(
         n samples.
     accepted : (n,) bool
         Samples inside the table's domain and load range; the effects' memory passes over the rest.
+    near : sequence of dict, optional
+        `guesses` of an earlier prediction of this block.
 
     Returns
     -------
@@ -46,23 +52,30 @@ def predicted(
         If a user's formula has no finite value; the message says how long after the first sample.
     """
     try:
-        return _predicted(models, block, accepted)
+        return _predicted(models, block, accepted, near)
     except UndefinedFormulaError as error:
         after = error.time_s - float(block.time[0])
         raise InputError(f"{error}, {after:.3f} s after the start") from error
 
 
 def _predicted(
-    models: Sequence[Evaluable], block: Block, accepted: NDArray[np.bool_]
+    models: Sequence[Evaluable],
+    block: Block,
+    accepted: NDArray[np.bool_],
+    near: Sequence[Guesses],
 ) -> list[BlockPrediction]:
     usable, rows = block.take(accepted), np.flatnonzero(accepted)
     twists, measured = np.full((2, len(models), len(block), 6), np.nan)
     memories: list[Memory | None] = [None] * len(models)
     warnings: list[dict[str, None]] = [{} for _ in models]
-    for start in range(0, len(usable), CHUNK):
+    guesses: list[Guesses] = []
+    for start, guess in zip(
+        range(0, len(usable), CHUNK), chain(near, repeat(NO_GUESSES)), strict=False
+    ):
         part = usable.take(slice(start, start + CHUNK))
         own = rows[start : start + CHUNK]
-        first = evaluate(models[0], part, memories[0])
+        first = evaluate(models[0], part, memories[0], near=guess)
+        guesses.append(first.staged.guesses)
         beside = max(1, STACK // len(part))
         groups = [slice(begin, begin + beside) for begin in range(1, len(models), beside)]
         for group in (slice(0, 1), *groups):
@@ -75,6 +88,6 @@ def _predicted(
             for known, each in zip(warnings[group], found, strict=True):
                 known.update(dict.fromkeys(each.warnings))
     return [
-        BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]))
+        BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]), tuple(guesses))
         for i in range(len(models))
     ]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,7 +230,10 @@ class ErrorModel:
         return self.batch_with(block, [()])[0]
 
     def batch_with(
-        self, block: Block, additions: Sequence[Sequence[Effect]]
+        self,
+        block: Block,
+        additions: Sequence[Sequence[Effect]],
+        near: Sequence[Mapping[str, Any]] = (),
     ) -> list[BlockPrediction]:
         """Predict a whole recording once for each of several additions to the model's effects.
 
@@ -242,6 +246,8 @@ class ErrorModel:
             n samples.
         additions : sequence of sequences of Effect
             Further effects of each model; an empty one for the model as it is.
+        near : sequence of dict, optional
+            `guesses` of an earlier prediction of this block: it changes the cost alone.
 
         Returns
         -------
@@ -250,7 +256,7 @@ class ErrorModel:
         """
         models = [self.with_effects(*self.effects, *extra) for extra in additions]
         share(models)
-        return predicted(models, block, self.accepts(block))
+        return predicted(models, block, self.accepts(block), near)
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
         """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""

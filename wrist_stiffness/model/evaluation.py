@@ -22,7 +22,15 @@ from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contacts import Held, solve_alike, solve_contacts
 from wrist_stiffness.model.contribution import NOTHING, Contribution
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.stages import Evaluable, Memory, Staged, staged, with_speeds
+from wrist_stiffness.model.stages import (
+    NO_GUESSES,
+    Evaluable,
+    Guesses,
+    Memory,
+    Staged,
+    staged,
+    with_speeds,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +86,11 @@ class Evaluated:
 
 
 def evaluate(
-    model: Evaluable, block: Block, memory: Memory | None, pose: Configuration | None = None
+    model: Evaluable,
+    block: Block,
+    memory: Memory | None,
+    pose: Configuration | None = None,
+    near: Guesses = NO_GUESSES,
 ) -> Evaluated:
     """Evaluate a model over a block.
 
@@ -92,6 +104,8 @@ def evaluate(
         What the block before left, None at the start.
     pose : Configuration, optional
         The configuration of a block of one sample, where it is known.
+    near : dict of str to state, optional
+        Where effects whose states are guesses ended at this block before, by their names.
 
     Returns
     -------
@@ -100,7 +114,7 @@ def evaluate(
     """
     guess = None if memory is None else memory.active
     start = situation_of(model, with_speeds(block, memory), guess, pose)
-    found = staged(model, start, memory)
+    found = staged(model, start, memory, near=near)
     at = found.last
     if pose is not None and at.given.through is None and "operators" not in at.statics.__dict__:
         return Evaluated(found, *_settled_one(model.single_pose, pose, at))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,9 +104,13 @@ class BlockPrediction:
         memory passes over such samples as a node does.
     warnings : tuple of str
         Each once.
+    guesses : tuple of dict
+        Where the first model's pins came to rest, chunk by chunk: where another prediction of the
+        same block may begin to look.
     """
 
     twist: Array
     measured: Array
     accepted: NDArray[np.bool_]
     warnings: tuple[str, ...]
+    guesses: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)

@@ -6,9 +6,10 @@ the same thing: the same object, with the same state.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,6 +31,9 @@ FIRST_ORDER_LIMIT = 2e-3
 """A screw that turns by more than this has left first order [rad]."""
 
 SAMPLE_STAGES = STAGES[1:]
+
+Guesses = Mapping[str, Any]
+NO_GUESSES: Guesses = MappingProxyType({})
 
 
 class Evaluable(Protocol):
@@ -143,7 +147,7 @@ class Staged:
         return {id(each.effect): each for each in self.advanced if each is not None}
 
     @cached_property
-    def guesses(self) -> dict[str, Any]:
+    def guesses(self) -> Guesses:
         """Where the effects whose states are guesses ended, by their names."""
         guessing = [e for e in self.advanced if e is not None and e.effect.law.state_is_a_guess]
         return {each.effect.name: each.after for each in guessing}
@@ -160,7 +164,11 @@ class Staged:
 
 
 def staged(
-    model: Evaluable, start: Situation, memory: Memory | None, like: Staged | None = None
+    model: Evaluable,
+    start: Situation,
+    memory: Memory | None,
+    like: Staged | None = None,
+    near: Guesses = NO_GUESSES,
 ) -> Staged:
     """Carry a model's effects through the stages.
 
@@ -174,7 +182,10 @@ def staged(
         What the block before left, None at the start.
     like : Staged, optional
         Another model at the same block.
+    near : dict of str to state, optional
+        Where effects whose states are guesses ended at this block before, by their names.
     """
+    near = near if like is None else like.guesses
     states = memory.states if memory else (None,) * len(model.effects)
     changing = [n for n, effect in enumerate(model.effects) if not effect.law.constant]
     advanced: list[Advanced | None] = [None] * len(model.effects)
@@ -182,7 +193,7 @@ def staged(
     for number, stage in enumerate(SAMPLE_STAGES):
         at, added = situations[-1], []
         for n in (n for n in changing if model.effects[n].stage == stage):
-            found = _advanced(model.effects[n], at, states[n], like)
+            found = _advanced(model.effects[n], at, states[n], like, near)
             advanced[n] = found
             added.append(found.added)
             warnings += found.warnings
@@ -190,14 +201,16 @@ def staged(
     return Staged(tuple(situations), tuple(advanced), tuple(warnings))
 
 
-def _advanced(effect: Effect, at: Situation, state: Any, like: Staged | None) -> Advanced:
+def _advanced(
+    effect: Effect, at: Situation, state: Any, like: Staged | None, near: Guesses
+) -> Advanced:
     # A user's own law may write into its state.
     known = None if like is None or effect.law.foreign else like.known.get(id(effect))
     if known is not None and known.at is at and known.before is state:
         return known
-    near = None if like is None else like.guesses.get(effect.name)
+    guess = near.get(effect.name)
     try:
-        added, after = _advanced_by(effect, at, state if near is None else near)
+        added, after = _advanced_by(effect, at, state if guess is None else guess)
     except MissingSignalError as missing:
         lacking = f"{effect.name}: {missing.signal} is missing, left out"
         return Advanced(effect, at, state, NOTHING, state, (lacking,))
