@@ -140,8 +140,9 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     place = search.quick()
     result = ask(place)
     strained = search.doubtful if result.findings else search.strained
-    # What slopes name and whole fits did not find, or the other way round, is asked as it is.
-    otherwise = search.found != {each.name for each in result.findings}
+    # Fits found something else than slopes name, and these do not explain everything.
+    found = search.found != {each.name for each in result.findings}
+    otherwise = found and result.verdict != "effect"
     if _leaves_much(result) or strained or otherwise:
         other = search.thorough()
         if other is not None:
