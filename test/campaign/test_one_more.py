@@ -273,6 +273,14 @@ def test_play_is_fitted_to_its_end_where_it_explains_most(wrist, beside, kept):
     assert [names for names, _, finished in wrist.done if finished] == [{PLAY}]
 
 
+def test_play_is_begun_from_the_drawing_where_very_much_is_left(wrist):
+    """25 um of play ended at 8, behind a bracket; beside its slopes from the drawing at 24.6."""
+    wrist.left, wrist.beside = leaves(alone=10**6, p=9 * 10**5, w=10**5), leaves(p=500)
+    assert Search(wrist, ()).thorough().fits[PLAY].cost == 500
+    finished = [(names, start is None) for names, start, beside in wrist.done if beside]
+    assert finished == [({PLAY}, False), ({PLAY}, True)]
+
+
 def test_what_is_no_play_is_fitted_once(wrist):
     """Beside play a fit takes a minute."""
     wrist.left = leaves(alone=1000, p=500, w=300)

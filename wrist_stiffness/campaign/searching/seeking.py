@@ -195,10 +195,10 @@ class Search:
         known = self._catalogue if alone is self._first else self._at(alone)
         tried = [e for e in known if e.law.id in PRESSING | RUBBING | LOOSE or e.name in self.found]
         trials = self._trials(alone, tried)
+        self._finish(trials)
         least = min((each.total for each in trials.values()), default=np.inf)
         if least > min(alone.total, self._reached.total + WORTH):
             return None
-        self._finish(trials)
         if len(self._reached.prices) == 1:
             trials |= dict.fromkeys(self._reached.prices, self._reached)
         return _as_they_are(alone, known, trials)
@@ -238,16 +238,23 @@ class Search:
         return found
 
     def _finish(self, trials: dict[str, Reached]) -> None:
-        """Fit the best of some to its end, and put it in its place.
+        """Fit play to its end where it explains most, and put it in its place.
 
-        What play leaves where the base's slopes do not know of it would be taken for an effect.
+        What it leaves where the base's slopes do not know of it would be taken for an effect.
+        Where very much is left these lead nowhere: then it is begun from the drawing as well.
         """
-        name, best = min(trials.items(), key=lambda each: each[1].total)
-        extras = list(best.effects.values())
-        if any(effect.law.id in LOOSE for effect in extras):
-            sessions = best.base.problem.sessions
-            base = self._fitter(sessions, extras, best.base, beside=True)
-            trials[name] = min(best, replace(best, base=base), key=lambda each: each.total)
+        loose = [e for e in trials if any(f.law.id in LOOSE for f in trials[e].effects.values())]
+        if not loose:
+            return
+        name = min(loose, key=lambda each: trials[each].total)
+        best = trials[name]
+        if best.total > min(each.total for each in trials.values()) and not best.rough:
+            return
+        sessions, extras = best.base.problem.sessions, list(best.effects.values())
+        starts = (best.base, None) if best.rough else (best.base,)
+        ends = [self._fitter(sessions, extras, start, beside=True) for start in starts]
+        fits = [best, *(replace(best, base=base) for base in ends)]
+        trials[name] = min(fits, key=lambda each: each.total)
 
     def beside(self, base: BaseFit) -> Place:
         """Return the place where everything that was fitted along with a base is known."""
