@@ -8,7 +8,8 @@ import pytest
 
 from wrist_stiffness.campaign.observing import QUANTITIES, as_units
 from wrist_stiffness.campaign.searching import refit as refitting
-from wrist_stiffness.campaign.searching.base_fit import Fitter, fit_base
+from wrist_stiffness.campaign.searching.base_fit import fit_base
+from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.refit import (
     blanked,
     refit,

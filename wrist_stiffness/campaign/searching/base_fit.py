@@ -6,7 +6,7 @@ fit repeats Gauss-Newton steps on the model itself, and only what is left is tak
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -46,13 +46,11 @@ SMALLEST_STEP = 1.0 / 16.0
 WANDER = np.repeat([0.5e-6, 5e-6], 3)
 """Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
 
-Tell = Callable[[str], None]
+LOOSE = frozenset(("joint_clearance",))
+"""Laws with gaps of their own: slopes about no play say next to nothing, and beside play each slope
+of the base is a search for where the pins rest."""
 
 MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
-
-
-def silent(text: str) -> None:
-    """Tell nobody."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,9 +264,9 @@ def fit_base(
     added = {effect.name: effect for effect in extras}
     usual = {each.effect.name for each in free}
     # Those on top of the base follow it, and play comes last.
-    ordered = sorted(added.values(), key=lambda e: (e.law.state_is_a_guess, e.name not in usual))
+    ordered = sorted(added.values(), key=lambda e: (e.law.id in LOOSE, e.name not in usual))
     more = [_about_zero(each) for each in ordered]
-    firm = len(ordered) if beside else sum(not each.law.state_is_a_guess for each in ordered)
+    firm = len(ordered) if beside else sum(each.law.id not in LOOSE for each in ordered)
     whole = model.with_effects(*held)
     if start is not None and start.bare.whole is model and start.bare.sessions is sessions:
         alone = start.bare
@@ -306,34 +304,6 @@ def fit_base(
     cost = _cost(problem.whiten(residual), z, weights, 1.0)
     columns = _columns(problem, bare, z)
     return BaseFit(problem, z, residual, columns, tuple(added), cost, alone)
-
-
-@dataclass(frozen=True)
-class Fitter:
-    """Fits the base of a model, alone or along with effects, and says so.
-
-    Parameters
-    ----------
-    model : ErrorModel
-        What is known of the wrist.
-    tell : callable, optional
-        Told what is being done.
-    """
-
-    model: ErrorModel
-    tell: Tell = silent
-
-    def __call__(
-        self,
-        sessions: tuple[UnitSession, ...],
-        extras: Sequence[Effect] = (),
-        start: BaseFit | None = None,
-        beside: bool = False,
-    ) -> BaseFit:
-        """Fit as `fit_base`."""
-        names = ", ".join(each.name for each in extras)
-        self.tell(f"fitting the wrist with {names}" if extras else "fitting the wrist as it is")
-        return fit_base(self.model, sessions, extras, start, beside)
 
 
 def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:

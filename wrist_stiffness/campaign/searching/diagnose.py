@@ -14,9 +14,10 @@ from numpy.polynomial.legendre import legvander
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, as_units
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, Fitter, Tell, silent
+from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
+from wrist_stiffness.campaign.searching.fitter import Fitter, Tell, silent
 from wrist_stiffness.campaign.searching.refit import (
     refit,
     rejudged,

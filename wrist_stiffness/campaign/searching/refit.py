@@ -14,9 +14,10 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.result import FAR
 from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, Fitter
+from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit
 from wrist_stiffness.campaign.searching.candidates import SHARE
-from wrist_stiffness.campaign.searching.seeking import INEXACT, LOOSE
+from wrist_stiffness.campaign.searching.fitter import Fitter
+from wrist_stiffness.campaign.searching.seeking import INEXACT
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units

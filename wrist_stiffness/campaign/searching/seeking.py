@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.campaign.observing import UnitSession
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, Fitter, free_base
+from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
+from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.screening import Fitted, Screen
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -56,9 +57,6 @@ its columns there say little of what it would explain."""
 
 RUBBING = frozenset(("joint_friction", "cable_wrench"))
 """Laws that stick before they slip: tried likewise, as the base takes up what holds it."""
-
-LOOSE = frozenset(("joint_clearance",))
-"""Laws with gaps of their own: tried likewise, as slopes about no play say next to nothing."""
 
 MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
