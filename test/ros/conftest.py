@@ -43,7 +43,7 @@ class Graph:
         for node in self.executor.get_nodes():
             node.destroy_node()
         self.executor.shutdown()
-        rclpy.shutdown(context=self.context)
+        rclpy.try_shutdown(context=self.context)
 
     def add(self, make_node, **parameters):
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]

@@ -125,7 +125,6 @@ def payloads(path, topic):
 
 
 def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path):
-    """On a busy machine a node may lose a few samples, but it says nothing else of the rest."""
     live, replayed = tmp_path / "live", tmp_path / "replayed"
     run_cell(seconds=3.0, record=live, rate_hz=50.0)
     counts = {topic.name: topic.count for topic in open_recording(live).topics}
@@ -134,11 +133,11 @@ def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path
         "/load_estimate",
         "/motor_commands",
         "/platform_pose_measured",
+        "/pose_error_predicted",
+        "/pose_error/s_um",
+        "/pose_error/phi_mdeg",
     ):
         assert counts[topic] == counts["/joint_states"], topic
-    assert 0.9 * counts["/joint_states"] < counts["/pose_error_predicted"]
-    for topic in ("/pose_error/s_um", "/pose_error/phi_mdeg"):
-        assert counts[topic] == counts["/pose_error_predicted"], topic
     # A corrector that is kept waiting drops old commands instead of lagging.
     assert 0.9 * counts["/motor_commands"] < counts["/motor_commands_corrected"]
     assert 0 < counts["/pose_error_residual"] < counts["/joint_states"]
@@ -152,8 +151,7 @@ def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path
     replay(live, model_path, replayed)
     before = payloads(live, "/pose_error_predicted")
     after = payloads(replayed, "/pose_error_predicted")
-    assert len(before) == counts["/pose_error_predicted"]
-    assert len(after) == counts["/joint_states"]
+    assert before.keys() == after.keys()
     differing = sum(payload != after[stamp] for stamp, payload in before.items())
     assert differing <= int(late[-1])
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import time
+from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, WrenchStamped
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -22,6 +24,7 @@ from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.conversions import (
     joint_message,
+    nanoseconds,
     pose_message_stamped,
     wrench_message,
 )
@@ -61,6 +64,17 @@ PARAMETERS = (
 SENT_QUEUE = QoSProfile(depth=1)
 """Motors follow the newest command only."""
 
+CORRECTED = "/motor_commands_corrected"
+
+ANSWERS = {
+    "/pose_error_predicted": PoseWithCovarianceStamped,
+    "/model_residual": PoseWithCovarianceStamped,
+}
+"""What the wrist's nodes say of a sample, beside the corrected command."""
+
+LONGEST_ANSWER_S = 1.0
+"""So long the last sample waits for its answers, where nobody may be there to give them."""
+
 
 class CellSimulator(Node):
     """Thin shell over `VirtualCell`; its motors follow `/motor_commands_corrected`."""
@@ -97,12 +111,19 @@ class CellSimulator(Node):
             NOTES_QOS,
         )
         self._enable = self.create_client(SetBool, "/angle_corrector/enable")
-        self.create_subscription(
-            JointState, "/motor_commands_corrected", self._on_command, SENT_QUEUE
-        )
+        self._asked_ns, self._asked_s = 0, time.monotonic()
+        self._answered = dict.fromkeys([CORRECTED, *ANSWERS], 0)
+        self.create_subscription(JointState, CORRECTED, self._on_command, SENT_QUEUE)
+        for topic, message_type in ANSWERS.items():
+            answer = partial(self._on_answer, topic)
+            self.create_subscription(message_type, topic, answer, SENT_QUEUE)
         self.create_timer(1.0 / settings.rate_hz, self._on_timer)
 
+    def _on_answer(self, topic: str, message: JointState | PoseWithCovarianceStamped) -> None:
+        self._answered[topic] = nanoseconds(message.header.stamp)
+
     def _on_command(self, message: JointState) -> None:
+        self._on_answer(CORRECTED, message)
         try:
             self._sent = MotorNames().angles(message.name, message.position)
         except WristError as error:
@@ -133,6 +154,8 @@ class CellSimulator(Node):
     def _begin(self, program: int, time_s: float) -> bool:
         """Begin a repetition of the motion; False while the corrector has not answered yet."""
         if self._programs and program >= self._programs:
+            if not self._is_answered():
+                return False
             for publisher in self.publishers:
                 publisher.wait_for_all_acked(Duration(seconds=1.0))
             raise SystemExit(0)
@@ -153,6 +176,13 @@ class CellSimulator(Node):
         self._notes.publish(String(data=json.dumps(notes)))
         return True
 
+    def _is_answered(self) -> bool:
+        """Tell whether those who are there have answered the last sample, or take too long."""
+        return time.monotonic() > self._asked_s + LONGEST_ANSWER_S or all(
+            stamp_ns >= self._asked_ns or not self.count_publishers(topic)
+            for topic, stamp_ns in self._answered.items()
+        )
+
     def _stamp_ns(self, time_s: float) -> int:
         return (self._start_ns or 0) + round(time_s * NANOSECONDS)
 
@@ -167,6 +197,7 @@ class CellSimulator(Node):
         )
         self._true.publish(pose_message_stamped(stamp_ns, sample.pose_rotation, sample.pose_shift))
         self._command.publish(joint_message(stamp_ns, "", self._names, self.cell.desired(time_s)))
+        self._asked_ns, self._asked_s = stamp_ns, time.monotonic()
 
 
 def main() -> int:

@@ -28,7 +28,7 @@ from wrist_stiffness.recording.messages import (
     Temperature,
     WrenchStamped,
 )
-from wrist_stiffness.ros.executor import DataGroup
+from wrist_stiffness.ros.executor import DataGroup, take_in_order
 from wrist_stiffness.ros.parameters import declare
 from wrist_stiffness.ros.qos import NOTES_QOS, RECORDING_QOS
 from wrist_stiffness.ros.run import run
@@ -44,6 +44,9 @@ PARAMETERS = (
 )
 
 LOOKS_PER_S = 20
+
+MOST_RUNS_AT_END = 50
+"""Of the executor: a second, for a stream that does not end."""
 
 TOPICS: dict[str, type[Message]] = {
     topics.LOAD_ESTIMATE: WrenchStamped,
@@ -114,7 +117,11 @@ class Recorder(Node):
         self._writer.write_raw(channel, payload, self.get_clock().now().nanoseconds)
 
     def destroy_node(self) -> None:
-        """Give the recording its name."""
+        """Write what has been heard but not taken yet, and give the recording its name."""
+        data = [each for each in self.subscriptions if isinstance(each.callback_group, DataGroup)]
+        for _ in range(MOST_RUNS_AT_END):
+            if not take_in_order(data):
+                break
         super().destroy_node()
         self._recording.close()
 

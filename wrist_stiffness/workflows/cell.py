@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -123,7 +123,10 @@ def _wait(
 
 @contextmanager
 def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.Popen[bytes]]]:
-    """Start nodes; end them in any case, first asked and then forced."""
+    """Start nodes; end them in any case, first asked and then forced.
+
+    The recorder ends last, so that it hears what the others say until they end.
+    """
     environment = {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_DOMAIN_ID": str(1 + os.getpid() % DOMAINS),
@@ -141,15 +144,21 @@ def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.P
             )
         yield running
     finally:
-        for process in running.values():
-            process.terminate()
-        for process in running.values():
-            try:
-                process.wait(END_PATIENCE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        recorder = [running.pop(RECORDER_NODE.name)] if RECORDER_NODE.name in running else []
+        _end(running.values())
+        _end(recorder)
         signal.signal(signal.SIGTERM, previous)
+
+
+def _end(processes: Collection[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        try:
+            process.wait(END_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def _leave(number: int, frame: FrameType | None) -> NoReturn:
