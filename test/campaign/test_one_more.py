@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_equal
 
 from wrist_stiffness.campaign.searching import seeking
 from wrist_stiffness.campaign.searching.screening import Fitted
@@ -86,7 +87,7 @@ class Wrist:
     def __init__(self):
         self.left, self.afresh, self.beside = {}, {}, {}
         self.promised = {PLAY: 0.0, CABLE: 0.0}
-        self.done, self.strained = [], set()
+        self.done, self.strained, self.unmeasured = [], set(), []
 
     def tell(self, text):
         """Nobody listens."""
@@ -100,12 +101,14 @@ class Wrist:
     def base(self, cost, extras=()):
         table = SimpleNamespace(measured=np.ones(NUMBERS, dtype=bool))
         model = SimpleNamespace(effects=())
+        residual = np.full((1, 6), float(cost))
+        residual[:, self.unmeasured] = np.nan
         return SimpleNamespace(
             cost=cost,
             extras=tuple(each.name for each in extras),
             beyond=lambda: {each.name: each for each in extras},
             problem=SimpleNamespace(table=table, sessions=(), model=model),
-            residual=np.zeros((1, 6)),
+            residual=residual,
             strain=cost,
             strained=cost in self.strained,
         )
@@ -142,7 +145,7 @@ def candidate(name, **whole):
         name=name,
         law=effect(name).law,
         effect_of=lambda values: effect(name),
-        changed_by=lambda change, strain: candidate(name, strain=strain),
+        changed_by=lambda change, strain: candidate(name, change=change, strain=strain),
         **whole,
     )
 
@@ -255,6 +258,13 @@ def test_what_tangents_led_to_stands_as_it_is_among_whole_fits(wrist):
     assert place.fits[BACKLASH] is search.quick().base
     strains = {each.name: each.strain for each in place.candidates if each.name in place.fits}
     assert strains == {BACKLASH: 300 - 1000, CABLE: 500 - 1000}
+
+
+def test_what_was_not_measured_is_changed_by_nothing(wrist):
+    """A tracker's points hold no rotation, and a column of NaN is refused."""
+    wrist.left, wrist.unmeasured = leaves(alone=1000, p=900, w=500), [0, 4]
+    changes = [each.change for each in Search(wrist, ()).thorough().candidates]
+    assert_equal([np.flatnonzero(each == 0) for each in changes], [[0, 4]] * 2)
 
 
 def test_of_two_that_tangents_led_to_each_stands_alone_among_whole_fits(wrist):
