@@ -11,7 +11,8 @@ from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Sample
-from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction, Session
+from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
+from wrist_stiffness.model.session import Session
 
 JUMP_S = 1.0
 """A stamp this much before the last one says that the clock jumped back: the memory begins anew."""

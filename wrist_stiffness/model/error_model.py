@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +21,12 @@ from wrist_stiffness.model.batch import predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
+from wrist_stiffness.model.session import Session
 from wrist_stiffness.model.situation import lengths
-from wrist_stiffness.model.stages import AtHome, Memory, constants_of, share
-
-LARGEST_TURN = 1.0
-"""Turn of the platform that no error makes, but a signal that is no temperature [rad]."""
+from wrist_stiffness.model.stages import AtHome, constants_of, share
 
 
 @dataclass(frozen=True)
@@ -189,7 +186,7 @@ class ErrorModel:
 
         def of_parameters() -> Array:
             moved = [other.predict(theta, load, active).twist for other in self.variations]
-            return self._spread(twist, moved)
+            return self.parameter_covariance(twist, moved)
 
         sensor = added.sensor(configuration)
         return Prediction(
@@ -207,8 +204,21 @@ class ErrorModel:
         """Whether no sample depends on another, nor an effect on what others do."""
         return not (self.changing if self.evaluation == "closed_form" else self.effects)
 
-    def _spread(self, twist: Array, moved: Sequence[Array]) -> Array:
-        """Covariance (6, 6) from the parameters: those fitted together, and the variations."""
+    def parameter_covariance(self, twist: Array, moved: Sequence[Array]) -> Array:
+        """Covariance from the parameters: those fitted together, and the variations.
+
+        Parameters
+        ----------
+        twist : (6,) float
+            Predicted [m, rad].
+        moved : sequence of (6,) float
+            The same as each of `variations` predicts it [m, rad].
+
+        Returns
+        -------
+        (6, 6) float
+            Translation first, in F.
+        """
         covariance = np.zeros((6, 6)) if self.joint is None else self.joint.covariance
         for other in moved:
             covariance += np.outer(other - twist, other - twist)
@@ -295,118 +305,4 @@ class ErrorModel:
         return covariance
 
 
-class Session:
-    """A model with the memory of a stream of samples.
-
-    Each uncertain parameter has a memory of its own, moved by one standard uncertainty: so the
-    covariance knows the history.  Models without uncertainties cost one evaluation a sample.
-
-    Parameters
-    ----------
-    model : ErrorModel
-        Predicts.
-    """
-
-    def __init__(self, model: ErrorModel) -> None:
-        self.model = model
-        self._memory: Memory | None = None
-        self._others: list[Memory] | None = None
-
-    def advance(self, sample: Sample) -> Prediction:
-        """Predict one sample and remember it.
-
-        Parameters
-        ----------
-        sample : Sample
-            Not earlier than the one before.
-
-        Returns
-        -------
-        Prediction
-            Twist, covariance and contact state.
-
-        Raises
-        ------
-        WristError
-            If the sample is out of range, not finite or earlier than the one before; it is not
-            remembered.
-        """
-        prediction, self._memory, varied = self._predicted(sample)
-        if self.model.variations:
-            self._others = varied()[1]
-        return prediction
-
-    def preview(self, sample: Sample) -> Prediction:
-        """Predict what `advance` would, and forget it: to try other angles.
-
-        Parameters
-        ----------
-        sample : Sample
-            Not earlier than the last one remembered.
-
-        Returns
-        -------
-        Prediction
-            Twist, covariance and contact state.
-
-        Raises
-        ------
-        WristError
-            As in `advance`.
-        """
-        return self._predicted(sample)[0]
-
-    def _predicted(
-        self, sample: Sample
-    ) -> tuple[Prediction, Memory, Callable[[], tuple[Array, list[Memory]]]]:
-        model, memory = self.model, self._memory
-        if not np.isfinite(sample.time):
-            raise InputError(f"sample: time {sample.time} is not finite")
-        if sample.theta_dot is not None and not np.isfinite(sample.theta_dot).all():
-            raise InputError(f"sample: motor speeds {sample.theta_dot} are not finite")
-        if memory is not None and sample.time < memory.time:
-            raise InputError(
-                f"sample: time {sample.time:.6f} s is before the last one, {memory.time:.6f} s"
-            )
-        if model.stateless:
-            plain = model.predict(sample.theta, sample.load, memory.active if memory else None)
-            later = Memory((), sample.time, sample.theta, plain.active)
-            return plain, later, lambda: (plain.covariance, [])
-        configuration = model.table.workspace.configuration(sample.theta)
-        model.table.check_load(sample.load.wrench)
-        pose = configuration if model.evaluation == "closed_form" else None
-        result = evaluate(model, sample.block, memory, pose)
-        twist, others = result.twist[0], self._others
-        turn = float(np.abs(twist[3:]).max())
-        if not turn < LARGEST_TURN:
-            raise InputError(
-                f"sample: the predicted error turns by {turn:.3g} rad, the limit is "
-                f"{LARGEST_TURN:g} rad: is a temperature, a covariate or a speed wrong?"
-            )
-
-        @cache
-        def varied() -> tuple[Array, list[Memory]]:
-            before: list[Memory | None] = [*others] if others else [None] * len(model.variations)
-            found = evaluate_beside(model.variations, before, result)
-            covariance = model._spread(twist, [moved.twist[0] for moved in found])
-            return covariance, [moved.memory for moved in found]
-
-        left, right = result.situation.sensor
-        prediction = Prediction(
-            twist,
-            configuration,
-            result.active[0],
-            model.table_covariance,
-            (_only(left), _only(right)),
-            lambda: varied()[0],
-            warnings=result.warnings,
-        )
-        return prediction, result.memory, varied
-
-
-def _only(rows: Array | None) -> Array | None:
-    """Return the only row of (1, 6), or what is (6,) already."""
-    return None if rows is None else rows.reshape(6)
-
-
-__all__ = ["BlockPrediction", "ErrorModel", "Load", "Prediction", "Session"]
+__all__ = ["ErrorModel", "Load", "Prediction"]

@@ -1,0 +1,158 @@
+"""A model with the memory of a stream of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.model.block import Load, Sample
+from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
+from wrist_stiffness.model.prediction import Prediction
+from wrist_stiffness.model.stages import Evaluable, Memory
+
+LARGEST_TURN = 1.0
+"""Turn of the platform that no error makes, but a signal that is no temperature [rad]."""
+
+
+class Streamable(Evaluable, Protocol):
+    """What a session must know of a model."""
+
+    @property
+    def stateless(self) -> bool:
+        """Whether no sample depends on another, nor an effect on what others do."""
+
+    @property
+    def variations(self) -> Sequence[Evaluable]:
+        """The model with each uncertain parameter moved by its standard uncertainty."""
+
+    def predict(
+        self, theta: Array, load: Load, active: NDArray[np.bool_] | None = None
+    ) -> Prediction:
+        """Predict one sample, at rest and with nothing before it."""
+
+    def table_covariance(self, configuration: Configuration, twist: Array) -> Array:
+        """Covariance (6, 6) of what the table says."""
+
+    def parameter_covariance(self, twist: Array, moved: Sequence[Array]) -> Array:
+        """Covariance (6, 6) from the parameters, with the twists (6,) of the variations."""
+
+
+class Session:
+    """A model with the memory of a stream of samples.
+
+    Each uncertain parameter has a memory of its own, moved by one standard uncertainty: so the
+    covariance knows the history.  Models without uncertainties cost one evaluation a sample.
+
+    Parameters
+    ----------
+    model : Streamable
+        Predicts.
+    """
+
+    def __init__(self, model: Streamable) -> None:
+        self.model = model
+        self._memory: Memory | None = None
+        self._others: list[Memory] | None = None
+
+    def advance(self, sample: Sample) -> Prediction:
+        """Predict one sample and remember it.
+
+        Parameters
+        ----------
+        sample : Sample
+            Not earlier than the one before.
+
+        Returns
+        -------
+        Prediction
+            Twist, covariance and contact state.
+
+        Raises
+        ------
+        WristError
+            If the sample is out of range, not finite or earlier than the one before; it is not
+            remembered.
+        """
+        prediction, self._memory, varied = self._predicted(sample)
+        if self.model.variations:
+            self._others = varied()[1]
+        return prediction
+
+    def preview(self, sample: Sample) -> Prediction:
+        """Predict what `advance` would, and forget it: to try other angles.
+
+        Parameters
+        ----------
+        sample : Sample
+            Not earlier than the last one remembered.
+
+        Returns
+        -------
+        Prediction
+            Twist, covariance and contact state.
+
+        Raises
+        ------
+        WristError
+            As in `advance`.
+        """
+        return self._predicted(sample)[0]
+
+    def _predicted(
+        self, sample: Sample
+    ) -> tuple[Prediction, Memory, Callable[[], tuple[Array, list[Memory]]]]:
+        model, memory = self.model, self._memory
+        if not np.isfinite(sample.time):
+            raise InputError(f"sample: time {sample.time} is not finite")
+        if sample.theta_dot is not None and not np.isfinite(sample.theta_dot).all():
+            raise InputError(f"sample: motor speeds {sample.theta_dot} are not finite")
+        if memory is not None and sample.time < memory.time:
+            raise InputError(
+                f"sample: time {sample.time:.6f} s is before the last one, {memory.time:.6f} s"
+            )
+        if model.stateless:
+            plain = model.predict(sample.theta, sample.load, memory.active if memory else None)
+            later = Memory((), sample.time, sample.theta, plain.active)
+            return plain, later, lambda: (plain.covariance, [])
+        configuration = model.table.workspace.configuration(sample.theta)
+        model.table.check_load(sample.load.wrench)
+        pose = configuration if model.evaluation == "closed_form" else None
+        result = evaluate(model, sample.block, memory, pose)
+        twist, others = result.twist[0], self._others
+        turn = float(np.abs(twist[3:]).max())
+        if not turn < LARGEST_TURN:
+            raise InputError(
+                f"sample: the predicted error turns by {turn:.3g} rad, the limit is "
+                f"{LARGEST_TURN:g} rad: is a temperature, a covariate or a speed wrong?"
+            )
+
+        @cache
+        def varied() -> tuple[Array, list[Memory]]:
+            before: list[Memory | None] = [*others] if others else [None] * len(model.variations)
+            found = evaluate_beside(model.variations, before, result)
+            covariance = model.parameter_covariance(twist, [moved.twist[0] for moved in found])
+            return covariance, [moved.memory for moved in found]
+
+        left, right = result.situation.sensor
+        prediction = Prediction(
+            twist,
+            configuration,
+            result.active[0],
+            model.table_covariance,
+            (_only(left), _only(right)),
+            lambda: varied()[0],
+            warnings=result.warnings,
+        )
+        return prediction, result.memory, varied
+
+
+def _only(rows: Array | None) -> Array | None:
+    """Return the only row of (1, 6), or what is (6,) already."""
+    return None if rows is None else rows.reshape(6)
