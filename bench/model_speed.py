@@ -25,6 +25,9 @@ from wrist_stiffness.shipped import shipped_file
 
 REPEATS = 7
 TYPICAL = ("axis_misalignment@joint_1", "joint_clearance@joint_3", "backlash@motor_1")
+STREAM = 400
+"""Samples of the streams."""
+
 CANDIDATES = 2048
 """Samples of the comparison of all candidates."""
 
@@ -52,6 +55,18 @@ def microseconds(call: Callable[[], object]) -> float:
     return 1e6 * min(timeit.repeat(call, number=20, repeat=REPEATS)) / 20
 
 
+def streamed_microseconds(model: ErrorModel, block: Block) -> float:
+    """Return the median time of a sample of a stream that moves: what remembers must look anew."""
+    session, times = model.session(), []
+    for now in map(block.take, (slice(i, i + 1) for i in range(len(block)))):
+        warm = {name: float(value[0]) for name, value in now.temperatures.items()}
+        sample = Sample(float(now.time[0]), now.theta[0], Load(now.load[0]), temperatures=warm)
+        start = time.perf_counter()
+        session.advance(sample)
+        times.append(time.perf_counter() - start)
+    return 1e6 * float(np.median(times))
+
+
 def batch_microseconds(model: ErrorModel, block: Block) -> float:
     """Return the time of a batch per sample."""
     start = time.perf_counter()
@@ -65,11 +80,10 @@ def main(samples: int) -> None:
     typical = plain.with_effects(*map(plausible, TYPICAL))
     block = recording(samples)
     theta, load = block.theta[7], Load(block.load[7])
-    sample = Sample(0.0, theta, load, temperatures={"ambient": 21.0})
+    stream = block.take(slice(0, STREAM))
     free, _ = commissioning(plain)
     calibrated = plain.with_effects(*(plausible(each.effect.name) for each in free))
     extended = calibrated.with_effects(*calibrated.effects, plausible("backlash@motor_1"))
-    session, bare = typical.session(), plain.session()
     one = microseconds(lambda: plain.predict(theta, load))
     print(f"{'':48}{'us':>9}{'ratio':>8}")
 
@@ -77,14 +91,14 @@ def main(samples: int) -> None:
         print(f"{name:48}{value:9.1f}{value / one:8.2f}", flush=True)
 
     line("one sample without effects, predict", one)
-    line("one sample without effects, session", microseconds(lambda: bare.advance(sample)))
-    line("one sample with three effects, session", microseconds(lambda: session.advance(sample)))
     for name, model in (
+        ("one sample without effects", plain),
+        (f"one sample with {TYPICAL[1]}", plain.with_effects(plausible(TYPICAL[1]))),
+        ("one sample with three effects", typical),
         (f"one sample with the {len(free)} of a calibration", calibrated),
         ("the same and backlash", extended),
     ):
-        own = model.session()
-        line(f"{name}, session", microseconds(lambda own=own: own.advance(sample)))
+        line(f"{name}, session", streamed_microseconds(model, stream))
     line(f"recording of {samples}, per sample", batch_microseconds(plain, block))
     line("the same with three effects", batch_microseconds(typical, block))
     few = block.take(slice(0, CANDIDATES))
