@@ -85,6 +85,7 @@ class LawCell(VirtualCell):
 
     def __init__(self, table: Table, settings: CellSettings, law: Law) -> None:
         super().__init__(table, settings, np.random.default_rng(0))
+        law.told(self.program)
         self._laws = [law, *self._laws]
         self._wrist = TrueWrist(table, self._laws)
 

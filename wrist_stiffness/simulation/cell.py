@@ -185,6 +185,8 @@ class VirtualCell:
             settings.program_seconds,
         )
         self._laws = true_laws(table, settings)
+        for law in self._laws:
+            law.told(self.program)
         self._wrist = TrueWrist(table, self._laws)
         # Laws have histories: each wrist has laws of its own.
         self._exact = ExactWrist(table, true_laws(table, settings))
@@ -281,13 +283,12 @@ class VirtualCell:
         self, time_s: Array, shaft: Array, load: Array, true: TrueState
     ) -> tuple[Array, Array, Array, Array]:
         """Return what error-free noise-free sensors with the hidden laws say."""
-        encoder, wrench = self._drive.read(shaft), load
-        rotation, shift = true.rotation, true.shift
+        wrench, rotation, shift = load, true.rotation, true.shift
         for law in self._laws:
-            encoder = law.read_angles(time_s, encoder)
+            shaft = law.read_shaft(time_s, shaft)
             wrench = law.read_load(true.block, wrench)
             rotation, shift = law.read_pose(true.block, rotation, shift)
-        return encoder, wrench, rotation, shift
+        return self._drive.read(shaft), wrench, rotation, shift
 
     def _stop_at_ends(self, sent: Array) -> None:
         limits = self.table.geometry.limits

@@ -324,7 +324,7 @@ def drift(d: Draw) -> Law:
 
 def time_delay(d: Draw) -> Law:
     """Return a late stamp."""
-    return TimeDelay(d.component, d.magnitude)
+    return TimeDelay(d.component, d.magnitude, d.table.mechanism)
 
 
 def resonance(d: Draw) -> Law:

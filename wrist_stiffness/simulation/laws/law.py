@@ -12,6 +12,7 @@ from wrist_stiffness.simulation.block import Block
 
 if TYPE_CHECKING:
     from wrist_stiffness.simulation.equilibrium import Equilibrium
+    from wrist_stiffness.simulation.program import Program
 
 
 class Law:
@@ -30,6 +31,9 @@ class Law:
         """Return another gravity (3,) in F, once before the start [m/s^2]."""
         return gravity
 
+    def told(self, program: Program) -> None:
+        """Hear what motors and load are told to do, once before the start."""
+
     def turn(self, time_s: Array, shaft: Array) -> Array:
         """Return by how much the driven links are ahead of the encoders, (n, 2) [rad]; remember."""
         return np.zeros_like(shaft)
@@ -46,9 +50,9 @@ class Law:
         """Return a twist of the whole platform, (n, 6) at O in F [m, rad]; remember."""
         return np.zeros_like(block.load)
 
-    def read_angles(self, time_s: Array, angles: Array) -> Array:
-        """Return what the encoders say instead, (n, 2) [rad]; remember."""
-        return angles
+    def read_shaft(self, time_s: Array, shaft: Array) -> Array:
+        """Return the shaft angles that the encoders count instead, (n, 2) [rad]; remember."""
+        return shaft
 
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Return what the load sensor says instead of a wrench (n, 6); remember."""
