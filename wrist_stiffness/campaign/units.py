@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 
@@ -160,7 +161,7 @@ def _changes(values: Array, first: Labels, end: Labels, level: Array, noise: Arr
 def _load_tolerance(load: Array) -> tuple[Array, Array]:
     """Return how far each component may move without changing, and its noise times a margin."""
     step = np.abs(np.diff(load, axis=0))
-    noise = 1.4826 / np.sqrt(2.0) * (np.median(step, axis=0) if len(step) else np.zeros(6))
+    noise = MAD_TO_SIGMA / np.sqrt(2.0) * (np.median(step, axis=0) if len(step) else np.zeros(6))
     level = np.repeat([np.ptp(load[:, i : i + 3], axis=0).max() for i in (0, 3)], 3)
     return LEAST_LOAD_CHANGE * level, SIGNIFICANT * noise
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
 
 WINDOW = 5
@@ -12,9 +13,6 @@ WINDOW = 5
 
 LIMIT = 15.0
 """Robust standard deviations from the median of its neighbours that make a spike."""
-
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a Gaussian over its median absolute deviation."""
 
 
 def spikes(values: Array, least: Array) -> NDArray[np.bool_]:
