@@ -15,6 +15,7 @@ from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.table_range import beyond_range
 from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
 from wrist_stiffness.diagnosis import Observations, Quantity
+from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
@@ -29,8 +30,6 @@ QUANTITIES = (
 
 LOST = 8.0
 """Robust standard deviations from its dwell's median at which one measurement is a lost beam."""
-
-MAD_TO_SIGMA = 1.4826
 
 SAME_POSE_COUNTS, SAME_LOAD = 2.5, 0.02
 """Two dwells repeat one condition within so many encoder counts and this share of the load."""
@@ -72,7 +71,7 @@ class UnitSession:
     white: Array
     wander: Array
 
-    @property
+    @cached_property
     def measured(self) -> Mask:
         """Units of which anything was measured, (u,); only these are in the table."""
         seen = np.isfinite(self.shift).any(axis=1) | np.isfinite(self.turn).any(axis=1)

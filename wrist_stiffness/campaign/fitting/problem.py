@@ -321,10 +321,9 @@ class FitProblem:
 
     def rows(self, blocks: list[Array]) -> Array:
         """Put the sessions' units together and keep those of the table."""
-        measured = [
-            np.isfinite(each.shift).any(1) | np.isfinite(each.turn).any(1) for each in self.sessions
-        ]
-        return np.concatenate([block[rows] for block, rows in zip(blocks, measured, strict=True)])
+        return np.concatenate(
+            [block[each.measured] for block, each in zip(blocks, self.sessions, strict=True)]
+        )
 
     def _residuals(self, number: int, additions: Sequence[Sequence[Effect]]) -> list[Array]:
         session = self.sessions[number]
