@@ -9,7 +9,7 @@ import numpy as np
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
 from wrist_stiffness.mechanism.single_pose import GROUPS
-from wrist_stiffness.model.contribution import Contribution
+from wrist_stiffness.model.contribution import Contribution, together
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 SEATS = tuple((LIMB[names[0]], BODIES.index(BODY[names[0]])) for names in GROUPS)
@@ -63,11 +63,11 @@ class Constants:
     def __add__(self, other: Constants) -> Constants:
         """Return both together."""
         return Constants(
-            _sum(self.screws, other.screws),
-            _sum(self.wrench, other.wrench),
-            _sum(self.gap, other.gap),
-            _sum(self.sensor_left, other.sensor_left),
-            _sum(self.sensor_right, other.sensor_right),
+            together(self.screws, other.screws),
+            together(self.wrench, other.wrench),
+            together(self.gap, other.gap),
+            together(self.sensor_left, other.sensor_left),
+            together(self.sensor_right, other.sensor_right),
             self.warnings + other.warnings,
         )
 
@@ -88,12 +88,6 @@ class Constants:
             wrench=_each(self.wrench, n),
             gap=_each(self.gap, n),
         )
-
-
-def _sum(known: Array | None, added: Array | None) -> Array | None:
-    if known is None or added is None:
-        return added if known is None else known
-    return known + added
 
 
 def _each(value: Array | None, n: int) -> Array | None:

@@ -42,7 +42,7 @@ class Contribution:
     def __add__(self, other: Contribution) -> Contribution:
         """Return both together; to first order they do not know of each other."""
         return Contribution(
-            *(_added(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+            *(together(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
         )
 
     def check(self, samples: int, sectors: int) -> None:
@@ -62,7 +62,8 @@ class Contribution:
                 raise InputError(f"{name} is not finite")
 
 
-def _added(a: Array | None, b: Array | None) -> Array | None:
+def together(a: Array | None, b: Array | None) -> Array | None:
+    """Return the sum of two arrays of which either may be None for nothing."""
     if a is None or b is None:
         return b if a is None else a
     return a + b

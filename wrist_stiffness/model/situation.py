@@ -19,7 +19,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.contacts import Held, forces_of, solve_contacts
-from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
+from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError, together
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 _TURNING = {"joint_2": ("link_1", "platform"), "joint_3": ("link_3", "platform")}
@@ -116,7 +116,7 @@ class Situation:
     def sensor(self) -> tuple[Array | None, Array | None]:
         """X and Y of the pose sensor with all that earlier stages added, (n, 6) or (6,) in F."""
         left, right = self.constants.sensor(self.configuration)
-        return _sum(left, self.given.sensor_left), _sum(right, self.given.sensor_right)
+        return together(left, self.given.sensor_left), together(right, self.given.sensor_right)
 
     def temperature(self, name: str) -> Array:
         """Return the temperature of a component or of `ambient` above reference, (n,) [K]."""
@@ -349,12 +349,6 @@ def _halves(matrix: Array, six: Array) -> Array:
     """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
     halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
     return halves.reshape(six.shape)
-
-
-def _sum(first: Array | None, second: Array | None) -> Array | None:
-    if first is None or second is None:
-        return second if first is None else first
-    return first + second
 
 
 def _difference(first: Array | None, second: Array | None) -> Array | None:
