@@ -25,8 +25,12 @@ TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.residual
 
 PACKAGE = Path(wrist_stiffness.__file__).parent
 
+READING = "wrist_stiffness.campaign.reading.session"
+"""Module that reads a session."""
+
 OWN = (
     "wrist_stiffness.campaign.searching.diagnose",
+    READING,
     # The registry finds the laws by their files, no import names them.
     *(f"wrist_stiffness.model.effects.{p.stem}" for p in (PACKAGE / "model/effects").glob("*.py")),
 )

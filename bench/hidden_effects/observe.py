@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from zlib import crc32
 
 import numpy as np
@@ -13,6 +13,11 @@ from registered import Registration, difference, register
 from units import last_sense, lost_samples, unit_labels, unit_means
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.reading.machine_signals import MachineSignals
+from wrist_stiffness.campaign.reading.pose_track import PoseTrack
+from wrist_stiffness.campaign.reading.session import session_of
+from wrist_stiffness.campaign.reading.signals import Signal
+from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
@@ -70,7 +75,7 @@ class Day:
     Parameters
     ----------
     recorded : MeasuredSession
-        What a recording would hold.
+        What a recording would hold, lost beams too; a row for each sample.
     units : Session
         The same as one table.
     base : BasePose
@@ -86,6 +91,11 @@ class Day:
     base: BasePose
     registration: Registration
     labels: np.ndarray
+
+    @cached_property
+    def read(self) -> MeasuredSession:
+        """What a user has of the session: `recorded` as a recording is read."""
+        return as_read(self.recorded)
 
     def explained(self, rotation: Array, shift: Array) -> Array:
         """Return what predicted poses (n, 3, 3), (n, 3) in F explain of the residual, (u, 6)."""
@@ -240,6 +250,30 @@ def measured_session(case: Case, session: int, sample: CellSample) -> MeasuredSe
         np.diag(white**2),
         {"pose_sensor": case.instrument, "session": name, "load_source": "ft"},
     )
+
+
+def as_read(recorded: MeasuredSession) -> MeasuredSession:
+    """Return a session as the product's own reading of its recording gives it.
+
+    Raises
+    ------
+    InputError
+        If reading refuses it.
+    """
+    block = recorded.block
+    time_ns = np.round(block.time * NANOSECONDS).astype(np.int64)
+    # A thermometer tells its newest value once a second: the same is held in between.
+    slow = {name: Signal(time_ns, values) for name, values in block.temperatures.items()}
+    machine = MachineSignals(
+        Signal(time_ns, block.theta), None, Signal(time_ns, block.load), False, slow, {}
+    )
+    # Of a sample without any reading there is no message.
+    told = recorded.measured.any(axis=1)
+    track = PoseTrack(
+        time_ns[told], recorded.shift[told], recorded.rotation[told], recorded.covariance
+    )
+    session = session_of(recorded.name, machine, track, wrist())
+    return replace(session, notes=recorded.notes)
 
 
 def observe(

@@ -31,11 +31,11 @@ def version_of_own() -> str:
 
 
 def own_diagnosis(riddle: Riddle, words: Dictionary | None = None) -> Answer:
-    """Diagnose the first day as it was recorded; the refitted wrist with the findings predicts.
+    """Diagnose the first day as it is read; the refitted wrist with the findings predicts.
 
-    The session holds what a recording holds.  No word of the simulation is looked at.
+    The session holds what reading a recording gives.  No word of the simulation is looked at.
     """
-    return diagnosed(riddle, riddle.days[0].recorded)
+    return diagnosed(riddle, riddle.days[0].read)
 
 
 def own_diagnosis_mcap(riddle: Riddle, words: Dictionary | None = None) -> Answer:
@@ -83,7 +83,7 @@ def refitted(base: BaseFit, named: Sequence[Effect] = ()) -> list[Effect]:
 def calibrated(days: tuple[Day, Day]) -> tuple[Array, Array]:
     """Return what the project's refitted wrist explains of both days, fitted to the first."""
     model = ErrorModel("benchmark", wrist(), "closed_form")
-    base = fit_base(model, (as_units(model, days[0].recorded),))
+    base = fit_base(model, (as_units(model, days[0].read),))
     extended = model.with_effects(*refitted(base))
     one, two = (predicted(extended, day) for day in days)
     return one, two

@@ -32,7 +32,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from bench_wrist import OWN, TRUTH, code_version
+from bench_wrist import OWN, READING, TRUTH, code_version
 from cases import Case, full_cases, quick_cases, stage_of
 from ceiling import knows_the_laws
 from diagnosis_core import diagnosis_core
@@ -96,12 +96,11 @@ def version_of(solver: str) -> str:
         "own_diagnosis": OWN,
         "own_diagnosis_mcap": (
             *OWN,
-            "wrist_stiffness.campaign.reading.session",
             "wrist_stiffness.workflows.simulate",
         ),
     }.get(solver, ())
-    # The project's calibration is in the floor of every score.
-    modules = (*modules, "wrist_stiffness.campaign.searching.base_fit")
+    # The project's calibration of what is read is in the floor of every score.
+    modules = (*modules, "wrist_stiffness.campaign.searching.base_fit", READING)
     return code_version((*TRUTH, *modules), (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 

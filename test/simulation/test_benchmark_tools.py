@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, kstest
 
+from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.residual import BasePose
+from wrist_stiffness.workflows.simulate import simulate_recording
 
 BENCH = Path(__file__).parents[2] / "bench" / "hidden_effects"
 
@@ -98,6 +100,90 @@ def test_cases_have_names_of_their_own_and_cover_the_catalogue(bench):
     assert all(case.main and case.kind in ("single", "double") for case in asked)
     stages = [bench("cases").stage_of(case) for case in cases]
     assert stages == sorted(stages)
+
+
+ROUNDING = 1e-12
+"""Of quaternions in a recording, and of stamps since 1970 [-]."""
+
+
+@pytest.fixture
+def half_a_minute(bench):
+    """Return a function that makes a case of 30 s in which nothing hides."""
+    cases = bench("cases")
+
+    class Short(cases.Case):
+        seconds = 30.0
+
+    return lambda **how: Short((), 0.0, **how)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"lost_beams": 0.05},
+        {"lost_beams": 0.05, "instrument": "tracker"},
+        {"lost_beams": 0.05, "sees": "points"},
+        {"instrument": "cmm"},
+    ],
+    ids=["interferometer", "tracker", "points", "at rests"],
+)
+def test_the_own_diagnosis_gets_what_reading_the_recording_gives(
+    how, bench, half_a_minute, tmp_path
+):
+    observe, case = bench("observe"), half_a_minute(**how)
+    day = observe.observe(case, (), 0)
+    path, table = tmp_path / "day.mcap", bench("bench_wrist").wrist()
+    settings, seed = observe.settings_of(case, 0), observe.noise_seed(case, 0)
+    simulate_recording(path, table, settings, case.seconds, seed)
+    read, wanted = day.read, read_session(path, table)
+    assert len(read) < len(day.recorded)  # rows without a pose tell nothing new
+    assert (read.name, read.notes) == (day.recorded.name, day.recorded.notes)
+    assert read.remarks == wanted.remarks
+    assert any("spikes: left out" in remark for remark in read.remarks) == ("lost_beams" in how)
+    assert np.array_equal(read.measured, wanted.measured)
+    for found, right in (
+        (read.shift, wanted.shift),
+        (read.rotation, wanted.rotation),
+        (read.block.theta, wanted.block.theta),
+        (read.block.load, wanted.block.load),
+        *((read.block.temperatures[name], v) for name, v in wanted.block.temperatures.items()),
+    ):
+        np.testing.assert_allclose(found, right, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(
+        read.block.time - read.block.time[0], wanted.block.time - wanted.block.time[0], atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("sees", ["pose", "points", "pointing"])
+def test_a_session_without_lost_beams_is_read_as_it_was_recorded(sees, bench, half_a_minute):
+    day = bench("observe").observe(half_a_minute(sees=sees), (), 0)
+    read, recorded = day.read, day.recorded
+    assert read.remarks == ()
+    for name in ("shift", "rotation", "covariance"):
+        assert np.array_equal(getattr(read, name), getattr(recorded, name), equal_nan=True)
+    for name in ("time", "theta", "load"):
+        assert np.array_equal(getattr(read.block, name), getattr(recorded.block, name))
+    for name, values in recorded.block.temperatures.items():
+        assert np.array_equal(read.block.temperatures[name], values)
+
+
+def test_the_own_diagnosis_is_asked_about_what_was_read(bench, half_a_minute, monkeypatch):
+    own, observe = bench("own_diagnosis"), bench("observe")
+    riddle = observe.pose_riddle(half_a_minute(lost_beams=0.05))
+    monkeypatch.setattr(own, "diagnosed", lambda riddle, session: session)
+    assert own.own_diagnosis(riddle) is riddle.days[0].read
+
+
+@pytest.mark.parametrize("solver", ["own_diagnosis", "own_diagnosis_mcap", "always_none"])
+def test_another_reading_or_delay_makes_old_answers_stale(solver, bench, monkeypatch):
+    run, tools = bench("run"), bench("bench_wrist")
+    asked = []
+    monkeypatch.setattr(run, "code_version", lambda modules, files: asked.append((modules, files)))
+    run.version_of(solver)
+    [(modules, files)] = asked
+    sources = {path.relative_to(tools.PACKAGE).as_posix() for path in tools._sources(modules)}
+    assert {"campaign/reading/spikes.py", "simulation/laws/time_delay.py"} <= sources
+    assert {"observe.py", "own_diagnosis.py"} <= set(files)
 
 
 @pytest.fixture

@@ -138,7 +138,7 @@ def read_session(
         machine = machine_signals(samples, known.frames)
         markers = table.geometry.platform.readout_points
         track = pose_track(samples, markers, known.frames)
-        session = _session(recording.path.name, machine, track, table, load_age_limit_s)
+        session = session_of(recording.path.name, machine, track, table, load_age_limit_s)
     except (FrameError, InputError, RecordingError) as error:
         hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
@@ -149,9 +149,38 @@ def read_session(
     return replace(session, notes=notes, remarks=said)
 
 
-def _session(
-    name: str, machine: MachineSignals, track: PoseTrack, table: Table, load_age_limit_s: float
+def session_of(
+    name: str,
+    machine: MachineSignals,
+    track: PoseTrack,
+    table: Table,
+    load_age_limit_s: float = StreamSettings.load_age_limit_s,
 ) -> MeasuredSession:
+    """Put the signals of a recording together: clocks, spikes, the way between poses.
+
+    Parameters
+    ----------
+    name : str
+        Of the session.
+    machine : MachineSignals
+        Angles, loads and what is slow.
+    track : PoseTrack
+        Measured poses in F.
+    table, load_age_limit_s
+        As in `read_session`.
+
+    Returns
+    -------
+    MeasuredSession
+        With remarks on everything that could not be used, and no notes.
+
+    Raises
+    ------
+    RecordingError
+        If the clocks do not overlap.
+    InputError
+        If too few poses are left, or they are those of another wrist.
+    """
     remarks = list(track.remarks)
     _require_overlap(machine.angles.time_ns, track.time_ns)
     offset = _offset(machine, track, table)
