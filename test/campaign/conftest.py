@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import (
     Float64,
@@ -125,6 +126,11 @@ class Campaign:
 @pytest.fixture(scope="session")
 def table():
     return load_table(shipped_file("precomputed/palmieri2015.npz"))
+
+
+@pytest.fixture(scope="session")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="session")

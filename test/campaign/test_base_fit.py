@@ -5,15 +5,8 @@ import pytest
 
 from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base, free_base
-from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
 from wrist_stiffness.simulation.cell import CellSettings
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.mark.slow

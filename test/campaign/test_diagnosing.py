@@ -9,18 +9,11 @@ import pytest
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
 RECORDINGS = Path(__file__).parents[1] / "data"
 SECONDS = 120.0
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 def measured(in_the_cell, model, hidden=(), base="wrong", seed=3):

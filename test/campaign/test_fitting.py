@@ -14,21 +14,14 @@ from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 """White scatter of a measured pose in tests with noise of their own [m, rad]."""
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 def effect(name, **values):

@@ -13,17 +13,10 @@ from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 POSES = 60
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 def session_of(model, seed):

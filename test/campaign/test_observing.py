@@ -12,18 +12,11 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 
 POSES_DEG = ((0, 0), (20, 10), (-15, 25), (20, 10))
 ADDED = np.array([3e-6, -2e-6, 5e-6, 2e-4, -1e-4, 3e-4])
 """Twist by which the platform is measured off its prediction [m, rad]."""
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture

@@ -34,8 +34,6 @@ from wrist_stiffness.campaign.planning.timeline import Pace, Visit, run_through
 from wrist_stiffness.campaign.planning.truths import after_data, as_asked
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.shipped import shipped_file
 
 LOAD = AppliedLoad(
     "push", np.array([0.3, 0.2, -1.0]), np.array([0.004, 0.0, 0.002]), np.zeros(3), True, True, 1.0
@@ -46,11 +44,6 @@ EFFECTS = {
     "drive_compliance@motor_1": {"compliance_mdeg_per_Nm": 500.0},
     "mount_compliance@motor_1": {},
 }
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")

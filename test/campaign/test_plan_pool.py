@@ -6,15 +6,8 @@ import pytest
 from wrist_stiffness.campaign.planning.loads_file import Actuator, Weight
 from wrist_stiffness.campaign.planning.pool import TILT_SHARE, draw_settings, moved_outward
 from wrist_stiffness.campaign.planning.timeline import APPROACH, straight
-from wrist_stiffness.lookup.table_file import load_table
-from wrist_stiffness.shipped import shipped_file
 
 HANDLE = np.array([0.0, 0.0, -0.018])
-
-
-@pytest.fixture(scope="module")
-def table():
-    return load_table(shipped_file("precomputed/palmieri2015.npz"))
 
 
 @pytest.fixture(scope="module")

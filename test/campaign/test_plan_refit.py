@@ -20,17 +20,10 @@ from wrist_stiffness.campaign.planning.question import SESSION, between, effect_
 from wrist_stiffness.campaign.planning.refit import Measured, fitted, rivals_alike
 from wrist_stiffness.campaign.planning.signatures import signatures
 from wrist_stiffness.campaign.planning.timeline import Pace, Visit, run_through
-from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.shipped import shipped_file
 
 PACE = Pace(np.radians(30.0), 2.0, False)
 HEAVY = {"mass_g": 150.0, "x_mm": -12.0, "y_mm": 6.0, "z_mm": -25.0}
 """Five times what would not surprise, and a moment that is no linear function of its values."""
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,8 @@ from wrist_stiffness.campaign.planning.timeline import PEAK, Pace
 from wrist_stiffness.errors import InputError, LoadRangeError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.backlash import Backlash
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 
 WEIGHT = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
 GRIPPER = Actuator(
@@ -29,11 +27,6 @@ GRIPPER = Actuator(
     1.0,
 )
 SPEED = np.radians(30.0)
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(autouse=True)

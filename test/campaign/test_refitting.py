@@ -21,20 +21,13 @@ from wrist_stiffness.campaign.searching.refit import (
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
 SHARE = 0.25
 WIDTH_RAD = 2e-3
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 def measured(in_the_cell, model, *hidden, session=0):

@@ -13,9 +13,7 @@ from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_ca
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.seeking import Reached, point_of
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
@@ -28,11 +26,6 @@ HIDDEN = (
 )
 WIDTH_MDEG = 1e3 * np.degrees(WIDTH)
 PRICE = 7.0
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")

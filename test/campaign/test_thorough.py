@@ -20,19 +20,12 @@ from wrist_stiffness.campaign.searching.seeking import point_of
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.result import Finding, Unexplained
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
 AXIS = "axis_misalignment@joint_4"
 HIDDEN = HiddenEffect("axis_misalignment", "joint_4", "plain", 6e-5, 7)
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")

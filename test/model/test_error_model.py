@@ -14,15 +14,8 @@ from wrist_stiffness.errors import (
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.error_model import Load
-from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.shipped import shipped_file
 
 POSE = np.radians([20.0, -10.0])
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 def load(*wrench, on_platform=False):
