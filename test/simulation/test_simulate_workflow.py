@@ -73,6 +73,7 @@ def test_command_writes_a_recording_and_its_result(wrist, tmp_path, capsys):
         (["--seconds", "nan"], "nan s is not"),
         (["--rate", "6000"], "6000 Hz is not more than 0 and at most 5000 Hz"),
         (["--rate", "1", "--seconds", "0.5"], "less than one sample"),
+        (["--seed", "-1", "--day", "2"], "seed -1 is negative"),
         (["--sees", "colours"], "'colours', which is not one of pose, points, pointing"),
         (["--lost-beams", "0.9"], "0.9 is not in 0 to 0.5"),
     ],

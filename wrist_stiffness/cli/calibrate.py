@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 from wrist_stiffness.errors import InputError
 
 DESCRIPTION = """\
 Commissioning. Fit what differs from session to session (registration of the pose sensor, its target
 on the platform, encoder zeros, the load sensor's tare) and from wrist to wrist (axes, flange gaps,
-stiffness of links and bushings) to recordings with measured poses, each within what is usual, and
-write the model as it holds for the newest recording. Without this step a comparison with
-measurements shows little but the registration."""
+stiffness of links and bushings, the load sensor's scale) to recordings with measured poses, each
+within what is usual, and write the model as it holds for the newest recording. Without this step a
+comparison with measurements shows little but the registration."""
 
 EPILOG = """\
 examples:
@@ -98,4 +98,4 @@ def _run(arguments: argparse.Namespace) -> int:
     print(f"\nwritten: {arguments.output}")
     if arguments.json:
         write_json(arguments.json, found.as_values())
-    return 0
+    return EXIT_DONE

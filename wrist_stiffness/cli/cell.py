@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 
 DESCRIPTION = """\
 Start pose_error_predictor, angle_corrector and a virtual wrist as ROS 2 nodes on this machine.
@@ -59,4 +59,4 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     if arguments.record is not None:
         print(f"written: {arguments.record}")
-    return 0
+    return EXIT_DONE

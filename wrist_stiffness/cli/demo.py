@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from wrist_stiffness.cli.parser import EXIT_BAD_INPUT, PROG
+from wrist_stiffness.cli.parser import EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO, PROG
 from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import WristError
 
@@ -72,7 +72,7 @@ def _run(output: str, seconds: float) -> int:
     for picture in result.pictures:
         print(f"written: {picture}")
     agreed = live.unexplained == 0 and live.equal > 0
-    return 0 if agreed else 1
+    return EXIT_DONE if agreed else EXIT_NO
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 
 DESCRIPTION = """\
@@ -67,4 +67,4 @@ def _run(arguments: argparse.Namespace) -> int:
         write_page(arguments.report, found.report())
     if arguments.json:
         write_json(arguments.json, found.as_values())
-    return 0
+    return EXIT_DONE

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser, named_numbers
 from wrist_stiffness.cli.pose_options import add_pose_options, whole_load
 
 DESCRIPTION = """\
@@ -73,8 +72,8 @@ def _run(arguments: argparse.Namespace) -> int:
         np.radians(arguments.angles).tolist(),
         Load(load, arguments.on_platform),
         measured,
-        _named(arguments.temperature, "--temperature"),
-        _named(arguments.covariate, "--covariate"),
+        named_numbers(arguments.temperature, "--temperature"),
+        named_numbers(arguments.covariate, "--covariate"),
     )
     values = explanation.as_values()
     print(f"{'':34}{'s [um]':>9}          {'phi [mdeg]':>12}")
@@ -92,22 +91,9 @@ def _run(arguments: argparse.Namespace) -> int:
         print(f"note: {warning}")
     if arguments.json:
         write_json(arguments.json, values)
-    return 0
+    return EXIT_DONE
 
 
 def _line(name: str, s: float, s_sigma: float, phi: float, phi_sigma: float) -> str:
     spread = [f"+-{sigma:7.3f}" if sigma else " " * 9 for sigma in (s_sigma, phi_sigma)]
     return f"{name:34}{s:9.3f} {spread[0]} {phi:11.3f} {spread[1]}"
-
-
-def _named(texts: Sequence[str], option: str) -> dict[str, float]:
-    from wrist_stiffness.errors import InputError
-
-    values = {}
-    for text in texts:
-        name, _, number = text.partition("=")
-        try:
-            values[name] = float(number)
-        except ValueError as error:
-            raise InputError(f"{option} {text}: write NAME=NUMBER") from error
-    return values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 
 DESCRIPTION = """\
@@ -64,4 +64,4 @@ def _run(arguments: argparse.Namespace) -> int:
             arguments.json,
             {"table": str(exported.path), "rows": exported.rows, "remarks": exported.remarks},
         )
-    return 0
+    return EXIT_DONE

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.calibrate import add_fit_options, require_new_model
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser, named_numbers
 from wrist_stiffness.cli.recording_options import recordings_named
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def _run(arguments: argparse.Namespace) -> int:
     print(f"\nwritten: {arguments.output}")
     if arguments.json:
         write_json(arguments.json, found.as_values())
-    return 0
+    return EXIT_DONE
 
 
 def _addition(arguments: argparse.Namespace) -> Addition:
@@ -110,12 +110,6 @@ def _addition(arguments: argparse.Namespace) -> Addition:
         return FileEffect(arguments.effect_file)
     if arguments.component is None or arguments.direction is None:
         raise InputError("--formula needs --component and --direction")
-    start = {}
-    for text in arguments.start:
-        name, _, number = text.partition("=")
-        try:
-            start[name] = float(number)
-        except ValueError as error:
-            raise InputError(f"--start {text}: write PARAMETER=NUMBER") from error
+    start = named_numbers(arguments.start, "--start")
     direction = direction_of(arguments.direction)
     return FormulaEffect(arguments.name, arguments.component, direction, arguments.formula, start)

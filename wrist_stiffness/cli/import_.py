@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 
 DESCRIPTION = """\
 Make a recording of a table, as a campaign with a CMM, a tracker or dial gauges ends in. Every
@@ -83,4 +83,4 @@ def _run(arguments: argparse.Namespace) -> int:
                 "covariates": imported.covariates,
             },
         )
-    return 0
+    return EXIT_DONE

@@ -139,7 +139,7 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     Raises
     ------
     SystemExit
-        From argparse: 0 after `--help` and `--version`, 2 on wrong use.
+        From argparse: 0 after `--help` and `--version`, 2 on wrong use; 143 after SIGTERM.
     """
     arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
     try:

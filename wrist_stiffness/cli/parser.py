@@ -2,7 +2,10 @@
 
 import argparse
 import re
+from collections.abc import Iterable
 from typing import Any, NoReturn
+
+from wrist_stiffness.errors import InputError
 
 PROG = "wrist-stiffness"
 
@@ -26,3 +29,21 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one line on stderr."""
         self.exit(EXIT_BAD_INPUT, f"{PROG}: error: {message} (see '{self.prog} --help')\n")
+
+
+def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
+    """Return the numbers of an option that takes NAME=NUMBER, by their names.
+
+    Raises
+    ------
+    InputError
+        If a text is no such pair.
+    """
+    values = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        try:
+            values[name] = float(number)
+        except ValueError as error:
+            raise InputError(f"{option} {text}: write NAME=NUMBER") from error
+    return values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.pose_options import add_pose_options, whole_load
 
 DESCRIPTION = """\
@@ -62,4 +62,4 @@ def _run(arguments: argparse.Namespace) -> int:
             print(f"  {name}  {100 * share:5.1f} %")
     if arguments.json:
         write_json(arguments.json, values)
-    return 0
+    return EXIT_DONE

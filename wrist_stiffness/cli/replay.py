@@ -7,11 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, settings_named
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.output_changes import TopicChanges
+    from wrist_stiffness.workflows.replay import ReplaySummary
 
 DESCRIPTION = """\
 Run the very code of the nodes over a recording and write it again with predicted pose errors and
@@ -51,8 +52,6 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    import numpy as np
-
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.recording.reader import open_recording
@@ -77,6 +76,23 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.overwrite,
         Progress("replay"),
     )
+    _print(summary)
+    print(f"written: {arguments.output}")
+    changes: tuple[TopicChanges, ...] = ()
+    if arguments.against is not None:
+        changes = output_changes(arguments.against, arguments.output)
+        print(f"against {arguments.against}:")
+        for topic in changes:
+            print(f"  {_told(topic)}")
+    if arguments.json:
+        told = {**summary.as_values(), "changes": [asdict(topic) for topic in changes]}
+        write_json(arguments.json, told)
+    return EXIT_DONE if all(topic.same for topic in changes) else EXIT_NO
+
+
+def _print(summary: ReplaySummary) -> None:
+    import numpy as np
+
     print(
         f"{summary.predictions} predictions for {summary.joint_states} joint states, "
         f"{summary.corrections} of {summary.commands} commands corrected"
@@ -94,30 +110,6 @@ def _run(arguments: argparse.Namespace) -> int:
         print(f"{count} predictions: {warning}")
     for reason, count in summary.refused.most_common():
         print(f"{count} refused, the first: {reason}")
-    print(f"written: {arguments.output}")
-    changes: tuple[TopicChanges, ...] = ()
-    if arguments.against is not None:
-        changes = output_changes(arguments.against, arguments.output)
-        print(f"against {arguments.against}:")
-        for topic in changes:
-            print(f"  {_told(topic)}")
-    if arguments.json:
-        write_json(
-            arguments.json,
-            {
-                "joint_states": summary.joint_states,
-                "predictions": summary.predictions,
-                "commands": summary.commands,
-                "corrections": summary.corrections,
-                "trajectories": summary.trajectories,
-                "corrected_trajectories": summary.corrected_trajectories,
-                "warnings": dict(summary.warnings),
-                "refused": dict(summary.refused),
-                "damage": summary.damage,
-                "changes": [asdict(topic) for topic in changes],
-            },
-        )
-    return 0 if all(topic.same for topic in changes) else 1
 
 
 def _told(topic: TopicChanges) -> str:

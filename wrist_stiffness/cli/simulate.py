@@ -125,18 +125,18 @@ def _run(arguments: argparse.Namespace) -> int:
             "--size belongs to --effect: --blind draws its own, and without either "
             "nothing is hidden"
         )
-    check_bounds(arguments.seconds, arguments.rate)
+    check_bounds(arguments.seconds, arguments.rate, arguments.seed)
     table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
     settings = CellSettings(
         rate_hz=arguments.rate,
         program_seconds=arguments.seconds,
-        program_seed=max(arguments.seed, 0),
+        program_seed=arguments.seed,
         experiment=arguments.experiment,
         instrument=arguments.instrument,
         sees=arguments.sees,
         lost_beams=arguments.lost_beams,
         base=arguments.base,
-        base_seed=max(arguments.seed, 0),
+        base_seed=arguments.seed,
     )
     if arguments.reveal is not None:
         return _reveal(arguments, table, settings)

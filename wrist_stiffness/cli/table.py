@@ -6,7 +6,8 @@ import argparse
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.parser import OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
+from wrist_stiffness.cli.pose_options import whole_load
 
 if TYPE_CHECKING:
     from wrist_stiffness.lookup.table import Table
@@ -150,7 +151,7 @@ def _build(arguments: argparse.Namespace) -> int:
     print(f"written: {arguments.output} (checksum {built.checksum[:12]})")
     if arguments.json:
         write_json(arguments.json, asdict(built.header) | {"checksum": built.checksum})
-    return 0
+    return EXIT_DONE
 
 
 def _check(arguments: argparse.Namespace) -> int:
@@ -170,11 +171,10 @@ def _check(arguments: argparse.Namespace) -> int:
             arguments.json,
             {"passed": passed, "findings": [asdict(finding) for finding in findings]},
         )
-    return 0 if passed else 1
+    return EXIT_DONE if passed else EXIT_NO
 
 
 def _show(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows import table
@@ -184,9 +184,7 @@ def _show(arguments: argparse.Namespace) -> int:
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
     shown, push = load_table(path), None
     if arguments.load is not None:
-        if len(arguments.load) not in (3, 6):
-            raise InputError(f"--load takes 3 or 6 numbers, not {len(arguments.load)}")
-        push = Push.of_millimetres(arguments.load, arguments.at)
+        push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
     pictures = table.draw_maps(shown, arguments.output, push)
     _print_facts(shown)
     summary = table.summarise(shown)
@@ -203,7 +201,7 @@ def _show(arguments: argparse.Namespace) -> int:
         print(f"written: {picture}")
     if arguments.json:
         write_json(arguments.json, asdict(summary))
-    return 0
+    return EXIT_DONE
 
 
 def _print_facts(shown: Table) -> None:

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -131,6 +132,20 @@ class ReplaySummary:
         """Count a message of a topic that gave no result."""
         text = f"{topic}: {reason}"
         self.refused[self._first_of_kind.setdefault(NUMBER.sub("#", text), text)] += 1
+
+    def as_values(self) -> dict[str, Any]:
+        """Return the counts and reasons as programs read them."""
+        return {
+            "joint_states": self.joint_states,
+            "predictions": self.predictions,
+            "commands": self.commands,
+            "corrections": self.corrections,
+            "trajectories": self.trajectories,
+            "corrected_trajectories": self.corrected_trajectories,
+            "warnings": dict(self.warnings),
+            "refused": dict(self.refused),
+            "damage": self.damage,
+        }
 
 
 def replay(

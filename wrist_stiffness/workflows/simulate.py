@@ -117,9 +117,7 @@ def simulate_recording(
     RecordingError
         If the recording exists or cannot be written.
     """
-    check_bounds(seconds, settings.rate_hz)
-    if seed < 0:
-        raise InputError(f"simulate: seed {seed} is negative")
+    check_bounds(seconds, settings.rate_hz, seed)
     cell = VirtualCell(table, settings, np.random.default_rng(seed))
     total = max(1, round(seconds * settings.rate_hz))
     thermometer = max(1, round(settings.rate_hz))
@@ -142,7 +140,7 @@ def simulate_recording(
     return Simulated(Path(path), total, total / settings.rate_hz)
 
 
-def check_bounds(seconds: float, rate_hz: float) -> None:
+def check_bounds(seconds: float, rate_hz: float, seed: int) -> None:
     """Refuse what would be no recording, or never end.
 
     Raises
@@ -160,6 +158,8 @@ def check_bounds(seconds: float, rate_hz: float) -> None:
         )
     if seconds * rate_hz < 1.0:
         raise InputError(f"simulate: {seconds:g} s at {rate_hz:g} Hz are less than one sample")
+    if seed < 0:
+        raise InputError(f"simulate: seed {seed} is negative")
 
 
 def hide(
