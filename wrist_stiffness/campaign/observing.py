@@ -176,7 +176,7 @@ def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
     Raises
     ------
     InputError
-        If no unit is left, or the sessions do not measure the same wrist's signals.
+        If there is no session, nothing of one lies in the model's range, or no unit was measured.
     """
     if not sessions:
         raise InputError("no session to compare the model with")
@@ -194,6 +194,11 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     """Cut a session into units and average what was measured.
 
     Measurements outside the model's domain or load range belong to no unit.
+
+    Raises
+    ------
+    InputError
+        If none lies in it; the message names the limits.
     """
     accepted = model.accepts(session.block)
     if not accepted.any():
@@ -281,7 +286,22 @@ def _white(values: Array, label: Labels, parts: Cut, stated: Array) -> Array:
 
 
 def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:
-    """Return the table of residuals of units against a prediction of them, (u, 6)."""
+    """Return the table of residuals of units against a prediction of them.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its kinematics and encoder step tell what the encoders hide.
+    sessions : tuple of UnitSession
+        In the order of time, u units together.
+    predicted : (u, 6) float
+        Pose error of the units, as the sensor would say it [m, rad].
+
+    Raises
+    ------
+    InputError
+        If no unit was measured.
+    """
     ends = np.cumsum([len(each.cut.dwell) for each in sessions])
     parts = np.split(predicted, ends[:-1])
     values = np.concatenate(

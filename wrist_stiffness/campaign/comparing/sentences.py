@@ -53,6 +53,12 @@ SLOW_SHARE = 0.1
 MOST_TWINS = 3
 """No more twins of a condition are named."""
 
+FAMILIES = 2
+"""Fast and slow conditions are asked apart, and both pay for it."""
+
+FEWEST_PER_MOTION = 6
+"""Units for each slow motion that is taken out."""
+
 
 @dataclass(frozen=True, eq=False)
 class Change:
@@ -287,10 +293,6 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
     )
 
 
-FAMILIES = 2
-"""Fast and slow conditions are asked apart, and both pay for it."""
-
-
 def _span(times: Array, sessions: Labels) -> float:
     """Time that was recorded in all sessions together [s]."""
     return sum(float(np.ptp(times[sessions == each])) for each in np.unique(sessions))
@@ -309,10 +311,6 @@ def _slow_motions(times: Array, sessions: Labels) -> Array:
             column[own] = np.cos(np.pi * order * passed / span)
             columns.append(column)
     return np.column_stack(columns) if columns else np.empty((len(times), 0))
-
-
-FEWEST_PER_MOTION = 6
-"""Units for each slow motion that is taken out."""
 
 
 def _which_are_slow(asked: Sequence[Array], constant: Array, trend: Array) -> Mask:

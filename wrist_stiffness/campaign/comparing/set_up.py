@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.observing import Observed, UnitSession
+from wrist_stiffness.diagnosis.observations import Mask
 from wrist_stiffness.diagnosis.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
@@ -126,7 +127,7 @@ def refitted_values(observed: Observed, set_ups: Sequence[SetUp]) -> Array:
     return np.asarray(left[(seen & np.isfinite(left)).any(axis=1)])
 
 
-def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: np.ndarray) -> SetUp:
+def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask) -> SetUp:
     theta = session.mean(session.block.theta)
     mechanism = model.table.mechanism
     home = mechanism.forward(theta)

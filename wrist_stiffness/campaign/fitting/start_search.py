@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.recipes import Shape, recipe
+from wrist_stiffness.campaign.fitting.recipes import Column, recipe
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -43,7 +44,7 @@ def start_values(found: Fit, effect: Effect) -> dict[str, float]:
     how = recipe(effect.law, effect.component, signals)
     best: tuple[float, dict[str, float]] = (np.inf, {})
     for shape in product(*(parameter.grid for parameter in how.shape)):
-        found_at = _factors(judge, effect, how.columns(shape), shape)
+        found_at = _factors(judge, effect, how.columns(shape))
         if found_at[0] < best[0]:
             best = found_at[0], how.start(found_at[1], shape)
     known = {parameter.key: parameter for parameter in effect.parameters}
@@ -53,9 +54,9 @@ def start_values(found: Fit, effect: Effect) -> dict[str, float]:
 
 
 def _factors(
-    judge: _Judge, effect: Effect, columns: tuple, shape: Shape
+    judge: _Judge, effect: Effect, columns: Sequence[Column]
 ) -> tuple[float, dict[str, float]]:
-    """Return the sum of squares that is left at a shape, and its linear factors."""
+    """Return half the sum of squares that is left, priors included, and the factors by name."""
     trials = [effect.with_values(column.trial) for column in columns]
     origins = [effect.with_values(column.origin) if column.origin else None for column in columns]
     changes = judge.changes([*trials, *(origin for origin in origins if origin)])
