@@ -107,7 +107,6 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.simulation.cell import CellSettings
     from wrist_stiffness.workflows.json_file import write_json
     from wrist_stiffness.workflows.simulate import (
         DAY_SEEDS,
@@ -127,17 +126,7 @@ def _run(arguments: argparse.Namespace) -> int:
         )
     check_bounds(arguments.seconds, arguments.rate, arguments.seed)
     table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
-    settings = CellSettings(
-        rate_hz=arguments.rate,
-        program_seconds=arguments.seconds,
-        program_seed=arguments.seed,
-        experiment=arguments.experiment,
-        instrument=arguments.instrument,
-        sees=arguments.sees,
-        lost_beams=arguments.lost_beams,
-        base=arguments.base,
-        base_seed=arguments.seed,
-    )
+    settings = _settings(arguments)
     if arguments.reveal is not None:
         return _reveal(arguments, table, settings)
     if arguments.output is None:
@@ -167,6 +156,23 @@ def _run(arguments: argparse.Namespace) -> int:
         )
     print(f"{written.path}: {written.samples} samples, {written.seconds:g} s")
     return EXIT_DONE
+
+
+def _settings(arguments: argparse.Namespace) -> CellSettings:
+    """Return the cell as it is asked for, without a hidden effect, on its first day."""
+    from wrist_stiffness.simulation.cell import CellSettings
+
+    return CellSettings(
+        rate_hz=arguments.rate,
+        program_seconds=arguments.seconds,
+        program_seed=arguments.seed,
+        experiment=arguments.experiment,
+        instrument=arguments.instrument,
+        sees=arguments.sees,
+        lost_beams=arguments.lost_beams,
+        base=arguments.base,
+        base_seed=arguments.seed,
+    )
 
 
 def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
