@@ -106,6 +106,24 @@ def test_constant_effects_are_the_same_together_as_one_by_one(model, make, monke
         assert set(apart.warnings) == set(found.warnings) == set(streamed[-1].warnings) != set()
 
 
+def test_a_calibrated_model_is_predicted_in_any_order(model, make):
+    """Parts, axes, bias and scale of the load: one sample says all of it."""
+    own = [place for place in PLACED if catalogue()[place[0]].constant]
+    own += [("link_stiffness", "link_2"), ("load_scale", "load_sensor")]
+    loaded, block = model.with_effects(*(plausible(*place) for place in own)), make.block(10)
+    at_once, tilted = loaded.batch(block), replace(block, load_on_platform=True)
+    on_platform = loaded.batch(tilted)
+    assert loaded.stateless
+    for row in reversed(range(len(block))):
+        for found, turned in ((at_once, False), (on_platform, True)):
+            one = loaded.predict(block.theta[row], Load(block.load[row], turned))
+            for key in ("twist", "measured"):
+                expected = getattr(found, key)
+                scale = np.abs(expected).max(axis=0)
+                assert np.all(np.abs(getattr(one, key) - expected[row]) <= 1e-12 * scale)
+    assert not loaded.with_effects(*loaded.effects, plausible("backlash", "motor_1")).stateless
+
+
 def test_preview_leaves_no_trace(model, make):
     loaded = model.with_effects(
         make.effect("backlash@motor_1", width_mdeg=(50.0, 1.0)),

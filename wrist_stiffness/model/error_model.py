@@ -103,6 +103,13 @@ class ErrorModel:
         return tuple(e for e in self.effects if not (e.law.constant or e.stage == "parts"))
 
     @cached_property
+    def _load_shares(self) -> tuple[float | None, ...]:
+        """What the changing effects add as a share of the said load, None for anything else."""
+        return tuple(
+            None if each.law.foreign else each.law.load_share(each.si) for each in self.changing
+        )
+
+    @cached_property
     def single_pose(self) -> SinglePoseStatics:
         """The closed form for one pose at a time, with the constants' screws and gaps."""
         own = self.constants
@@ -176,6 +183,8 @@ class ErrorModel:
         self.table.check_load(wrench)
         added = self.constants
         if self.evaluation == "closed_form":
+            if self._load_shares:
+                wrench = wrench * (1.0 + sum(share or 0.0 for share in self._load_shares))
             if added.wrench is not None:
                 wrench = wrench + added.wrench
             twist, _, active = self.single_pose.respond(configuration, wrench, active)
@@ -202,7 +211,9 @@ class ErrorModel:
     @cached_property
     def stateless(self) -> bool:
         """Whether no sample depends on another, nor an effect on what others do."""
-        return not (self.changing if self.evaluation == "closed_form" else self.effects)
+        if self.evaluation == "spline":
+            return not self.effects
+        return None not in self._load_shares
 
     def parameter_covariance(self, twist: Array, moved: Sequence[Array]) -> Array:
         """Covariance from the parameters: those fitted together, and the variations.

@@ -132,6 +132,10 @@ class Law(ABC):
         """Return by how much a law of the stage `parts` scales the flexibility of its part."""
         return 1.0
 
+    def load_share(self, values: Mapping[str, float]) -> float | None:
+        """Return the share of the said load that the law adds; None where it adds anything else."""
+        return None
+
 
 def require_id(name: str) -> None:
     """Refuse an id that cannot stand in NAME@COMPONENT, as arguments and reports have it.

@@ -28,4 +28,8 @@ class LoadScale(Law):
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return true minus said."""
-        return Contribution(wrench=(1.0 / (1.0 + values["scale_percent"]) - 1.0) * at.load), None
+        return Contribution(wrench=self.load_share(values) * at.load), None
+
+    def load_share(self, values: Mapping[str, float]) -> float:
+        """Return the same as a share of what is said."""
+        return 1.0 / (1.0 + values["scale_percent"]) - 1.0
