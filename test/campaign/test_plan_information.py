@@ -34,6 +34,8 @@ from wrist_stiffness.campaign.planning.timeline import Pace, Visit, run_through
 from wrist_stiffness.campaign.planning.truths import after_data, as_asked
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
 
 LOAD = AppliedLoad(
     "push", np.array([0.3, 0.2, -1.0]), np.array([0.004, 0.0, 0.002]), np.zeros(3), True, True, 1.0
@@ -44,6 +46,11 @@ EFFECTS = {
     "drive_compliance@motor_1": {"compliance_mdeg_per_Nm": 500.0},
     "mount_compliance@motor_1": {},
 }
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")
@@ -217,6 +224,15 @@ def test_more_measurements_never_harm(known):
     assert calibrated(whole, known.layout) > calibrated(part, known.layout) > 0.0
     gains = [improvement(gram, known.layout) for gram in (part, whole)]
     assert all(gains[1][name] >= gains[0][name] >= 1.0 for name in NUISANCES)
+
+
+def test_only_what_comes_on_top_of_earlier_measurements_counts(known):
+    goals = [Goal("backlash@motor_1", "drive_compliance@motor_1"), Goal("backlash@motor_1", "")]
+    part, layout = known.grams[:5].sum(axis=0), known.layout
+    on_top = discrimination(known.total, layout, goals, part)
+    whole, before = (discrimination(gram, layout, goals) for gram in (known.total, part))
+    assert on_top == pytest.approx(np.sqrt(whole**2 - before**2))
+    assert np.all(discrimination(part, layout, goals, part) == 0.0)
 
 
 def test_columns_of_a_linear_law_make_up_its_truth(model, timeline):

@@ -11,6 +11,7 @@ from wrist_stiffness.campaign.planning.information import (
     Goal,
     MeasurementNoise,
     by_truth,
+    carried_over,
     discrimination,
     information,
 )
@@ -113,8 +114,8 @@ def test_a_plan_ends_where_half_of_what_may_be_is_settled(model, noise, earlier,
     monkeypatch.setattr(pool, "POOL", 10)
     told = []
 
-    def spy(gram, layout, goals):
-        told.append(by_truth(gram, layout, goals))
+    def spy(*given):
+        told.append(by_truth(*given))
         return told[-1]
 
     monkeypatch.setattr("wrist_stiffness.campaign.planning.plan.by_truth", spy)
@@ -125,3 +126,20 @@ def test_a_plan_ends_where_half_of_what_may_be_is_settled(model, noise, earlier,
     assert found.visits
     assert all(np.mean(d >= RESOLVED) >= 0.5 for d in told[-1])
     assert any(np.mean(d >= RESOLVED) < 0.5 for d in told[-2])
+
+
+def test_what_was_asked_is_open_however_settled_it_is_reckoned(model, noise, earlier, monkeypatch):
+    """Where no law is quite right, earlier data are reckoned to tell more than they did.
+
+    Here four times as much, which would settle the question without another pose.
+    """
+    monkeypatch.setattr(pool, "POOL", 10)
+    monkeypatch.setattr(
+        "wrist_stiffness.campaign.planning.plan.carried_over",
+        lambda *given: 4.0 * carried_over(*given),
+    )
+    weight = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
+    question = asked("gravity@platform", HEAVY, "gravity@link_3")
+    found = plan(model, question, Conditions((weight,), PACE, noise, None, 0), [earlier])
+    assert {answer.goal for answer in found.answers} == set(question.goals)
+    assert len(found.visits) > 3

@@ -66,7 +66,7 @@ def choose(
     """
     chosen: list[int] = []
     total, spent = start.copy(), 0.0
-    # Who asks has not been answered by what is there, whatever a linear reckoning says of it.
+    # What every plan has may be reckoned enough; alone it is no answer to anybody's question.
     while not chosen or not enough(total):
         left = np.flatnonzero(cost_s <= budget_s - spent)
         if len(left) == 0:

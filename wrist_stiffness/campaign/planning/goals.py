@@ -10,8 +10,6 @@ from wrist_stiffness.campaign.planning.information import (
     RESOLVED,
     Goal,
     Information,
-    Layout,
-    discrimination,
 )
 from wrist_stiffness.mechanism.components import Array
 
@@ -25,18 +23,6 @@ SEEN = 3.0
 def needed(goal: Goal) -> float:
     """Return the discrimination that settles a question."""
     return RESOLVED if goal.rival else SEEN
-
-
-def refuted(gram: Array, layout: Layout, alike: Sequence[Sequence[str]]) -> set[str]:
-    """Return the members of classes that cannot make up what the first one left in the data."""
-    pairs = [
-        Goal(members[0], rival)
-        for members in alike
-        for rival in members[1:]
-        if members[0] in layout.truths and rival in layout.truths
-    ]
-    reached = discrimination(gram, layout, pairs)
-    return {pair.rival for pair, d in zip(pairs, reached, strict=True) if d >= RESOLVED}
 
 
 def all_goals(known: Information) -> tuple[Goal, ...]:

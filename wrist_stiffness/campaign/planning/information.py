@@ -249,7 +249,9 @@ def beyond_nuisances(gram: Array, layout: Layout) -> Array:
     return left
 
 
-def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
+def discrimination(
+    gram: Array, layout: Layout, goals: Sequence[Goal], before: Array | None = None
+) -> Array:
     """Return the discrimination of each goal.
 
     Parameters
@@ -260,6 +262,9 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
         Of the columns.
     goals : sequence of g Goal
         Questions.
+    before : (q, q) float, optional
+        Part of the experiments that was measured before the questions were asked; only what comes
+        on top counts.
 
     Returns
     -------
@@ -267,14 +272,30 @@ def discrimination(gram: Array, layout: Layout, goals: Sequence[Goal]) -> Array:
         d in standard deviations; over several truths, what errs as often as they do on average.
     """
     squares = np.zeros((*gram.shape[:-2], len(goals)))
-    for number, own in enumerate(by_truth(gram, layout, goals)):
+    for number, own in enumerate(by_truth(gram, layout, goals, before)):
         wrong = logsumexp(-0.125 * own**2, axis=-1) - np.log(own.shape[-1])
         squares[..., number] = np.maximum(-8.0 * wrong, 0.0)
     return np.sqrt(squares)
 
 
-def by_truth(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
-    """Return the discriminations (..., t) of each goal at each of its t truths."""
+def by_truth(
+    gram: Array, layout: Layout, goals: Sequence[Goal], before: Array | None = None
+) -> list[Array]:
+    """Return the discriminations (..., t) of each goal at each of its t truths.
+
+    What was measured `before` a question was asked has left it open, whatever is reckoned here: a
+    law that is not quite right, or a rival that bends further than its tangent, fits better than
+    it should.  Counted as an answer it would let one more pose pass for enough, again and again.
+    """
+    squares = _squares(gram, layout, goals)
+    if before is not None:
+        known = _squares(before, layout, goals)
+        squares = [np.maximum(s - k, 0.0) for s, k in zip(squares, known, strict=True)]
+    return [np.sqrt(each) for each in squares]
+
+
+def _squares(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
+    """Return the squares of the discriminations (..., t) of each goal."""
     left = beyond_nuisances(gram, layout)
     found = []
     for goal in goals:
@@ -287,7 +308,7 @@ def by_truth(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
             apart = own - np.sum(cross * np.linalg.solve(inner, cross), axis=-2)
             charge = CHARGE * (len(rival) - len(layout.columns[goal.truth]))
             own = np.minimum(apart + charge, own)
-        found.append(np.sqrt(np.maximum(own, 0.0)))
+        found.append(np.maximum(own, 0.0))
     return found
 
 

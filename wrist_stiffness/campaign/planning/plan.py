@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.campaign.planning.choice import LOOKED_AT, choose
-from wrist_stiffness.campaign.planning.goals import all_goals, nearest, needed, refuted
+from wrist_stiffness.campaign.planning.goals import all_goals, nearest, needed
 from wrist_stiffness.campaign.planning.information import (
     Goal,
     Information,
@@ -97,7 +97,7 @@ class Answer:
     goal : Goal
         The question.
     discrimination : float
-        In standard deviations.
+        Beyond what was measured before, in standard deviations.
     reachable : bool
         Whether `LONGER` times the pool with these loads could settle it.
     """
@@ -203,13 +203,11 @@ def plan(
         start += carried_over(each, (*SESSION, TARE))
     if before:
         truths = after_data(start, known.layout, question.alike, rng)
-        excluded = refuted(start, known.layout, question.alike)
-        goals = tuple(goal for goal in goals if goal.truth not in excluded)
     else:
         truths = as_asked(known, question.alike)
     grams, start, layout = truths.of(known.grams), truths.of(start), truths.layout
     total = grams.sum(axis=0)
-    best = discrimination(start + LONGER * total, layout, goals)
+    best = discrimination(start + LONGER * total, layout, goals, start)
     reachable = {goal: bool(d >= needed(goal)) for goal, d in zip(goals, best, strict=True)}
     aimed = [goal for goal in goals if reachable[goal]]
     if not aimed and not whole:
@@ -219,13 +217,13 @@ def plan(
         aimed = nearest(aimed, discrimination(total, layout, aimed))
 
     def utility(gram: Array) -> Array:
-        right = 1.0 - wrong_bound(discrimination(gram, layout, aimed)).mean(axis=-1)
+        right = 1.0 - wrong_bound(discrimination(gram, layout, aimed, start)).mean(axis=-1)
         return right + calibrated(gram, layout) if whole else right
 
     def enough(gram: Array) -> bool:
         if conditions.seconds is not None:
             return False
-        each = zip(aimed, by_truth(gram, layout, aimed), strict=True)
+        each = zip(aimed, by_truth(gram, layout, aimed, start), strict=True)
         return all(np.mean(d >= needed(goal)) >= LIKELY for goal, d in each)
 
     chosen = choose(
@@ -246,7 +244,7 @@ def plan(
         # Arranged anew without visits, it might get a longer warm-up.
         timeline = pool.arranged(visits, rng) if visits else shortest
     final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
-    reached = discrimination(start + truths.of(final.total), layout, goals)
+    reached = discrimination(start + truths.of(final.total), layout, goals, start)
     answers = [
         Answer(goal, float(d), reachable[goal]) for goal, d in zip(goals, reached, strict=True)
     ]
