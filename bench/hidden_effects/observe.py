@@ -239,12 +239,13 @@ def measured_session(case: Case, session: int, sample: CellSample) -> MeasuredSe
     time_s, name = times(case), f"day_{session + 1}"
     held = np.arange(len(time_s)) // round(RATE_HZ) * round(RATE_HZ)
     shown = THERMOMETER_STEP_K * np.round(sample.temperature / THERMOMETER_STEP_K)
-    temperatures = dict(zip(SENSED, shown[held].T, strict=True))
+    slow = dict(zip(SENSED, shown[held].T, strict=True))
+    cell = VirtualCell(wrist(), settings_of(case, session), np.random.default_rng(0))
     pose = instrument(case.instrument)
     white = np.repeat([pose.shift.white, pose.rotation.white], 3)
     return MeasuredSession(
         name,
-        Block(time_s, sample.encoder, sample.wrench, temperatures=temperatures),
+        Block(time_s, sample.encoder, sample.wrench, cell.speed(time_s), temperatures=slow),
         sample.measured_shift,
         sample.measured_rotation,
         np.diag(white**2),
@@ -265,7 +266,12 @@ def as_read(recorded: MeasuredSession) -> MeasuredSession:
     # A thermometer tells its newest value once a second: the same is held in between.
     slow = {name: Signal(time_ns, values) for name, values in block.temperatures.items()}
     machine = MachineSignals(
-        Signal(time_ns, block.theta), None, Signal(time_ns, block.load), False, slow, {}
+        Signal(time_ns, block.theta),
+        None if block.theta_dot is None else Signal(time_ns, block.theta_dot),
+        Signal(time_ns, block.load),
+        False,
+        slow,
+        {},
     )
     # Of a sample without any reading there is no message.
     told = recorded.measured.any(axis=1)

@@ -69,7 +69,8 @@ class Asked:
         return self.places["further"]
 
     def beside(self, base):
-        assert base is self.places["thorough"].fits[AXIS]
+        place = self.places[self.begun[-1]]
+        assert any(base is each for each in place.fits.values())
         return self.places["beside"]
 
     def ask(self, place):
@@ -169,11 +170,20 @@ def test_play_that_is_found_beside_what_was_named_joins_it():
     """What only slopes named was not in that fit: it stood in for the play."""
     quick = answer("effect", DELAY, AXIS, share=0.1)
     more = answer("effect", PLAY, after=1.0)
-    search = Asked(quick, further=more, found=[DELAY])
+    search = Asked(quick, further=more, beside=answer("none"), found=[DELAY])
     where, result = search.answered()
     assert where == "further"
     assert names(result) == [DELAY, PLAY]
     assert result.after == {"s_um": 1.0}
+
+
+def test_beside_play_too_everything_is_asked_again():
+    """Slopes without the play in them are no evidence of a third effect."""
+    quick, more = answer("effect", DELAY), answer("effect", PLAY, AXIS)
+    search = Asked(quick, further=more, beside=answer("none", after=1.0), found=[DELAY])
+    _, result = search.answered()
+    assert search.asked == ["quick", "further", "beside"]
+    assert names(result) == [DELAY, PLAY]
 
 
 def test_where_play_is_not_named_the_quick_answer_stands():

@@ -39,7 +39,6 @@ def test_angles_are_interpolated_at_the_stamps_of_the_poses(tmp_path, campaign, 
     np.testing.assert_array_equal(session.block.time, campaign.pose_ns / SECOND)
     # The chord of 10 ms of this motion is all that separates it from the truth.
     np.testing.assert_allclose(session.rotation, campaign.rigid(campaign.pose_ns), atol=1e-12)
-    assert session.block.theta_dot is None
     assert session.measured.all()
     assert session.remarks == ()
     assert session.name == "bag"
@@ -57,8 +56,21 @@ def test_speeds_are_used_where_drivers_tell_them(tmp_path, campaign, table):
     np.testing.assert_allclose(session.block.theta_dot, np.tile([0.25, -0.5], (len(session), 1)))
 
 
-def test_speeds_of_zero_that_drivers_leave_are_not_believed(tmp_path, campaign, table):
-    campaign.with_joints(velocity=(0.0, 0.0)).with_loads().with_poses()
+@pytest.mark.parametrize("told", [{}, {"velocity": (0.0, 0.0)}])
+def test_speeds_that_drivers_leave_out_are_those_of_dense_angles(tmp_path, campaign, table, told):
+    """Poses may be rare: a difference between two of them is the speed of another moment."""
+    stamps = campaign.joint_ns[7:-7:20]
+    campaign.with_joints(**told).with_loads().with_poses(stamps=stamps)
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    late, early = (campaign.theta(stamps + ns) for ns in (MILLISECOND, -MILLISECOND))
+    true = (late - early) / 2e-3
+    np.testing.assert_allclose(session.block.theta_dot, true, atol=2e-3 * np.abs(true).max())
+
+
+def test_sparse_angles_tell_no_speeds(tmp_path, campaign, table):
+    campaign.with_joints()
+    campaign.entries = campaign.entries[::10]
+    campaign.with_loads().with_poses(stamps=campaign.joint_ns[20:-20])
     assert read_session(campaign.written(tmp_path / "bag"), table).block.theta_dot is None
 
 

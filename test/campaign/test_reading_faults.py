@@ -10,6 +10,9 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.reading.session import LEAST_POSES, read_session
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.recording.messages import PoseStamped
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings
+from wrist_stiffness.workflows.simulate import simulate_recording
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
@@ -241,6 +244,17 @@ def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, t
     session = read_session(campaign.written(tmp_path / "bag"), table)
     np.testing.assert_array_equal(np.flatnonzero(~session.measured.any(axis=1)), lost)
     assert "4 of 799 measured poses are spikes: left out" in session.remarks
+
+
+@pytest.mark.parametrize("late_ms", [20, 66])
+def test_short_fast_moves_that_are_stamped_late_are_no_spikes(tmp_path, late_ms, table):
+    """At 10 Hz such a move is four samples between rests of many."""
+    late = HiddenEffect("time_delay", "pose_sensor", "plain", 1e-3 * late_ms, 0)
+    settings = CellSettings(rate_hz=10.0, hidden=(late,))
+    path = tmp_path / "late.mcap"
+    simulate_recording(path, table, settings, 120.0, seed=1)
+    session = read_session(path, table)
+    assert session.measured.all()
 
 
 def test_dropouts_are_counted(tmp_path, campaign, complete, table):

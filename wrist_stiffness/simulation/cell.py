@@ -32,6 +32,10 @@ SENSED = (*HEATED, "ambient")
 TRUTHS = ("fast", "exact")
 
 
+SPEED_STEP_S = 1e-3
+"""Half the time over which a speed is taken [s]."""
+
+
 @dataclass(frozen=True)
 class CellSettings:
     """What the cell does and with which sensors; the seed of its noise is not part of it.
@@ -201,6 +205,12 @@ class VirtualCell:
     def desired(self, time_s: float | Array) -> Array:
         """Return the nominal motor command (..., 2) [rad] at times since the start (...) [s]."""
         return self.program.angles(self.program.phase(np.asarray(time_s)))
+
+    def speed(self, time_s: float | Array) -> Array:
+        """Return the speed (..., 2) of the nominal command [rad/s], as drives tell theirs."""
+        time = np.asarray(time_s)
+        before, after = np.maximum(time - SPEED_STEP_S, 0.0), time + SPEED_STEP_S
+        return (self.desired(after) - self.desired(before)) / (after - before)[..., None]
 
     def step(self, time_s: float, sent: Array) -> CellSample:
         """Advance to a time.

@@ -19,6 +19,10 @@ from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSampl
 JOINT_GAP_S = 0.5
 """Farthest joint state from a measured pose that still tells its angles [s]."""
 
+SPEED_WINDOW_S = 0.025
+"""Half the time over which a speed is taken from dense angles [s]: short against a move, and long
+enough that one encoder count in it is a slow speed."""
+
 
 @dataclass(frozen=True, eq=False)
 class MachineSignals:
@@ -29,7 +33,7 @@ class MachineSignals:
     angles : Signal
         Motor angles (m, 2) [rad].
     speeds : Signal or None
-        Motor speeds (m, 2), where the joint states tell them [rad/s].
+        Motor speeds (m, 2), where the joint states tell them or are dense enough [rad/s].
     loads : Signal
         Wrenches (l, 6) at O [N, N m].
     load_on_platform : bool
@@ -107,7 +111,7 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
             raise InputError(nothing)
     return MachineSignals(
         angles,
-        _speeds(samples.joints),
+        _told_speeds(samples.joints) or _speeds(angles),
         loads,
         on_platform,
         _slow(samples.temperatures),
@@ -131,11 +135,25 @@ def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
     return in_order(loads.time_ns, wrench), any(on_platform.values())
 
 
-def _speeds(joints: JointSamples) -> Signal | None:
+def _told_speeds(joints: JointSamples) -> Signal | None:
     """Return the speeds, None where drivers leave them out or at zero."""
     speeds = in_order(joints.time_ns, joints.velocity)
     whole = len(speeds) == len(in_order(joints.time_ns, joints.position))
     return speeds if whole and np.any(speeds.values != 0.0) else None
+
+
+def _speeds(angles: Signal) -> Signal | None:
+    """Return differences of dense angles, as late as early; None of sparse ones.
+
+    Differences of the angles at the measured poses, which may be ten times as sparse, would lag.
+    """
+    if len(angles) < 2 or np.median(np.diff(angles.time_ns)) > SPEED_WINDOW_S * NANOSECONDS:
+        return None
+    half = round(SPEED_WINDOW_S * NANOSECONDS)
+    ends = np.clip(angles.time_ns + [[-half], [half]], angles.time_ns[0], angles.time_ns[-1])
+    before, after = (angles.interpolated(each) for each in ends)
+    span_s = (ends[1] - ends[0]) / NANOSECONDS
+    return Signal(angles.time_ns, (after - before) / span_s[:, None])
 
 
 def _slow(samples: Mapping[str, ScalarSamples]) -> dict[str, Signal]:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -26,7 +27,7 @@ from wrist_stiffness.campaign.reading.path import GAP_S, turning_stamps
 from wrist_stiffness.campaign.reading.pose_track import PoseTrack, pose_track
 from wrist_stiffness.campaign.reading.registration import agreement, put_right
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps
-from wrist_stiffness.campaign.reading.spikes import spikes
+from wrist_stiffness.campaign.reading.spikes import WINDOW, spikes
 from wrist_stiffness.campaign.reading.static_frames import frames_of
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.table_range import beyond_range
@@ -36,6 +37,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
@@ -76,6 +78,9 @@ LEAST_SPIKE_M = 30e-6
 
 LEAST_SPIKE_STEPS = 4.0
 """In encoder steps: in motion the measured rotation leaves the encoders' by counts."""
+
+LATE_S = 0.1
+"""So late a stamp may be: what turns meanwhile is no spike.  Positions of O hardly move."""
 
 TURN_STEPS = 1.5
 """In encoder steps: a smaller swing between two poses is the chatter of a count."""
@@ -369,11 +374,17 @@ def _another_clock(offset: ClockOffset, machine: MachineSignals, track: PoseTrac
 
 
 def _spikes(time: Array, shift: Array, rotation: Array, rigid: Array, step: float) -> Mask:
+    """Tell which poses stand out, of rotations also from what a late stamp does in motion."""
     if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
         return np.zeros(len(time), dtype=bool)
     turn = rotation @ np.swapaxes(rigid, 1, 2)
     axis = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
-    least = np.repeat([LEAST_SPIKE_M, LEAST_SPIKE_STEPS * step], 3)
+    interval = np.diff(time)
+    turned = log_motion(np.swapaxes(rigid[:-1], 1, 2) @ rigid[1:], np.zeros((len(interval), 3)))
+    swing = LATE_S * np.linalg.norm(turned[:, 3:], axis=1) / interval
+    near = np.max(sliding_window_view(np.pad(swing, WINDOW // 2), WINDOW - 1), axis=1)
+    least = np.repeat([LEAST_SPIKE_M, LEAST_SPIKE_STEPS * step], 3) * np.ones((len(time), 1))
+    least[:, 3:] += near[:, None]
     return spikes(np.hstack([shift, axis]), least)
 
 

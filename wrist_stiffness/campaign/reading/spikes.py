@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
@@ -24,7 +25,7 @@ def spikes(values: Array, least: Array) -> NDArray[np.bool_]:
     ----------
     values : (n, m) float
         In the order of time; NaN = not measured.
-    least : (m,) float
+    least : (n, m) float
         Smaller spikes are none.
 
     Returns
@@ -33,15 +34,13 @@ def spikes(values: Array, least: Array) -> NDArray[np.bool_]:
         True = spike.
     """
     found = np.zeros(len(values), dtype=bool)
-    for column, floor in zip(values.T, least, strict=True):
+    for column, floor in zip(values.T, least.T, strict=True):
         known = np.flatnonzero(np.isfinite(column))
         if len(known) < WINDOW:
             continue
-        windows = np.lib.stride_tricks.sliding_window_view(
-            np.pad(column[known], WINDOW // 2, mode="edge"), WINDOW
-        )
+        windows = sliding_window_view(np.pad(column[known], WINDOW // 2, mode="edge"), WINDOW)
         apart = np.abs(column[known] - np.median(windows, axis=1))
         moving = apart[apart > 0.0]
         scale = MAD_TO_SIGMA * float(np.median(moving)) if moving.size else 0.0
-        found[known[apart > max(LIMIT * scale, floor)]] = True
+        found[known[apart > np.maximum(LIMIT * scale, floor[known])]] = True
     return found

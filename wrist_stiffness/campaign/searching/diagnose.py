@@ -152,7 +152,7 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
                 return other, again
     other = search.further([each.name for each in result.findings])
     if other is not None:
-        more = ask(other)
+        more = _with_the_first(search, other, ask)
         if any(each.name in other.fits for each in more.findings):
             fitted = [each for each in result.findings if each.name in other.base.extras]
             return other, _together(replace(result, findings=tuple(fitted)), more)
