@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.session import LEAST_POSES, read_session
+from wrist_stiffness.campaign.reading.session import LEAST_POSES, _spikes, read_session
+from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.recording.messages import PoseStamped
 from wrist_stiffness.simulation.catalogue import HiddenEffect
@@ -255,6 +256,23 @@ def test_short_fast_moves_that_are_stamped_late_are_no_spikes(tmp_path, late_ms,
     simulate_recording(path, table, settings, 120.0, seed=1)
     session = read_session(path, table)
     assert session.measured.all()
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 100.0, 1000.0])
+def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table):
+    """In dense poses the flicker of a count looks like a fast motion."""
+    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(4)
+    time = 1.7e9 + np.arange(400) / rate_hz
+    # Two stamps so near to each other are the same in seconds.
+    time[101] = time[100]
+    theta = 0.1 + step * rng.integers(0, 2, (400, 2))
+    turn = np.radians(1e-3) * rng.standard_normal((400, 3))
+    lost = np.arange(20, 400, 40)
+    turn[lost] += np.radians(0.15)
+    still = rigid_rotation(table, np.full((400, 2), 0.1))
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ still
+    found = _spikes(time, np.zeros((400, 3)), rotation, rigid_rotation(table, theta), step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
 def test_dropouts_are_counted(tmp_path, campaign, complete, table):

@@ -381,7 +381,9 @@ def _spikes(time: Array, shift: Array, rotation: Array, rigid: Array, step: floa
     axis = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
     interval = np.diff(time)
     turned = log_motion(np.swapaxes(rigid[:-1], 1, 2) @ rigid[1:], np.zeros((len(interval), 3)))
-    swing = LATE_S * np.linalg.norm(turned[:, 3:], axis=1) / interval
+    # Neighbours differ by half a window's turn at most: a count that flickers at 1 kHz is no speed.
+    share = LATE_S / np.maximum(interval, LATE_S / (WINDOW // 2))
+    swing = share * np.linalg.norm(turned[:, 3:], axis=1)
     near = np.max(sliding_window_view(np.pad(swing, WINDOW // 2), WINDOW - 1), axis=1)
     least = np.repeat([LEAST_SPIKE_M, LEAST_SPIKE_STEPS * step], 3) * np.ones((len(time), 1))
     least[:, 3:] += near[:, None]
