@@ -1,5 +1,7 @@
 """Units of a session: dwells and half seconds of motion, and the path that is kept of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,6 +114,17 @@ def test_approach_and_order_of_loading_are_told():
     last = found.label == np.flatnonzero(found.dwell)[-1]
     assert (found.sense[last, 0] == 1.0).all()
     assert found.at_rest[last].all()
+
+
+def test_the_approach_is_that_of_the_motion_whatever_a_count_says_as_it_ends():
+    """Speeds of dense joint states are of a moment: half a count either way is a slow speed."""
+    block = session()
+    speed = np.gradient(ramp(block.time, 3.0, 5.0, 0.0, 0.5), block.time)
+    speed[block.time > 5.02] = -STEP / 0.05
+    told = replace(block, theta_dot=np.stack([speed, np.zeros_like(speed)], axis=1))
+    found = cut_all(told)
+    last = found.label == np.flatnonzero(found.dwell)[-1]
+    assert (found.sense[last, 0] == 1.0).all()
 
 
 def test_a_slow_sweep_is_no_rest():

@@ -110,11 +110,11 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     before, after = _windows(block.time, max(WINDOW_S, 1.5 * step) if not sparse else 0.0)
     turning = _changes(block.theta, before, after, np.full(2, COUNTS * encoder_step), 0.0)
     loading = _changes(block.load, before, after, *_load_tolerance(block.load))
-    speed = block.theta_dot
-    if speed is None:
-        speed = np.zeros((n, 2)) if sparse else _speed(block, before, after)
+    mean_speed = np.zeros((n, 2)) if sparse else _speed(block, before, after)
+    speed = mean_speed if block.theta_dot is None else block.theta_dot
     stretch, resting = _stretches(turning | loading, block.theta, encoder_step, sparse)
-    sense = _last_sign(block.theta, speed, turning, sparse)
+    # Told speeds are those of a moment: as a motion ends, of a count that flickers.
+    sense = _last_sign(block.theta, mean_speed, turning, sparse)
     last_turn, last_load = _last(turning, block.time), _last(loading, block.time)
     start = np.searchsorted(stretch, np.arange(stretch[-1] + 1))
     held_s: Array = np.where(resting, block.time - block.time[start[stretch]], 0.0)
