@@ -8,7 +8,8 @@ import rclpy
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
 
-from wrist_stiffness.recording import open_recording
+from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.ros import cell_simulator
 from wrist_stiffness.ros.cell_simulator import CellSimulator
 from wrist_stiffness.ros.recorder import Recorder
@@ -34,6 +35,24 @@ def test_a_recorder_that_is_told_to_stop_writes_what_it_has_heard(graph, tmp_pat
     recording = open_recording(path)
     stamps = [message.header.stamp_ns for _, _, message in recording.messages(["/joint_states"])]
     assert stamps == list(range(1, SAMPLES))
+
+
+def test_a_recorder_whose_disk_refuses_the_last_message_is_closed(graph, tmp_path, monkeypatch):
+    recorder = graph.add(Recorder, output=str(tmp_path / "run.mcap"))
+    graph.until(lambda: list(recorder.subscriptions), "subscriptions of the recorder")
+    graph.listen(JointState, "/joint_states")
+    graph.executor.remove_node(recorder)
+    monkeypatch.setattr(RecordingWriter, "write_raw", refused)
+    graph.joints("/joint_states", 1)
+    graph.until(lambda: graph.heard["/joint_states"], "first sample")
+    with pytest.raises(RecordingError, match="No space left"):
+        recorder.destroy_node()
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def refused(writer, channel, payload, log_time_ns):
+    """As a full disk does."""
+    raise RecordingError("run.mcap cannot be written: No space left on device")
 
 
 class Run:

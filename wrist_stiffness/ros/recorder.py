@@ -119,11 +119,14 @@ class Recorder(Node):
     def destroy_node(self) -> None:
         """Write what has been heard but not taken yet, and give the recording its name."""
         data = [each for each in self.subscriptions if isinstance(each.callback_group, DataGroup)]
-        for _ in range(MOST_RUNS_AT_END):
-            if not take_in_order(data):
-                break
-        super().destroy_node()
-        self._recording.close()
+        try:
+            for _ in range(MOST_RUNS_AT_END):
+                if not take_in_order(data):
+                    break
+        finally:
+            # Whatever a full disk refuses of the last messages, the ones before are to be kept.
+            super().destroy_node()
+            self._recording.close()
 
 
 def main() -> int:
