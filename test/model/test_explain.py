@@ -189,6 +189,8 @@ def test_command_prints_a_table_and_writes_json(model_path, tmp_path, capsys):
         (["--measured", "300", "0", "0", "0", "0", "0", "1"], "more than 100 mm"),
         (["--temperature", "link1=25"], "temperature of 'link1': no such place"),
         (["--temperature", "link_1=warm"], "--temperature link_1=warm: write NAME=NUMBER"),
+        (["--covariate", "=3"], "--covariate =3: write NAME=NUMBER"),
+        (["--covariate", "a=3", "--covariate", "a=4"], "--covariate a=4: a is 3 already"),
         (["--load", "0", "0", "-9"], "9 N"),
     ],
 )

@@ -37,13 +37,18 @@ def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
     Raises
     ------
     InputError
-        If a text is no such pair.
+        If a text is no such pair, or a name comes twice.
     """
-    values = {}
+    values: dict[str, float] = {}
     for text in texts:
         name, _, number = text.partition("=")
         try:
-            values[name] = float(number)
+            value = float(number)
         except ValueError as error:
             raise InputError(f"{option} {text}: write NAME=NUMBER") from error
+        if not name:
+            raise InputError(f"{option} {text}: write NAME=NUMBER")
+        if name in values:
+            raise InputError(f"{option} {text}: {name} is {values[name]:g} already")
+        values[name] = value
     return values
