@@ -143,3 +143,20 @@ def test_what_was_asked_is_open_however_settled_it_is_reckoned(model, noise, ear
     found = plan(model, question, Conditions((weight,), PACE, noise, None, 0), [earlier])
     assert {answer.goal for answer in found.answers} == set(question.goals)
     assert len(found.visits) > 3
+    # Along with the earlier data it would be more than both: the root of the sum of squares.
+    assert max(answer.discrimination for answer in found.answers) < np.sqrt(2.0) * RESOLVED
+
+
+def test_earlier_data_put_nothing_in_reach(model, noise, earlier, monkeypatch):
+    """Else a plan would ask for the longest time what its loads never tell."""
+    monkeypatch.setattr(pool, "POOL", 10)
+    # As if the pool told nothing, however long, and the earlier data all.
+    monkeypatch.setattr("wrist_stiffness.campaign.planning.plan.LONGER", 0.0)
+    monkeypatch.setattr(
+        "wrist_stiffness.campaign.planning.plan.carried_over",
+        lambda *given: 4.0 * carried_over(*given),
+    )
+    question = asked("gravity@platform", HEAVY, "gravity@link_3")
+    found = plan(model, question, Conditions((), PACE, noise, None, 0), [earlier])
+    assert found.timeline is None
+    assert [answer.discrimination for answer in found.answers] == [0.0, 0.0]

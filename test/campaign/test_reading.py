@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.machine_signals import machine_signals
+from wrist_stiffness.campaign.reading.machine_signals import _speeds, machine_signals
 from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.reading.signals import in_order
+from wrist_stiffness.campaign.reading.signals import Signal, in_order
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.load_history import LoadHistory
 from wrist_stiffness.errors import FrameError, StaleLoadError
@@ -65,6 +65,18 @@ def test_speeds_that_drivers_leave_out_are_those_of_dense_angles(tmp_path, campa
     late, early = (campaign.theta(stamps + ns) for ns in (MILLISECOND, -MILLISECOND))
     true = (late - early) / 2e-3
     np.testing.assert_allclose(session.block.theta_dot, true, atol=2e-3 * np.abs(true).max())
+
+
+def test_speeds_of_dense_angles_hold_to_their_ends_and_over_gaps():
+    """Also where the stamps are near to each other here and minutes apart there."""
+    steps = np.random.default_rng(3).integers(1, 10 * MILLISECOND, 500)
+    steps[250] = 120 * SECOND
+    time_ns = 1_700_000_000 * SECOND + np.cumsum(steps)
+    slope = np.array([0.3, -0.1])
+    angles = 1e-9 * (time_ns - time_ns[0])[:, None] * slope
+    found = _speeds(Signal(time_ns, angles)).values
+    np.testing.assert_allclose(found, np.tile(slope, (500, 1)), rtol=1e-6)
+    assert _speeds(Signal(time_ns[:1], angles[:1])) is None
 
 
 def test_sparse_angles_tell_no_speeds(tmp_path, campaign, table):

@@ -25,3 +25,9 @@ def test_eight_deviations_are_not_yet_a_lost_beam():
 
 def test_smaller_ones_than_the_least_are_none():
     assert not spikes(noisy(150e-6), 1e3 * LEAST).any()
+
+
+def test_each_measurement_has_a_least_of_its_own_also_where_others_are_missing():
+    values, least = noisy(150e-6), LEAST.copy()
+    values[:90], least[400] = np.nan, 1e-3
+    assert np.flatnonzero(spikes(values, least)).tolist() == [100, 101]
