@@ -189,7 +189,7 @@ def plan_between_rivals(
     options : Options
         Without a duration it takes what it needs.
     recordings : Recordings, optional
-        Those of the diagnosis: what they tell is not asked again.
+        Those of the diagnosis: its rivals are fitted to them, and what it left open counts as open.
     progress : callable, optional
         Called with (done, total).
 
