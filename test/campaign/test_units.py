@@ -63,6 +63,17 @@ def test_a_motor_that_comes_to_rest_is_no_stand_yet(end):
     assert loaded[0] >= 0
 
 
+def test_a_count_that_flickers_while_the_load_comes_on_is_a_stand():
+    block = session(rate=50.0)
+    speed = np.zeros_like(block.theta)
+    speed[block.time > 6.0, 0] = STEP / 0.05 * np.resize([1.0, 0.0, -1.0], (block.time > 6.0).sum())
+    found = cut_all(replace(block, theta_dot=speed))
+    time = np.array([block.time[found.label == u].mean() for u in range(len(found.dwell))])
+    loaded = _stands(found, STEP)[time > 6.0]
+    assert (loaded == loaded[-1]).all()
+    assert loaded[-1] >= 0
+
+
 def moving_times(block, found):
     return [block.time[found.label == u] for u in np.flatnonzero(~found.dwell)]
 

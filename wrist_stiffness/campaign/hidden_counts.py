@@ -74,6 +74,7 @@ def _stands(cut: Cut, step: float) -> Labels:
     np.minimum.at(first, unit, number)
     np.maximum.at(last, unit, number)
     moving = np.zeros(len(cut.dwell), dtype=bool)
-    fast = (np.abs(cut.speed[used]) > COUNTS * step / WINDOW_S).any(axis=1)
+    # A count that flickers at rest is as fast at its moment as a slow motion.
+    fast = (np.abs(cut.mean_speed[used]) > COUNTS * step / WINDOW_S).any(axis=1)
     np.logical_or.at(moving, unit, fast)
     return np.where((first == last) & (cut.dwell | ~moving), first, -1)

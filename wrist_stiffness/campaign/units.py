@@ -71,8 +71,8 @@ class Cut:
         Its share of the unit's mean; the shares of a unit add up to 1.
     held_s : (n,) float
         Time since anything changed [s].
-    speed : (k, 2) float
-        Motor speeds at the kept samples [rad/s].
+    speed, mean_speed : (k, 2) float
+        Motor speeds at the kept samples, and their means over a window around each [rad/s].
     at_rest : (n,) bool
         Whether the load changed after the last motion rather than before it.
     sense : (n, 2) float
@@ -87,6 +87,7 @@ class Cut:
     weight: Array
     held_s: Array
     speed: Array
+    mean_speed: Array
     at_rest: Mask
     sense: Array
 
@@ -131,6 +132,7 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
         _weights(block.time[kept], unit, dwell),
         held_s,
         np.where(resting[kept, None], 0.0, speed[kept]),
+        np.where(resting[kept, None], 0.0, mean_speed[kept]),
         last_load > last_turn,
         sense,
     )
