@@ -56,13 +56,12 @@ def refused(writer, channel, payload, log_time_ns):
 
 
 class Run:
-    """A virtual wrist that moves for a second, and a predictor that says nothing by itself."""
+    """A virtual wrist that moves for a second, and a node that answers nothing by itself."""
 
-    def __init__(self, graph):
+    def __init__(self, graph, topic, message_type):
         self._graph = graph
-        self._answers = graph.probe.create_publisher(
-            PoseWithCovarianceStamped, "/pose_error_predicted", 10
-        )
+        self._answers = graph.probe.create_publisher(message_type, topic, 10)
+        self._message_type, self.quiet_s = message_type, 0.0
         graph.listen(JointState, "/joint_states")
         graph.add(CellSimulator, programs=1, program_s=1.0, rate_hz=50.0, listeners=1)
         graph.until(self._answers.get_subscription_count, "listener")
@@ -75,27 +74,38 @@ class Run:
         def quiet():
             if len(heard) > last[0]:
                 last[:] = len(heard), time.monotonic()
-            return last[0] and time.monotonic() > last[1] + seconds
+            self.quiet_s = time.monotonic() - last[1]
+            return last[0] and self.quiet_s > seconds
 
         self._graph.until(quiet, "end of the run")
 
     def answer(self):
         """Answer the last sample."""
-        message = PoseWithCovarianceStamped(header=self._graph.heard["/joint_states"][-1].header)
-        self._answers.publish(message)
+        header = self._graph.heard["/joint_states"][-1].header
+        self._answers.publish(self._message_type(header=header))
 
 
-def test_a_run_ends_when_its_last_sample_is_answered(graph, monkeypatch):
+@pytest.mark.parametrize(
+    ("topic", "message_type"),
+    [
+        ("/pose_error_predicted", PoseWithCovarianceStamped),
+        ("/model_residual", PoseWithCovarianceStamped),
+        ("/motor_commands_corrected", JointState),
+    ],
+)
+def test_a_run_ends_when_its_last_sample_is_answered(graph, monkeypatch, topic, message_type):
     monkeypatch.setattr(cell_simulator, "LONGEST_ANSWER_S", np.inf)
-    run = Run(graph)
+    run = Run(graph, topic, message_type)
     run.spin(QUIET_S)
     run.answer()
     with pytest.raises(SystemExit):
         run.spin(np.inf)
 
 
-def test_a_run_does_not_wait_for_ever(graph, monkeypatch):
+def test_a_run_waits_but_not_for_ever(graph, monkeypatch):
     monkeypatch.setattr(cell_simulator, "LONGEST_ANSWER_S", QUIET_S)
-    run = Run(graph)
+    run = Run(graph, "/pose_error_predicted", PoseWithCovarianceStamped)
     with pytest.raises(SystemExit):
         run.spin(np.inf)
+    # The last sample is heard a little after it was said.
+    assert run.quiet_s > 0.5 * QUIET_S
