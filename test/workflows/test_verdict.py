@@ -13,9 +13,12 @@ GROWTH = Finding(
 )
 
 
-def answer(verdict, share):
+def answer(verdict, share, after=1.2):
     rest = Unexplained((), share, "the conditions foretell a part of what is left")
-    return Diagnosis(verdict, "dwell", {}, {}, {}, (), (GROWTH,), rest, (), 0, "this session")
+    floor, before, after = {"s_um": 1.0}, {"s_um": 50.0}, {"s_um": after}
+    return Diagnosis(
+        verdict, "dwell", floor, before, after, (), (GROWTH,), rest, (), 0, "this session"
+    )
 
 
 @pytest.mark.parametrize(
@@ -29,6 +32,12 @@ def answer(verdict, share):
 def test_a_small_rest_does_not_read_as_none(verdict, share, words):
     assert unexplained_share(answer(verdict, share)).startswith(words)
     assert ("too little" in unexplained_share(answer(verdict, share))) == (verdict == "effect")
+
+
+def test_a_small_share_of_a_large_error_is_not_called_little():
+    text = unexplained_share(answer("effect", 0.04, after=12.0))
+    assert text.startswith("4 % of the structure above the noise, and still 12 times the noise")
+    assert "too little" not in text
 
 
 def test_why_nothing_can_be_corrected_is_told_apart():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wrist_stiffness.campaign.noise_floor import WITH_WANDER, over_floor
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.registry import find_law
 
@@ -28,8 +29,16 @@ def unexplained_share(result: Diagnosis) -> str:
     if share == 0.0:
         return "nothing of the structure above the noise"
     amount = f"{share:.0f}" if share >= 1.0 else f"{share:.1g}"
-    small = "" if result.verdict == "unknown" else ", too little to look for another effect"
-    return f"{amount} % of the structure above the noise{small}"
+    text = f"{amount} % of the structure above the noise"
+    if result.verdict == "unknown":
+        return text
+    ratio = over_floor(result.after, result.noise_floor)
+    if ratio > WITH_WANDER:
+        return (
+            f"{text}, and still {ratio:.2g} times the noise: no law is exact, and a smaller effect "
+            "may hide in what these leave"
+        )
+    return f"{text}, too little to look for another effect"
 
 
 def class_of(finding: Finding) -> str:
