@@ -124,6 +124,14 @@ def test_a_calibrated_model_is_predicted_in_any_order(model, make):
     assert not loaded.with_effects(*loaded.effects, plausible("backlash", "motor_1")).stateless
 
 
+def test_a_scaled_load_is_another_load_by_the_spline_as_well(model, make):
+    spline, block = model.with_evaluation("spline"), make.block(1)
+    scaled = make.effect("load_scale@load_sensor", scale_percent=(25.0, 1.0))
+    found = spline.with_effects(scaled).predict(block.theta[0], Load(block.load[0]))
+    expected = spline.predict(block.theta[0], Load(0.8 * block.load[0]))
+    np.testing.assert_allclose(found.twist, expected.twist, rtol=1e-9)
+
+
 def test_preview_leaves_no_trace(model, make):
     loaded = model.with_effects(
         make.effect("backlash@motor_1", width_mdeg=(50.0, 1.0)),

@@ -140,6 +140,16 @@ def test_motors_follow_what_is_sent_not_the_program(wrist):
     assert np.max(np.abs(sample.encoder - corrected)) <= step
 
 
+def test_told_speeds_add_up_to_the_way_of_the_program(wrist):
+    cell = VirtualCell(wrist(), CellSettings(), rng(0))
+    time = np.arange(0.0, 12.0, 1e-3)
+    speed, sent = cell.speed(time), cell.desired(time)
+    way = 1e-3 * np.cumsum(0.5 * (speed[1:] + speed[:-1]), axis=0)
+    # A small part of a count, which is 0.26 mrad.
+    np.testing.assert_allclose(way, sent[1:] - sent[0], atol=1e-5)
+    assert np.ptp(sent, axis=0).min() > 0.1
+
+
 def test_bad_settings_and_angles_are_refused(wrist):
     with pytest.raises(InputError, match="rate_hz = 0"):
         CellSettings(rate_hz=0.0)
