@@ -275,6 +275,42 @@ def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
+def paused(campaign, first, last):
+    """Leave out the joint states between two of them."""
+    del campaign.entries[first + 1 : last]
+    return campaign
+
+
+def test_where_joint_states_pause_in_motion_poses_have_no_angles(tmp_path, campaign, table):
+    """A straight way from one to the next is 9 deg wrong in the middle of a second."""
+    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    (why,) = session.remarks
+    assert "measured poses are not used: the motors moved while the joint states paused" in why
+    assert 90 < 799 - len(session) <= 100
+    time_ns = np.round(1e9 * session.block.time).astype(np.int64)
+    # 5 ms of this motion, and what a stamp since 1970 tells.
+    error = np.abs(session.block.theta - campaign.theta(time_ns))
+    assert error.max() < np.radians(0.25)
+
+
+def test_where_joint_states_pause_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
+    monkeypatch.setattr(
+        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
+    )
+    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert session.measured.all()
+    assert len(session) == 799
+
+
+def test_rare_joint_states_are_no_pause(tmp_path, campaign, table):
+    campaign.with_joints()
+    campaign.entries = campaign.entries[::80]
+    campaign.with_loads().with_poses()
+    assert read_session(campaign.written(tmp_path / "bag"), table).measured.sum() > 700
+
+
 def test_dropouts_are_counted(tmp_path, campaign, complete, table):
     nothing = np.full(3, np.nan)
     rotation = campaign.rigid(campaign.pose_ns)

@@ -19,6 +19,12 @@ from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSampl
 JOINT_GAP_S = 0.5
 """Farthest joint state from a measured pose that still tells its angles [s]."""
 
+PAUSE_PERIODS = 3.0
+"""Of the joint states, beyond `JOINT_GAP_S`, that are a pause in which nobody knows the way."""
+
+STILL_RAD = float(np.radians(0.05))
+"""So much, some counts, the angles beside a pause may be from those of a pose in it [rad]."""
+
 SPEED_WINDOW_S = 0.025
 """Half the time over which a speed is taken from dense angles [s]: short against a move, and long
 enough that one encoder count in it is a slow speed."""
@@ -57,14 +63,27 @@ class MachineSignals:
         newest = self.loads.newest(time_ns)
         age = time_ns - self.loads.time_ns[newest]
         loads = (newest >= 0) & (age <= round(load_age_limit_s * NANOSECONDS))
+        way = self._way_is_known(time_ns)
         reasons = []
         for known, what in (
             (angles, f"no joint state within {JOINT_GAP_S:g} s"),
-            (loads | ~angles, f"no load estimate in the {load_age_limit_s:g} s before"),
+            (way | ~angles, "the motors moved while the joint states paused"),
+            (loads | ~(angles & way), f"no load estimate in the {load_age_limit_s:g} s before"),
         ):
             if not known.all():
                 reasons.append(f"{np.sum(~known)} measured poses are not used: {what}")
-        return angles & loads, tuple(reasons)
+        return angles & way & loads, tuple(reasons)
+
+    def _way_is_known(self, time_ns: Stamps) -> NDArray[np.bool_]:
+        """Tell which stamps (n,) lie in no pause of the joint states, or in one without motion."""
+        own = self.angles.time_ns
+        before = np.maximum(self.angles.newest(time_ns), 0)
+        after = np.minimum(np.searchsorted(own, time_ns), len(own) - 1)
+        nearest = np.where(time_ns - own[before] < own[after] - time_ns, before, after)
+        moved = np.abs(self.angles.interpolated(time_ns) - self.angles.values[nearest])
+        period = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
+        longest = max(JOINT_GAP_S * NANOSECONDS, PAUSE_PERIODS * period)
+        return (own[after] - own[before] <= longest) | (moved <= STILL_RAD).all(axis=1)
 
     def at(self, time_ns: Stamps) -> Block:
         """Return the signals that belong to usable stamps (n,) [ns], which rise."""
