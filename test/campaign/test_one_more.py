@@ -270,6 +270,15 @@ def test_what_was_not_measured_is_changed_by_nothing(wrist):
     assert_equal([np.flatnonzero(each == 0) for each in changes], [[0, 4]] * 2)
 
 
+@pytest.mark.parametrize(("laws", "fitted"), [({"cable_wrench"}, {CABLE}), ((), {BACKLASH})])
+def test_only_laws_that_are_asked_for_are_fitted_whole(wrist, laws, fitted):
+    """Beside what tangents led to, where they led anywhere."""
+    tangents = leaves(b=300) if BACKLASH in fitted else leaves(b=990)
+    wrist.left = leaves(alone=1000, p=200, w=300) | tangents
+    place = Search(wrist, ()).thorough(laws)
+    assert place.fits.keys() == fitted
+
+
 def test_of_two_that_tangents_led_to_each_stands_alone_among_whole_fits(wrist):
     """One of them with the other's help would be better than all others."""
     wrist.left = leaves(alone=1000, b=600, d=700, bd=300, w=200)
@@ -325,9 +334,10 @@ def test_play_is_tried_beside_what_was_named_alone(wrist):
     assert place.fits[PLAY].cost == 240
 
 
-def test_beside_play_the_bushing_in_its_gap_is_not_asked_for(wrist):
+@pytest.mark.parametrize("law", ["bushing_stiffness", "bushing_hardening"])
+def test_beside_play_the_bushing_in_its_gap_is_not_asked_for(wrist, law):
     """It would stand for the way the gap closes, which no law knows exactly."""
-    own, other = ({f"bushing_stiffness@joint_{number}"} for number in (1, 2))
+    own, other = ({f"{law}@joint_{number}"} for number in (1, 2))
     wrist.left = leaves(alone=1000, p=300) | {frozenset(each): 900 for each in (own, other)}
     search = Search(wrist, ())
     fit = wrist.reached(PLAY).base

@@ -25,7 +25,7 @@ from wrist_stiffness.campaign.searching.refit import (
     valued,
     withdrawn,
 )
-from wrist_stiffness.campaign.searching.seeking import Place, Search
+from wrist_stiffness.campaign.searching.seeking import PRESSING, Place, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError
@@ -144,8 +144,10 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     # Fits found something else than slopes name, and these do not explain everything.
     found = search.found != {each.name for each in result.findings}
     otherwise = found and result.verdict != "effect"
-    if _leaves_much(result) or strained or otherwise:
-        other = search.thorough()
+    doubted = _leaves_much(result) or strained or otherwise
+    if doubted or result.verdict == "none":
+        # What presses the base takes up whole, within its tolerances: then nothing seems missing.
+        other = search.thorough() if doubted else search.thorough(PRESSING)
         if other is not None:
             again = _with_the_first(search, other, ask)
             if _says_more(again, result):

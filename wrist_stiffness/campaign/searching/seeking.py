@@ -186,15 +186,20 @@ class Search:
             return Place(self._first.base, self._catalogue)
         return Place(self._reached.base, self._at(self._reached))
 
-    def thorough(self) -> Place | None:
+    def thorough(self, laws: Collection[str] = PRESSING | RUBBING | LOOSE) -> Place | None:
         """Fit what no tangent shows one by one with the whole base; return all side by side.
 
         Each with what it changes, base and all, in place of its tangents.  None where nothing comes
         as far as the base alone, or as what tangents led to.
+
+        Parameters
+        ----------
+        laws : collection of str
+            Which are fitted, beside those to which tangents led.
         """
         alone = self._alone
         known = self._catalogue if alone is self._first else self._at(alone)
-        tried = [e for e in known if e.law.id in PRESSING | RUBBING | LOOSE or e.name in self.found]
+        tried = [e for e in known if e.law.id in laws or e.name in self.found]
         trials = self._trials(alone, tried)
         self._finish(trials)
         least = min((each.total for each in trials.values()), default=np.inf)
