@@ -58,6 +58,8 @@ def paired(lines: Sequence[Line], solver: str, other: str) -> str:
         for name in (solver, other)
     }
     keys = sorted(by_key[solver].keys() & by_key[other].keys())
+    if not keys:
+        return f"`{other}` and `{solver}` share no case yet."
     rows = [
         f"| size | cases | asked | {solver} | {other} | difference |",
         "|---|---|---|---|---|---|",
@@ -75,7 +77,7 @@ def paired(lines: Sequence[Line], solver: str, other: str) -> str:
                 f"{100 * one.mean():.0f} % | {100 * two.mean():.0f} % | "
                 f"{gap:+.0f} ({100 * low:+.0f} to {100 * high:+.0f}) |"
             )
-    return "\n".join(rows) if keys else f"`{other}` and `{solver}` share no case yet."
+    return "\n".join(rows)
 
 
 def newcombe(one: NDArray[np.bool_], two: NDArray[np.bool_]) -> tuple[float, float]:
