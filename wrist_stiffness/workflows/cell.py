@@ -151,11 +151,13 @@ def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.P
 
 
 def _end(processes: Collection[subprocess.Popen[bytes]]) -> None:
+    """Ask processes to end, and force those that have not after one patience for all."""
     for process in processes:
         process.terminate()
+    end_s = time.monotonic() + END_PATIENCE_S
     for process in processes:
         try:
-            process.wait(END_PATIENCE_S)
+            process.wait(max(end_s - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
