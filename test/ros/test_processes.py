@@ -165,6 +165,8 @@ def test_a_signal_ends_the_cell_with_all_its_nodes(tmp_path, ending, code):
         [sys.executable, "-m", "wrist_stiffness", "cell", "--record", str(path)],
         stderr=subprocess.PIPE,
         text=True,
+        # Tests that run in the background are started deaf to SIGINT, and hand that on.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         try:
             end_s = time.monotonic() + DEADLINE_S
