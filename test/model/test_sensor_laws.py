@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.vectors import block_diagonal
@@ -219,6 +220,68 @@ def test_late_pose_stamps_show_an_earlier_pose(model, make):
         exp_twist(result.twist[0]), (forward(theta - 0.1 * speed).platform, np.zeros(3)), back
     )
     assert np.allclose(result.measured[0], log_motion(*shown), rtol=1e-10)
+
+
+def swing(time):
+    """Return angles and speeds (n, 2) of a smooth motion."""
+    phase = np.outer(time, [3.0, 2.0]) + [0.3, 1.1]
+    return 0.2 * np.sin(phase), 0.2 * np.cos(phase) * [3.0, 2.0]
+
+
+def late_turn(model, make, place, delay_ms, step_s):
+    """Return the turn that is measured with a late stamp, and what it should be, (n, 3)."""
+    time = np.arange(0.0, 2.0, step_s)
+    theta, speed = swing(time)
+    block = Block(time, theta, np.zeros((len(time), 6)), theta_dot=speed)
+    late = model.with_effects(make.effect(f"time_delay@{place}", delay_ms=delay_ms)).batch(block)
+    plain = model.batch(block).twist[:, 3:]
+    true = theta.copy()
+    if place == "pose_sensor":
+        true = swing(time - 1e-3 * delay_ms)[0]
+    else:
+        column = int(place[-1]) - 1
+        true[:, column] = swing(time + 1e-3 * delay_ms)[0][:, column]
+    forward = model.table.mechanism.forward
+    turned = forward(true).platform @ np.swapaxes(forward(theta).platform, -1, -2)
+    if place == "pose_sensor":
+        turned, plain = Rotation.from_rotvec(plain).as_matrix() @ turned, 0.0
+    expected = plain + Rotation.from_matrix(turned).as_rotvec()
+    used = time > 2.5e-3 * abs(delay_ms)
+    return late.measured[used, 3:], expected[used]
+
+
+@pytest.mark.parametrize(
+    ("place", "delay_ms"), [("pose_sensor", 130.0), ("motor_1", -70.0), ("motor_2", -70.0)]
+)
+def test_what_was_between_two_samples_is_known_to_fourth_order(model, make, place, delay_ms):
+    errors = [
+        np.abs(np.subtract(*late_turn(model, make, place, delay_ms, step))).max()
+        for step in (0.1, 0.05)
+    ]
+    assert errors[0] < 2e-4
+    assert errors[1] < errors[0] / 8.0
+
+
+@pytest.mark.parametrize(
+    ("place", "sign"), [("motor_1", 1.0), ("motor_2", 1.0), ("pose_sensor", -1.0)]
+)
+def test_what_is_still_to_come_is_known_to_second_order(model, make, place, sign):
+    """Speeds at 1 kHz; half the delay leaves an eighth of the error."""
+    errors = [
+        np.abs(np.subtract(*late_turn(model, make, place, sign * delay_ms, 1e-3))).max()
+        for delay_ms in (40.0, 20.0)
+    ]
+    assert errors[0] < 1e-3
+    assert errors[1] < errors[0] / 6.0
+
+
+def test_two_first_samples_of_one_moment_do_not_know_of_each_other(model, make):
+    time = np.array([0.0, 0.0, 0.1])
+    theta = np.radians([[20.0, -10.0], [21.0, -10.0], [22.0, -10.0]])
+    late = model.with_effects(make.effect("time_delay@pose_sensor", delay_ms=50.0))
+    block = Block(time, theta, np.zeros((3, 6)), theta_dot=np.full((3, 2), 0.1))
+    first = late.batch(block.take(slice(0, 1))).measured
+    assert np.array_equal(late.batch(block).measured[:1], first)
 
 
 def test_late_load_stamps_run_along_the_ramp(model, make):
