@@ -240,12 +240,11 @@ def measured_session(case: Case, session: int, sample: CellSample) -> MeasuredSe
     held = np.arange(len(time_s)) // round(RATE_HZ) * round(RATE_HZ)
     shown = THERMOMETER_STEP_K * np.round(sample.temperature / THERMOMETER_STEP_K)
     slow = dict(zip(SENSED, shown[held].T, strict=True))
-    cell = VirtualCell(wrist(), settings_of(case, session), np.random.default_rng(0))
     pose = instrument(case.instrument)
     white = np.repeat([pose.shift.white, pose.rotation.white], 3)
     return MeasuredSession(
         name,
-        Block(time_s, sample.encoder, sample.wrench, cell.speed(time_s), temperatures=slow),
+        Block(time_s, sample.encoder, sample.wrench, sample.speed, temperatures=slow),
         sample.measured_shift,
         sample.measured_rotation,
         np.diag(white**2),

@@ -145,6 +145,7 @@ def test_the_own_diagnosis_gets_what_reading_the_recording_gives(
         (read.shift, wanted.shift),
         (read.rotation, wanted.rotation),
         (read.block.theta, wanted.block.theta),
+        (read.block.theta_dot, wanted.block.theta_dot),
         (read.block.load, wanted.block.load),
         *((read.block.temperatures[name], v) for name, v in wanted.block.temperatures.items()),
     ):
@@ -161,7 +162,7 @@ def test_a_session_without_lost_beams_is_read_as_it_was_recorded(sees, bench, ha
     assert read.remarks == ()
     for name in ("shift", "rotation", "covariance"):
         assert np.array_equal(getattr(read, name), getattr(recorded, name), equal_nan=True)
-    for name in ("time", "theta", "load"):
+    for name in ("time", "theta", "theta_dot", "load"):
         assert np.array_equal(getattr(read.block, name), getattr(recorded.block, name))
     for name, values in recorded.block.temperatures.items():
         assert np.array_equal(read.block.temperatures[name], values)

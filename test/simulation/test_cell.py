@@ -141,13 +141,33 @@ def test_motors_follow_what_is_sent_not_the_program(wrist):
 
 
 def test_told_speeds_add_up_to_the_way_of_the_program(wrist):
+    """A drive tells the mean of the last four milliseconds: as it was two of them ago."""
     cell = VirtualCell(wrist(), CellSettings(), rng(0))
     time = np.arange(0.0, 12.0, 1e-3)
-    speed, sent = cell.speed(time), cell.desired(time)
+    sent = cell.desired(time)
+    speed = cell.run(time, sent).speed
     way = 1e-3 * np.cumsum(0.5 * (speed[1:] + speed[:-1]), axis=0)
     # A small part of a count, which is 0.26 mrad.
-    np.testing.assert_allclose(way, sent[1:] - sent[0], atol=1e-5)
+    then = cell.desired(np.maximum(time - 2e-3, 0.0))
+    np.testing.assert_allclose(way, then[1:] - then[0], atol=1e-5)
     assert np.ptp(sent, axis=0).min() > 0.1
+
+
+def test_drives_tell_how_the_motors_move_not_how_the_program_does(wrist):
+    """Motors that are held tell no speed, motors that are sent another way another one."""
+    cell, time = VirtualCell(wrist(), CellSettings(), rng(0)), np.arange(0.0, 12.0, 1e-2)
+    held = np.repeat(cell.desired(time)[:1], len(time), axis=0)
+    still = cell.run(time, held).speed
+    moving = VirtualCell(wrist(), CellSettings(), rng(0)).run(time, cell.desired(time)).speed
+    assert np.abs(still).max() < 0.1 * np.abs(moving).max()
+    other = VirtualCell(wrist(), CellSettings(), rng(0)).run(
+        time, cell.desired(time) + np.outer(time, [0.01, -0.02])
+    )
+    np.testing.assert_allclose((other.speed - moving)[1:].mean(axis=0), [0.01, -0.02], atol=1e-4)
+    steps = [cell.step(12.0 + t, angles).speed for t, angles in zip(time, held, strict=True)]
+    block = VirtualCell(wrist(), CellSettings(), rng(0))
+    block.run(time, held)
+    assert np.array_equal(steps, block.run(12.0 + time, held).speed)
 
 
 def test_bad_settings_and_angles_are_refused(wrist):

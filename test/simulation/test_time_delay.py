@@ -163,6 +163,8 @@ def test_a_late_cell_at_10_hz_says_what_a_fast_one_said_before(place, wrist):
     else:
         column = PLACES.index(place) - 2
         error, effect = ((each.encoder - then.encoder)[:, column] for each in (late, now))
+        wrong, change = ((each.speed - then.speed)[:, column] for each in (late, now))
+        assert np.max(np.abs(wrong)) < 1e-3 * np.max(np.abs(change))
         counts = late.encoder / count
         np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
     # Where a shaft stops within its count is settled while samples come: fewer tell it later.

@@ -71,10 +71,16 @@ def wrench_message(stamp_ns: int, frame_id: str, wrench: Array) -> WrenchStamped
 
 
 def joint_message(
-    stamp_ns: int, frame_id: str, names: Sequence[str], positions: Array
+    stamp_ns: int,
+    frame_id: str,
+    names: Sequence[str],
+    positions: Array,
+    velocities: Array | None = None,
 ) -> JointState:
-    """Return a joint state from names and positions (n,) [rad]."""
+    """Return a joint state from names, positions (n,) [rad] and, if known, speeds (n,) [rad/s]."""
     message = JointState(name=list(names), position=positions.tolist())
+    if velocities is not None:
+        message.velocity = velocities.tolist()
     message.header.stamp = time_message(stamp_ns)
     message.header.frame_id = frame_id
     return message

@@ -32,10 +32,6 @@ SENSED = (*HEATED, "ambient")
 TRUTHS = ("fast", "exact")
 
 
-SPEED_STEP_S = 1e-3
-"""Half the time over which a speed is taken [s]."""
-
-
 @dataclass(frozen=True)
 class CellSettings:
     """What the cell does and with which sensors; the seed of its noise is not part of it.
@@ -114,6 +110,8 @@ class CellSample:
     ----------
     encoder : (..., 2) float
         Motor angles as measured [rad].
+    speed : (..., 2) float
+        Motor speeds as the drives tell them [rad/s].
     wrench : (..., 6) float
         Load on the platform at O in F as measured [N, N m].
     pose_rotation : (..., 3, 3) float
@@ -129,6 +127,7 @@ class CellSample:
     """
 
     encoder: Array
+    speed: Array
     wrench: Array
     pose_rotation: Array
     pose_shift: Array
@@ -199,18 +198,13 @@ class VirtualCell:
         self._static = pose_sensor.static
         self._view = PoseView(settings.sees, settings.lost_beams, view_rng)
         self._drive = Drive(table.geometry.limits.encoder_step, drive_rng)
+        self._departed: tuple[float, Array] | None = None
         self._load_noise = NoiseSource(sensor.force, sensor.moment, load_rng)
         self._pose_noise = NoiseSource(pose_sensor.shift, pose_sensor.rotation, pose_rng)
 
     def desired(self, time_s: float | Array) -> Array:
         """Return the nominal motor command (..., 2) [rad] at times since the start (...) [s]."""
-        return self.program.angles(self.program.phase(np.asarray(time_s)))
-
-    def speed(self, time_s: float | Array) -> Array:
-        """Return the speed (..., 2) of the nominal command [rad/s], as drives tell theirs."""
-        time = np.asarray(time_s)
-        before, after = np.maximum(time - SPEED_STEP_S, 0.0), time + SPEED_STEP_S
-        return (self.desired(after) - self.desired(before)) / (after - before)[..., None]
+        return self.program.sent(np.asarray(time_s))
 
     def step(self, time_s: float, sent: Array) -> CellSample:
         """Advance to a time.
@@ -271,6 +265,7 @@ class VirtualCell:
             rotation[unseen], shift[unseen] = np.nan, np.nan
         return CellSample(
             encoder=encoder,
+            speed=self._told_speed(time_s, sent),
             wrench=wrench + self._load_noise(time_s),
             pose_rotation=true.rotation,
             pose_shift=true.shift,
@@ -299,6 +294,22 @@ class VirtualCell:
             wrench = law.read_load(true.block, wrench)
             rotation, shift = law.read_pose(true.block, rotation, shift)
         return self._drive.read(shaft), wrench, rotation, shift
+
+    def _told_speed(self, time_s: Array, sent: Array) -> Array:
+        """Return what the drives say of their speeds: the program's, and how that is departed from.
+
+        What an encoder counts wrong is so small a part of a speed that it is left out.
+        """
+        departure = sent - self.desired(time_s)
+        last_s, last = self._departed or (time_s[0], departure[0])
+        step = np.diff(departure, axis=0, prepend=last[None])
+        interval = np.diff(time_s, prepend=last_s)[:, None]
+        rate = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
+        self._departed = float(time_s[-1]), departure[-1]
+        speed = self.program.speed(time_s) + rate
+        for law in self._laws:
+            speed = law.read_speed(time_s, speed)
+        return self._drive.tell(speed)
 
     def _stop_at_ends(self, sent: Array) -> None:
         limits = self.table.geometry.limits

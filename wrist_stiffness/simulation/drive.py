@@ -24,6 +24,9 @@ class Drive:
     SETTLING_S = 0.1
     """Time constant with which the shaft goes to another place within the count."""
 
+    SPEED_UNIT = float(np.radians(0.01))
+    """In which a drive tells its speed [rad/s]."""
+
     def __init__(self, step: float, rng: np.random.Generator) -> None:
         self._step = step
         self._rng = rng
@@ -52,6 +55,10 @@ class Drive:
     def read(self, shaft: Array) -> Array:
         """Return what the encoders show for shaft angles (n, 2) [rad]."""
         return self._step * np.round(shaft / self._step)
+
+    def tell(self, speed: Array) -> Array:
+        """Return the speeds that the drives tell for those (n, 2) that they see [rad/s]."""
+        return self.SPEED_UNIT * np.round(speed / self.SPEED_UNIT)
 
     def _draw(self) -> Array:
         return self._step * self._rng.uniform(-0.5, 0.5, 2)

@@ -10,6 +10,10 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
 
+SPEED_SPAN_S = 4e-3
+"""Over which drives take a speed [s]."""
+
+
 @dataclass(frozen=True)
 class Track:
     """Values at knots, joined by minimum-jerk transitions (Flash and Hogan 1985).
@@ -73,6 +77,15 @@ class Program:
     def phase(self, time_s: Array) -> Array:
         """Return the time since the current repetition began (...) [s]."""
         return np.mod(time_s, self.duration_s)
+
+    def sent(self, time_s: Array) -> Array:
+        """Return the nominal motor angles (..., 2) at times since the start (...) [s]."""
+        return self.angles(self.phase(time_s))
+
+    def speed(self, time_s: Array) -> Array:
+        """Return their mean speeds (..., 2) over the last `SPEED_SPAN_S` [rad/s]."""
+        before = self.sent(np.maximum(time_s - SPEED_SPAN_S, 0.0))
+        return (self.sent(time_s) - before) / SPEED_SPAN_S
 
 
 class Schedule:

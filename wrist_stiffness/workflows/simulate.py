@@ -253,10 +253,11 @@ def _write_sample(
     header = Header(stamp_ns, BASE_FRAME)
     force, moment = sample.wrench[:3].tolist(), sample.wrench[3:].tolist()
     motors = Header(stamp_ns, "")
+    angles, speeds = tuple(sample.encoder.tolist()), tuple(sample.speed.tolist())
     for topic, message in (
         (topics.LOAD_ESTIMATE, WrenchStamped(header, Wrench(Vector3(*force), Vector3(*moment)))),
         (topics.MOTOR_COMMANDS, JointState(motors, DEFAULT_JOINTS, tuple(command.tolist()))),
-        (topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, tuple(sample.encoder.tolist()))),
+        (topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, angles, speeds)),
     ):
         writer.write(topic, message, stamp_ns)
     pose = pose_message(header, sample, whole=settings.sees == "pose")

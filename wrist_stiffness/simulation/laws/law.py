@@ -54,6 +54,10 @@ class Law:
         """Return the shaft angles that the encoders count instead, (n, 2) [rad]; remember."""
         return shaft
 
+    def read_speed(self, time_s: Array, speed: Array) -> Array:
+        """Return the motor speeds that the drives see instead, (n, 2) [rad/s]; remember."""
+        return speed
+
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Return what the load sensor says instead of a wrench (n, 6); remember."""
         return wrench

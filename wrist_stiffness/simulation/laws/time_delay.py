@@ -68,7 +68,7 @@ class TimeDelay(Law):
 
     def __init__(self, component: str, delay_s: float, mechanism: Mechanism) -> None:
         self._component = component
-        self._line = DelayLine(delay_s)
+        self._line, self._speed_line = DelayLine(delay_s), DelayLine(delay_s)
         self._mechanism = mechanism
 
     def told(self, program: Program) -> None:
@@ -80,8 +80,17 @@ class TimeDelay(Law):
         if self._component not in MOTOR:
             return shaft
         out, column = shaft.copy(), MOTOR[self._component]
-        now, then = (self._sent(each) for each in (time_s, self._line.moments(time_s)))
+        now, then = (self._program.sent(t) for t in (time_s, self._line.moments(time_s)))
         out[:, column] = (then + self._line(time_s, shaft - now))[:, column]
+        return out
+
+    def read_speed(self, time_s: Array, speed: Array) -> Array:
+        """See the speed of the same motor late."""
+        if self._component not in MOTOR:
+            return speed
+        out, column = speed.copy(), MOTOR[self._component]
+        now, then = (self._program.speed(t) for t in (time_s, self._speed_line.moments(time_s)))
+        out[:, column] = (then + self._speed_line(time_s, speed - now))[:, column]
         return out
 
     def read_load(self, block: Block, wrench: Array) -> Array:
@@ -98,14 +107,11 @@ class TimeDelay(Law):
             return rotation, shift
         moments = self._line.moments(block.time_s)
         now, then = (
-            self._mechanism.forward(self._sent(t)).platform for t in (block.time_s, moments)
+            self._mechanism.forward(self._program.sent(t)).platform
+            for t in (block.time_s, moments)
         )
         still = np.zeros_like(shift)
         turn = log_motion(rotation @ np.swapaxes(now, -1, -2), still)[:, 3:]
         late = self._line(block.time_s, np.concatenate([shift, turn], axis=-1))
         turned, _ = exp_twist(np.concatenate([still, late[:, 3:]], axis=-1))
         return turned @ then, late[:, :3]
-
-    def _sent(self, time_s: Array) -> Array:
-        """Return where the program has the motors at times (n,), (n, 2) [rad]."""
-        return self._program.angles(self._program.phase(time_s))
