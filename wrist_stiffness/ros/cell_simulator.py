@@ -191,9 +191,7 @@ class CellSimulator(Node):
         sample = self.cell.step(time_s, self._sent)
         # The load first: it belongs to the joint state of the same stamp.
         self._load.publish(wrench_message(stamp_ns, BASE_FRAME, sample.wrench))
-        self._joints.publish(
-            joint_message(stamp_ns, "", self._names, sample.encoder, sample.speed)
-        )
+        self._joints.publish(joint_message(stamp_ns, "", self._names, sample.encoder, sample.speed))
         self._measured.publish(
             pose_message_stamped(stamp_ns, sample.measured_rotation, sample.measured_shift)
         )

@@ -9,7 +9,6 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
-
 SPEED_SPAN_S = 4e-3
 """Over which drives take a speed [s]."""
 

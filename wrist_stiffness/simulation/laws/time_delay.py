@@ -107,8 +107,7 @@ class TimeDelay(Law):
             return rotation, shift
         moments = self._line.moments(block.time_s)
         now, then = (
-            self._mechanism.forward(self._program.sent(t)).platform
-            for t in (block.time_s, moments)
+            self._mechanism.forward(self._program.sent(t)).platform for t in (block.time_s, moments)
         )
         still = np.zeros_like(shift)
         turn = log_motion(rotation @ np.swapaxes(now, -1, -2), still)[:, 3:]
