@@ -110,7 +110,7 @@ def recorded(
     warm = dict(zip(SENSED, sample.temperature.T, strict=True))
     return MeasuredSession(
         f"day_{settings.session + 1}",
-        Block(time_s, sample.encoder, sample.wrench, temperatures=warm),
+        Block(time_s, sample.encoder, sample.wrench, sample.speed, temperatures=warm),
         sample.measured_shift,
         sample.measured_rotation,
         np.diag(instrument(settings.instrument).sigma ** 2),
