@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.session import LEAST_POSES, _spikes, read_session
-from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
+from wrist_stiffness.campaign.reading.refusals import LEAST_POSES
+from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.recording.messages import PoseStamped
-from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows.simulate import simulate_recording
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
@@ -233,46 +230,6 @@ def test_a_target_that_sits_anyhow_is_read(tmp_path, campaign, table):
     campaign.with_joints().with_loads()
     campaign.with_poses(rotation=instrument @ campaign.rigid(campaign.pose_ns) @ target)
     assert len(read_session(campaign.written(tmp_path / "bag"), table)) == 799
-
-
-def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, table):
-    rng = np.random.default_rng(5)
-    shift = 5e-6 * rng.standard_normal((799, 3))
-    shift[400:] += 3e-4
-    lost = np.array([50, 200, 201, 600])
-    shift[lost] += 2e-3
-    campaign.with_joints().with_loads().with_poses(shift)
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    np.testing.assert_array_equal(np.flatnonzero(~session.measured.any(axis=1)), lost)
-    assert "4 of 799 measured poses are spikes: left out" in session.remarks
-
-
-@pytest.mark.parametrize("late_ms", [20, 66])
-def test_short_fast_moves_that_are_stamped_late_are_no_spikes(tmp_path, late_ms, table):
-    """At 10 Hz such a move is four samples between rests of many."""
-    late = HiddenEffect("time_delay", "pose_sensor", "plain", 1e-3 * late_ms, 0)
-    settings = CellSettings(rate_hz=10.0, hidden=(late,))
-    path = tmp_path / "late.mcap"
-    simulate_recording(path, table, settings, 120.0, seed=1)
-    session = read_session(path, table)
-    assert session.measured.all()
-
-
-@pytest.mark.parametrize("rate_hz", [10.0, 100.0, 1000.0])
-def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table):
-    """In dense poses the flicker of a count looks like a fast motion."""
-    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(4)
-    time = 1.7e9 + np.arange(400) / rate_hz
-    # Two stamps so near to each other are the same in seconds.
-    time[101] = time[100]
-    theta = 0.1 + step * rng.integers(0, 2, (400, 2))
-    turn = np.radians(1e-3) * rng.standard_normal((400, 3))
-    lost = np.arange(20, 400, 40)
-    turn[lost] += np.radians(0.15)
-    still = rigid_rotation(table, np.full((400, 2), 0.1))
-    rotation = Rotation.from_rotvec(turn).as_matrix() @ still
-    found = _spikes(time, np.zeros((400, 3)), rotation, rigid_rotation(table, theta), step)
-    np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
 def paused(campaign, first, last):
