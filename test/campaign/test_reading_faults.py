@@ -232,42 +232,6 @@ def test_a_target_that_sits_anyhow_is_read(tmp_path, campaign, table):
     assert len(read_session(campaign.written(tmp_path / "bag"), table)) == 799
 
 
-def paused(campaign, first, last):
-    """Leave out the joint states between two of them."""
-    del campaign.entries[first + 1 : last]
-    return campaign
-
-
-def test_where_joint_states_pause_in_motion_poses_have_no_angles(tmp_path, campaign, table):
-    """A straight way from one to the next is 9 deg wrong in the middle of a second."""
-    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    (why,) = session.remarks
-    assert "measured poses are not used: the motors moved while the joint states paused" in why
-    assert 90 < 799 - len(session) <= 100
-    time_ns = np.round(1e9 * session.block.time).astype(np.int64)
-    # 5 ms of this motion, and what a stamp since 1970 tells.
-    error = np.abs(session.block.theta - campaign.theta(time_ns))
-    assert error.max() < np.radians(0.25)
-
-
-def test_where_joint_states_pause_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
-    monkeypatch.setattr(
-        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
-    )
-    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    assert session.measured.all()
-    assert len(session) == 799
-
-
-def test_rare_joint_states_are_no_pause(tmp_path, campaign, table):
-    campaign.with_joints()
-    campaign.entries = campaign.entries[::80]
-    campaign.with_loads().with_poses()
-    assert read_session(campaign.written(tmp_path / "bag"), table).measured.sum() > 700
-
-
 def test_dropouts_are_counted(tmp_path, campaign, complete, table):
     nothing = np.full(3, np.nan)
     rotation = campaign.rigid(campaign.pose_ns)
@@ -302,18 +266,6 @@ def test_positions_stay_where_only_the_orientation_is_not_a_number(tmp_path, cam
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(session.rotation[:, 0, 0])) % 5, 0)
     told = "measured pose: 160 of 799 orientations are not finite: of these the position"
     assert any(remark.startswith(told) for remark in session.remarks)
-
-
-def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign, table):
-    theta = campaign.theta(campaign.joint_ns)
-    theta[300] = np.radians([0.0, 360.0])
-    campaign.theta = lambda time_ns: theta
-    campaign.with_joints()
-    del campaign.theta
-    campaign.with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    assert len(session) == 797
-    assert any("cannot reach" in remark for remark in session.remarks)
 
 
 @pytest.mark.parametrize(

@@ -166,7 +166,7 @@ def session_of(
     InputError
         If too few poses are left, or they are those of another wrist.
     """
-    remarks = list(track.remarks)
+    remarks = [*machine.remarks, *track.remarks]
     require_overlap(machine.angles.time_ns, track.time_ns)
     offset = late = _offset(machine, track, table)
     if offset is not None and _another_clock(offset, machine, track):
