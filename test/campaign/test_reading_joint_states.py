@@ -100,3 +100,23 @@ def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign,
     session = read_session(campaign.written(tmp_path / "bag"), table)
     assert len(session) == 797
     assert any("cannot reach" in remark for remark in session.remarks)
+
+
+def test_angles_that_are_sent_again_and_again_are_taken_when_they_appear(tmp_path, campaign, table):
+    """Read every 0.1 s, sent every 10 ms, at 30 deg/s; the wrist rests from 4 to 6 s."""
+    count = np.arange(800)
+    moment = campaign.joint_ns[np.where(count > 600, count - 200, np.minimum(count, 400))]
+    true = np.round(campaign.theta(moment) / np.radians(0.015)) * np.radians(0.015)
+    campaign.theta = lambda time_ns: true[count - count % 10]
+    campaign.with_joints()
+    del campaign.theta
+    rotation = campaign.mechanism.forward(true[:-1]).platform
+    campaign.with_loads().with_poses(rotation=rotation, stamps=campaign.joint_ns[:-1])
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert any("angles are read every 0.1 s" in remark for remark in session.remarks)
+    rows = np.searchsorted(campaign.joint_ns, np.round(1e9 * session.block.time) - 1000)
+    error = np.degrees(np.abs(session.block.theta - true[rows]))
+    # A chord of 0.1 s at 80 deg/s^2 and a count; a held angle is wrong by up to 3 deg.
+    at_turn = (rows > 390) & (rows < 412) | (rows > 590) & (rows < 612)
+    assert error[~at_turn].max() < 0.12
+    assert len(session) > 780

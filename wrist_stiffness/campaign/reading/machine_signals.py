@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.campaign.reading.held_angles import without_held
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps, in_order
 from wrist_stiffness.campaign.reading.wild_angles import without_wild
 from wrist_stiffness.compensation.intake import Frames
@@ -135,7 +136,8 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
     """
     loads, on_platform = _loads(samples.loads, frames)
     recorded = in_order(samples.joints.time_ns, samples.joints.position)
-    angles, wild = without_wild(recorded)
+    read, held_s = without_held(recorded)
+    angles, wild = without_wild(read)
     for signal, nothing in (
         (angles, "no joint state has finite angles"),
         (loads, "no load estimate is finite"),
@@ -149,8 +151,21 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
         on_platform,
         _slow(samples.temperatures),
         _slow(samples.covariates),
-        (f"{wild} of {len(recorded)} joint states are wild: left out",) if wild else (),
+        _said(wild, len(read), held_s),
     )
+
+
+def _said(wild: int, states: int, held_s: float) -> tuple[str, ...]:
+    """Return what is wrong with joint states."""
+    remarks = []
+    if held_s:
+        remarks.append(
+            f"the motor angles are read every {held_s:.3g} s and sent more often: they are taken "
+            "when they first appear, and are interpolated between"
+        )
+    if wild:
+        remarks.append(f"{wild} of {states} joint states are wild: left out")
+    return tuple(remarks)
 
 
 def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
