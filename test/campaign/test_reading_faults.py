@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.session import LEAST_POSES, _spikes, read_session
-from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
+from wrist_stiffness.campaign.reading.refusals import LEAST_POSES
+from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.recording.messages import PoseStamped
-from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows.simulate import simulate_recording
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
@@ -235,82 +232,6 @@ def test_a_target_that_sits_anyhow_is_read(tmp_path, campaign, table):
     assert len(read_session(campaign.written(tmp_path / "bag"), table)) == 799
 
 
-def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, table):
-    rng = np.random.default_rng(5)
-    shift = 5e-6 * rng.standard_normal((799, 3))
-    shift[400:] += 3e-4
-    lost = np.array([50, 200, 201, 600])
-    shift[lost] += 2e-3
-    campaign.with_joints().with_loads().with_poses(shift)
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    np.testing.assert_array_equal(np.flatnonzero(~session.measured.any(axis=1)), lost)
-    assert "4 of 799 measured poses are spikes: left out" in session.remarks
-
-
-@pytest.mark.parametrize("late_ms", [20, 66])
-def test_short_fast_moves_that_are_stamped_late_are_no_spikes(tmp_path, late_ms, table):
-    """At 10 Hz such a move is four samples between rests of many."""
-    late = HiddenEffect("time_delay", "pose_sensor", "plain", 1e-3 * late_ms, 0)
-    settings = CellSettings(rate_hz=10.0, hidden=(late,))
-    path = tmp_path / "late.mcap"
-    simulate_recording(path, table, settings, 120.0, seed=1)
-    session = read_session(path, table)
-    assert session.measured.all()
-
-
-@pytest.mark.parametrize("rate_hz", [10.0, 100.0, 1000.0])
-def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table):
-    """In dense poses the flicker of a count looks like a fast motion."""
-    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(4)
-    time = 1.7e9 + np.arange(400) / rate_hz
-    # Two stamps so near to each other are the same in seconds.
-    time[101] = time[100]
-    theta = 0.1 + step * rng.integers(0, 2, (400, 2))
-    turn = np.radians(1e-3) * rng.standard_normal((400, 3))
-    lost = np.arange(20, 400, 40)
-    turn[lost] += np.radians(0.15)
-    still = rigid_rotation(table, np.full((400, 2), 0.1))
-    rotation = Rotation.from_rotvec(turn).as_matrix() @ still
-    found = _spikes(time, np.zeros((400, 3)), rotation, rigid_rotation(table, theta), step)
-    np.testing.assert_array_equal(np.flatnonzero(found), lost)
-
-
-def paused(campaign, first, last):
-    """Leave out the joint states between two of them."""
-    del campaign.entries[first + 1 : last]
-    return campaign
-
-
-def test_where_joint_states_pause_in_motion_poses_have_no_angles(tmp_path, campaign, table):
-    """A straight way from one to the next is 9 deg wrong in the middle of a second."""
-    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    (why,) = session.remarks
-    assert "measured poses are not used: the motors moved while the joint states paused" in why
-    assert 90 < 799 - len(session) <= 100
-    time_ns = np.round(1e9 * session.block.time).astype(np.int64)
-    # 5 ms of this motion, and what a stamp since 1970 tells.
-    error = np.abs(session.block.theta - campaign.theta(time_ns))
-    assert error.max() < np.radians(0.25)
-
-
-def test_where_joint_states_pause_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
-    monkeypatch.setattr(
-        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
-    )
-    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    assert session.measured.all()
-    assert len(session) == 799
-
-
-def test_rare_joint_states_are_no_pause(tmp_path, campaign, table):
-    campaign.with_joints()
-    campaign.entries = campaign.entries[::80]
-    campaign.with_loads().with_poses()
-    assert read_session(campaign.written(tmp_path / "bag"), table).measured.sum() > 700
-
-
 def test_dropouts_are_counted(tmp_path, campaign, complete, table):
     nothing = np.full(3, np.nan)
     rotation = campaign.rigid(campaign.pose_ns)
@@ -345,18 +266,6 @@ def test_positions_stay_where_only_the_orientation_is_not_a_number(tmp_path, cam
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(session.rotation[:, 0, 0])) % 5, 0)
     told = "measured pose: 160 of 799 orientations are not finite: of these the position"
     assert any(remark.startswith(told) for remark in session.remarks)
-
-
-def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign, table):
-    theta = campaign.theta(campaign.joint_ns)
-    theta[300] = np.radians([0.0, 360.0])
-    campaign.theta = lambda time_ns: theta
-    campaign.with_joints()
-    del campaign.theta
-    campaign.with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
-    assert len(session) == 797
-    assert any("cannot reach" in remark for remark in session.remarks)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ import pytest
 
 from wrist_stiffness.campaign.reading.spikes import spikes
 
-LEAST = np.full((500, 1), 1e-6)
+LEAST = 1e-6
+STILL = np.zeros(500)
+NEVER = STILL > 0.0
 
 
 def noisy(size, at=(100, 101, 400)):
@@ -16,18 +18,33 @@ def noisy(size, at=(100, 101, 400)):
 
 @pytest.mark.parametrize("size", [150e-6, -150e-6])
 def test_thirty_deviations_are_a_spike(size):
-    assert np.flatnonzero(spikes(noisy(size), LEAST)).tolist() == [100, 101, 400]
+    assert np.flatnonzero(spikes(noisy(size), LEAST, STILL, NEVER)).tolist() == [100, 101, 400]
 
 
 def test_eight_deviations_are_not_yet_a_lost_beam():
-    assert not spikes(noisy(40e-6), LEAST).any()
+    assert not spikes(noisy(40e-6), LEAST, STILL, NEVER).any()
 
 
 def test_smaller_ones_than_the_least_are_none():
-    assert not spikes(noisy(150e-6), 1e3 * LEAST).any()
+    assert not spikes(noisy(150e-6), 1e3 * LEAST, STILL, NEVER).any()
 
 
-def test_each_measurement_has_a_least_of_its_own_also_where_others_are_missing():
-    values, least = noisy(150e-6), LEAST.copy()
-    values[:90], least[400] = np.nan, 1e-3
-    assert np.flatnonzero(spikes(values, least)).tolist() == [100, 101]
+def test_where_others_are_missing_spikes_are_found_all_the_same():
+    values = noisy(150e-6)
+    values[:90] = np.nan
+    assert np.flatnonzero(spikes(values, LEAST, STILL, NEVER)).tolist() == [100, 101, 400]
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.0, [100, 101, 400]), (0.2, [])])
+def test_as_much_as_motion_does_everywhere_is_no_spike(share, found):
+    """Every fifth sample moves, and late stamps make a share of the swing of it."""
+    moving = np.arange(500) % 5 == 0
+    values = noisy(150e-6)
+    values[moving, 0] += share * 1e-3
+    swing = np.full(500, 1e-3)
+    assert np.flatnonzero(spikes(values, LEAST, swing, moving)).tolist() == found
+
+
+def test_of_few_moves_all_is_put_down_to_the_motion_that_may_be():
+    swing = np.where(np.arange(500) == 400, 1e-3, 0.0)
+    assert np.flatnonzero(spikes(noisy(150e-6), LEAST, swing, swing > 0.0)).tolist() == [100, 101]

@@ -30,7 +30,8 @@ from wrist_stiffness.campaign.reading.pose_track import (
     last_of_equal,
     measured_components,
 )
-from wrist_stiffness.campaign.reading.session import notes_of, require_topics
+from wrist_stiffness.campaign.reading.refusals import require_topics
+from wrist_stiffness.campaign.reading.session import notes_of
 from wrist_stiffness.campaign.reading.signals import Stamps
 from wrist_stiffness.campaign.reading.static_frames import frames_of
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.campaign.reading.held_angles import without_held
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps, in_order
+from wrist_stiffness.campaign.reading.wild_angles import without_wild
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import FrameError, InputError
@@ -19,8 +21,9 @@ from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSampl
 JOINT_GAP_S = 0.5
 """Farthest joint state from a measured pose that still tells its angles [s]."""
 
-PAUSE_PERIODS = 3.0
-"""Of the joint states, beyond `JOINT_GAP_S`, that are a pause in which nobody knows the way."""
+WAY_S = 0.2
+"""Joint states farther apart than this do not tell the way of a moving motor: at 50 deg/s^2 a
+straight one is wrong by 0.25 deg, and by 6 deg between states a second apart [s]."""
 
 STILL_RAD = float(np.radians(0.05))
 """So much, some counts, the angles beside a pause may be from those of a pose in it [rad]."""
@@ -46,6 +49,8 @@ class MachineSignals:
         Whether their components are in U.
     temperatures, covariates : dict of str to Signal
         By component, by name.
+    remarks : tuple of str
+        What could not be used.
     """
 
     angles: Signal
@@ -54,6 +59,7 @@ class MachineSignals:
     load_on_platform: bool
     temperatures: Mapping[str, Signal]
     covariates: Mapping[str, Signal]
+    remarks: tuple[str, ...] = ()
 
     def usable(
         self, time_ns: Stamps, load_age_limit_s: float
@@ -67,7 +73,10 @@ class MachineSignals:
         reasons = []
         for known, what in (
             (angles, f"no joint state within {JOINT_GAP_S:g} s"),
-            (way | ~angles, "the motors moved while the joint states paused"),
+            (
+                way | ~angles,
+                f"the motors moved between joint states more than {WAY_S:g} s apart",
+            ),
             (loads | ~(angles & way), f"no load estimate in the {load_age_limit_s:g} s before"),
         ):
             if not known.all():
@@ -76,14 +85,19 @@ class MachineSignals:
 
     def _way_is_known(self, time_ns: Stamps) -> NDArray[np.bool_]:
         """Tell which stamps (n,) lie in no pause of the joint states, or in one without motion."""
-        own = self.angles.time_ns
-        before = np.maximum(self.angles.newest(time_ns), 0)
-        after = np.minimum(np.searchsorted(own, time_ns), len(own) - 1)
-        nearest = np.where(time_ns - own[before] < own[after] - time_ns, before, after)
-        moved = np.abs(self.angles.interpolated(time_ns) - self.angles.values[nearest])
-        period = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
-        longest = max(JOINT_GAP_S * NANOSECONDS, PAUSE_PERIODS * period)
-        return (own[after] - own[before] <= longest) | (moved <= STILL_RAD).all(axis=1)
+        own, angle = self.angles.time_ns, self.angles.interpolated
+        before = own[np.maximum(self.angles.newest(time_ns), 0)]
+        after = own[np.minimum(np.searchsorted(own, time_ns), len(own) - 1)]
+        gap = after - before
+        nearest = np.where(time_ns - before < after - time_ns, before, after)
+        moved = np.abs(angle(time_ns) - angle(nearest))
+        # A motor that turns back in a pause is where it was at both ends of it.
+        around = (np.maximum(before - gap, own[0]), before, after, np.minimum(after + gap, own[-1]))
+        way = np.diff(np.stack([angle(stamps) for stamps in around]), axis=0)
+        share = (time_ns - before) * (after - time_ns) / np.maximum(gap, 1) ** 2.0
+        bent = 0.5 * share[:, None] * np.max(np.abs(np.diff(way, axis=0)), axis=0)
+        still = (np.maximum(moved, bent) <= STILL_RAD).all(axis=1)
+        return (gap <= WAY_S * NANOSECONDS) | still
 
     def at(self, time_ns: Stamps) -> Block:
         """Return the signals that belong to usable stamps (n,) [ns], which rise."""
@@ -121,7 +135,9 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
         If no angle or no load is finite.
     """
     loads, on_platform = _loads(samples.loads, frames)
-    angles = in_order(samples.joints.time_ns, samples.joints.position)
+    recorded = in_order(samples.joints.time_ns, samples.joints.position)
+    read, held_s = without_held(recorded)
+    angles, wild = without_wild(read)
     for signal, nothing in (
         (angles, "no joint state has finite angles"),
         (loads, "no load estimate is finite"),
@@ -135,7 +151,21 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
         on_platform,
         _slow(samples.temperatures),
         _slow(samples.covariates),
+        _said(wild, len(read), held_s),
     )
+
+
+def _said(wild: int, states: int, held_s: float) -> tuple[str, ...]:
+    """Return what is wrong with joint states."""
+    remarks = []
+    if held_s:
+        remarks.append(
+            f"the motor angles are read every {held_s:.3g} s and sent more often: they are taken "
+            "when they first appear, and are interpolated between"
+        )
+    if wild:
+        remarks.append(f"{wild} of {states} joint states are wild: left out")
+    return tuple(remarks)
 
 
 def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:

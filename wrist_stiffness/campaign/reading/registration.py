@@ -13,6 +13,12 @@ from wrist_stiffness.mechanism.components import Array
 
 POSES_USED = 1000
 
+ROUNDS = 4
+"""After which registrations change no more."""
+
+SOUND = 3.0
+"""Times the median misfit up to which a position has a say in where the target is."""
+
 
 @dataclass(frozen=True)
 class Agreement:
@@ -96,3 +102,63 @@ def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
             if misfit < best:
                 best, said = misfit, change
     return said
+
+
+def turn_left(measured: Array, rigid: Array) -> Array:
+    """Return what constant turns of instrument and target leave of measured rotations.
+
+    Parameters
+    ----------
+    measured, rigid : (n, 3, 3) float
+        U -> F; measured ones are NaN where they are not.
+
+    Returns
+    -------
+    (n, 3) float
+        Rotation vectors from X rigid Y to measured [rad].
+    """
+    left = np.full((len(measured), 3), np.nan)
+    known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
+    if len(known) == 0:
+        return left
+    seen, said = Rotation.from_matrix(measured[known]), Rotation.from_matrix(rigid[known])
+    used = np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))
+    seen_used, said_used = seen[used], said[used]
+    instrument = Rotation.identity()
+    for _ in range(ROUNDS):
+        target = (said_used.inv() * instrument.inv() * seen_used).mean()
+        instrument = (seen_used * (said_used * target).inv()).mean()
+    left[known] = (seen * (instrument * said * target).inv()).as_rotvec()
+    return left
+
+
+def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
+    """Return what a constant place of the target in U and one in F leave of positions.
+
+    Parameters
+    ----------
+    shift : (n, 3) float
+        Measured positions [m]; NaN = not measured.
+    rigid : (n, 3, 3) float
+        U -> F.
+
+    Returns
+    -------
+    left : (n, 3) float
+        [m].
+    lever : float
+        Distance of the target from its place in U, as far as motion tells it [m].
+    """
+    used = np.unique(np.linspace(0, len(shift) - 1, POSES_USED).astype(int))
+    places = np.concatenate([rigid, np.broadcast_to(np.eye(3), rigid.shape)], axis=2)
+    design, seen = places[used].reshape(-1, 6), shift[used].ravel()
+    good = np.isfinite(seen)
+    if not good.any():
+        return shift, 0.0
+    fitted = np.zeros(6)
+    for _ in range(ROUNDS):
+        fitted = np.linalg.lstsq(design[good], seen[good], rcond=None)[0]
+        off = np.abs(seen - design @ fitted)
+        # A lost beam is far beyond three times the median of what is left.
+        good = off <= SOUND * np.nanmedian(off)
+    return shift - places @ fitted, float(np.linalg.norm(fitted[:3]))

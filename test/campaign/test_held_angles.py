@@ -1,0 +1,44 @@
+"""Angles that are read less often than sent are told from angles that rest or creep by counts."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.reading.held_angles import without_held
+from wrist_stiffness.campaign.reading.signals import Signal
+
+COUNT = np.radians(0.015)
+TIME_NS = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(2000)
+
+
+def counted(angle):
+    return np.stack([np.round(angle / COUNT), np.round(0.3 * angle / COUNT)], axis=1) * COUNT
+
+
+def moves():
+    """Swings of 10 deg with rests between."""
+    t = 0.01 * np.arange(2000)
+    return counted(np.radians(10.0) * np.sin(np.clip(t % 5.0, 0.0, 2.0 * np.pi / 2.0)))
+
+
+@pytest.mark.parametrize("every", [2, 5, 10])
+def test_repetitions_are_left_out(every):
+    rows = np.arange(2000)
+    kept, held_s = without_held(Signal(TIME_NS, moves()[rows - rows % every]))
+    assert held_s == pytest.approx(0.01 * every)
+    np.testing.assert_array_equal(kept.time_ns, TIME_NS[::every])
+
+
+@pytest.mark.parametrize("speed_deg_s", [0.2, 1.0, 5.0, 30.0])
+def test_slow_motion_in_counts_is_no_repetition(speed_deg_s):
+    signal = Signal(TIME_NS, counted(np.radians(speed_deg_s) * 0.01 * np.arange(2000)))
+    assert without_held(signal) == (signal, 0.0)
+
+
+def test_moves_with_rests_between_are_no_repetition():
+    signal = Signal(TIME_NS, moves())
+    assert without_held(signal) == (signal, 0.0)
+
+
+def test_one_joint_state_is_none():
+    signal = Signal(TIME_NS[:1], np.zeros((1, 2)))
+    assert without_held(signal) == (signal, 0.0)

@@ -1,0 +1,97 @@
+"""Lost beams are left out in motion too, and nothing else is."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.campaign.reading.lost_beams import lost_beams
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.workflows.simulate import simulate_recording
+
+
+def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, table):
+    rng = np.random.default_rng(5)
+    shift = 5e-6 * rng.standard_normal((799, 3))
+    shift[400:] += 3e-4
+    lost = np.array([50, 200, 201, 600])
+    shift[lost] += 2e-3
+    campaign.with_joints().with_loads().with_poses(shift)
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    np.testing.assert_array_equal(np.flatnonzero(~session.measured.any(axis=1)), lost)
+    assert "4 of 799 measured poses are spikes: left out" in session.remarks
+
+
+@pytest.mark.parametrize("late_ms", [20, 66])
+def test_short_fast_moves_that_are_stamped_late_are_no_spikes(tmp_path, late_ms, table):
+    """At 10 Hz such a move is four samples between rests of many."""
+    late = HiddenEffect("time_delay", "pose_sensor", "plain", 1e-3 * late_ms, 0)
+    settings = CellSettings(rate_hz=10.0, hidden=(late,))
+    path = tmp_path / "late.mcap"
+    simulate_recording(path, table, settings, 120.0, seed=1)
+    session = read_session(path, table)
+    assert session.measured.all()
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 100.0, 1000.0])
+def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table):
+    """In dense poses the flicker of a count looks like a fast motion."""
+    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(4)
+    time = 1.7e9 + np.arange(400) / rate_hz
+    # Two stamps so near to each other are the same in seconds.
+    time[101] = time[100]
+    theta = 0.1 + step * rng.integers(0, 2, (400, 2))
+    turn = np.radians(1e-3) * rng.standard_normal((400, 3))
+    lost = np.arange(20, 400, 40)
+    turn[lost] += np.radians(0.15)
+    still = rigid_rotation(table, np.full((400, 2), 0.1))
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ still
+    found = lost_beams(time, np.zeros((400, 3)), rotation, rigid_rotation(table, theta), step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)
+
+
+@pytest.fixture(scope="module")
+def worked(table):
+    """Two minutes of the cell at 10 Hz: the rotations in the cell's frame, moving poses apart."""
+    settings = CellSettings(rate_hz=10.0)
+    cell = VirtualCell(table, settings, np.random.default_rng(1))
+    time = np.arange(1200) / 10.0
+    sample = cell.run(time, cell.desired(time))
+    rigid = rigid_rotation(table, sample.encoder)
+    turned = Rotation.from_matrix(np.swapaxes(rigid[:-1], 1, 2) @ rigid[1:]).magnitude()
+    moving = 3 + np.flatnonzero(np.minimum(turned[2:-3], turned[3:-2]) > np.radians(0.5))
+    return time, sample, rigid, moving
+
+
+def test_a_lost_beam_of_a_pointing_sensor_is_found_in_motion(worked, table):
+    """0.2 deg, while the wrist turns by more than that from each sample to the next."""
+    time, sample, rigid, moving = worked
+    lost = moving[:: len(moving) // 15]
+    turn = np.zeros((1200, 3))
+    turn[lost, np.arange(len(lost)) % 3] = np.radians(0.2)
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ sample.measured_rotation
+    nowhere = np.full((1200, 3), np.nan)
+    step = table.geometry.limits.encoder_step
+    found = lost_beams(1.7e9 + time, nowhere, rotation, rigid, step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)
+
+
+@pytest.mark.parametrize("lever_mm", [5.0, 15.0])
+@pytest.mark.parametrize("points_only", [False, True])
+def test_a_target_off_o_costs_no_sound_pose_and_hides_no_lost_beam(
+    worked, table, lever_mm, points_only
+):
+    time, sample, rigid, moving = worked
+    target = Rotation.from_euler("xyz", [2.0, -1.0, 3.0], degrees=True).as_matrix()
+    lever = 1e-3 * lever_mm * np.array([0.6, -0.48, 0.64])
+    shift = sample.measured_shift + sample.measured_rotation @ lever
+    rotation = sample.measured_rotation @ target
+    if points_only:
+        rotation = np.full_like(rotation, np.nan)
+    lost = moving[:: len(moving) // 15]
+    shift[lost, 2] += 0.2e-3
+    step = table.geometry.limits.encoder_step
+    found = lost_beams(1.7e9 + time, shift, rotation, rigid, step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)

@@ -1,0 +1,122 @@
+"""Joint states that pause, are rare, wild or out of reach: what they cost, and that it is said."""
+
+import numpy as np
+
+from wrist_stiffness.campaign.reading.session import read_session
+
+MILLISECOND = 1_000_000
+
+
+def paused(campaign, first, last):
+    """Leave out the joint states between two of them."""
+    del campaign.entries[first + 1 : last]
+    return campaign
+
+
+def test_where_joint_states_pause_in_motion_poses_have_no_angles(tmp_path, campaign, table):
+    """A straight way from one to the next is 9 deg wrong in the middle of a second."""
+    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    (why,) = session.remarks
+    assert "not used: the motors moved between joint states more than 0.2 s apart" in why
+    assert 90 < 799 - len(session) <= 100
+    time_ns = np.round(1e9 * session.block.time).astype(np.int64)
+    # 5 ms of this motion, and what a stamp since 1970 tells.
+    error = np.abs(session.block.theta - campaign.theta(time_ns))
+    assert error.max() < np.radians(0.25)
+
+
+def test_where_joint_states_pause_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
+    monkeypatch.setattr(
+        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
+    )
+    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert session.measured.all()
+    assert len(session) == 799
+
+
+def test_between_rare_joint_states_poses_in_motion_have_no_angles(
+    tmp_path, campaign, table, monkeypatch
+):
+    """Also where motor 1 turns back between two of them; after 4 s the wrist rests."""
+    swing, end = type(campaign).theta, campaign.joint_ns[400]
+    monkeypatch.setattr(
+        type(campaign), "theta", lambda own, time_ns: swing(own, np.minimum(time_ns, end))
+    )
+    campaign.with_joints()
+    campaign.entries = campaign.entries[::80]
+    campaign.with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    told = (
+        "measured poses are not used: the motors moved between joint states more than 0.2 s apart"
+    )
+    assert any(told in remark for remark in session.remarks)
+    used = session.measured.any(axis=1)
+    assert used.sum() > 200
+    time_ns = np.round(1e9 * session.block.time).astype(np.int64)
+    error = np.abs(session.block.theta - campaign.theta(time_ns))[used]
+    assert error.max() < np.radians(0.05)
+
+
+def test_between_rare_joint_states_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
+    monkeypatch.setattr(
+        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
+    )
+    campaign.with_joints()
+    campaign.entries = campaign.entries[::80]
+    campaign.with_loads().with_poses(stamps=campaign.pose_ns[:700])
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert session.measured.all()
+    assert len(session) == 700
+
+
+def test_a_wild_joint_state_costs_no_pose_and_no_speed(tmp_path, campaign, table):
+    true = campaign.theta
+    right = true(campaign.joint_ns)
+    wild = right.copy()
+    wild[[100, 300], [0, 1]] += np.radians([5.0, -1.0])
+    campaign.theta = lambda time_ns: wild
+    campaign.with_joints()
+    campaign.theta = true
+    campaign.with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert session.remarks == ("2 of 800 joint states are wild: left out",)
+    assert session.measured.all()
+    late, early = (true(campaign.pose_ns + ns) for ns in (MILLISECOND, -MILLISECOND))
+    speed = (late - early) / 2e-3
+    found = session.block.theta_dot[:-3]
+    np.testing.assert_allclose(found, speed[:-3], atol=6e-3 * np.abs(speed).max())
+    np.testing.assert_allclose(session.block.theta, true(campaign.pose_ns), atol=np.radians(0.01))
+
+
+def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign, table):
+    theta = campaign.theta(campaign.joint_ns)
+    theta[300:302] = np.radians([0.0, 360.0])
+    campaign.theta = lambda time_ns: theta
+    campaign.with_joints()
+    del campaign.theta
+    campaign.with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert len(session) == 797
+    assert any("cannot reach" in remark for remark in session.remarks)
+
+
+def test_angles_that_are_sent_again_and_again_are_taken_when_they_appear(tmp_path, campaign, table):
+    """Read every 0.1 s, sent every 10 ms, at 30 deg/s; the wrist rests from 4 to 6 s."""
+    count = np.arange(800)
+    moment = campaign.joint_ns[np.where(count > 600, count - 200, np.minimum(count, 400))]
+    true = np.round(campaign.theta(moment) / np.radians(0.015)) * np.radians(0.015)
+    campaign.theta = lambda time_ns: true[count - count % 10]
+    campaign.with_joints()
+    del campaign.theta
+    rotation = campaign.mechanism.forward(true[:-1]).platform
+    campaign.with_loads().with_poses(rotation=rotation, stamps=campaign.joint_ns[:-1])
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    assert any("angles are read every 0.1 s" in remark for remark in session.remarks)
+    rows = np.searchsorted(campaign.joint_ns, np.round(1e9 * session.block.time) - 1000)
+    error = np.degrees(np.abs(session.block.theta - true[rows]))
+    # A chord of 0.1 s at 80 deg/s^2 and a count; a held angle is wrong by up to 3 deg.
+    at_turn = (rows > 390) & (rows < 412) | (rows > 590) & (rows < 612)
+    assert error[~at_turn].max() < 0.12
+    assert len(session) > 780

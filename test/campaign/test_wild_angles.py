@@ -1,0 +1,43 @@
+"""One joint state alone may be wild; what motors do is not."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.reading.signals import Signal
+from wrist_stiffness.campaign.reading.wild_angles import without_wild
+
+COUNT = np.radians(0.015)
+
+
+def swinging(rate_hz, period_s=1.0):
+    """Ten seconds of a swing of 10 deg, in counts that chatter."""
+    time = np.arange(0.0, 10.0, 1.0 / rate_hz)
+    angle = np.radians(10.0) * np.sin(2.0 * np.pi * time / period_s)
+    angle += COUNT * np.random.default_rng(2).integers(-1, 2, len(time))
+    time_ns = 1_700_000_000_000_000_000 + np.round(1e9 * time).astype(np.int64)
+    return Signal(time_ns, np.stack([angle, 0.5 * angle], axis=1))
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 1000.0])
+def test_what_motors_do_is_kept(rate_hz):
+    signal = swinging(rate_hz)
+    assert without_wild(signal)[1] == 0
+    steps = Signal(signal.time_ns, np.where(signal.values > 0.0, np.radians(3.0), 0.0))
+    assert without_wild(steps)[1] == 0
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 1000.0])
+def test_a_single_wild_one_is_left_out_also_in_motion(rate_hz):
+    signal = swinging(rate_hz)
+    signal.values[[40, 120], [0, 1]] += np.radians(1.0)
+    kept, left_out = without_wild(signal)
+    assert left_out == 2
+    np.testing.assert_array_equal(
+        np.setdiff1d(signal.time_ns, kept.time_ns), signal.time_ns[[40, 120]]
+    )
+
+
+def test_in_sparse_states_a_motor_may_have_gone_out_and_back():
+    signal = swinging(10.0)
+    signal.values[40] += np.radians(20.0)
+    assert without_wild(signal)[1] == 0

@@ -1,0 +1,62 @@
+"""Wild joint states: one alone, farther off than a motor can go and come back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.campaign.reading.signals import Signal
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.mechanism.components import Array
+
+DENSE_S = 0.025
+"""Median time between joint states below which out and back is no motion [s]."""
+
+LEAST_WILD_RAD = float(np.radians(0.2))
+"""Some counts: smaller ones are chatter [rad]."""
+
+ALONE = 4.0
+"""Times what its neighbours are off the line without it that a wild one is off the line."""
+
+
+def without_wild(angles: Signal) -> tuple[Signal, int]:
+    """Leave out single angles that are far from those before and after.
+
+    Parameters
+    ----------
+    angles : Signal
+        Motor angles (m, 2) [rad].
+
+    Returns
+    -------
+    kept : Signal
+        The others; all of them where they are too sparse to tell.
+    left_out : int
+    """
+    if len(angles) < 5 or np.median(np.diff(angles.time_ns)) > DENSE_S * NANOSECONDS:
+        return angles, 0
+    time = (angles.time_ns - angles.time_ns[0]) / NANOSECONDS
+    # Rows of each state with those around it, and of its neighbours with those without it.
+    off, before, after = (
+        _off_the_line(time, angles.values, *(np.arange(2, len(time) - 2) + k for k in ks))
+        for ks in ((-1, 0, 1), (-2, -1, 1), (-1, 1, 2))
+    )
+    alone = off > np.maximum(LEAST_WILD_RAD, ALONE * np.maximum(before, after))
+    # Far apart in time nobody knows what the motor did between.
+    own = np.diff(angles.time_ns)[1:-1]
+    near = np.maximum(own[:-1], own[1:]) <= 2 * DENSE_S * NANOSECONDS
+    kept = np.ones(len(angles), dtype=bool)
+    kept[2:-2] = ~(alone.any(axis=1) & near)
+    return Signal(angles.time_ns[kept], angles.values[kept]), int(np.sum(~kept))
+
+
+def _off_the_line(
+    time: Array,
+    values: Array,
+    first: NDArray[np.intp],
+    middle: NDArray[np.intp],
+    last: NDArray[np.intp],
+) -> Array:
+    """Return how far middle values (k, 2) are from the straight line between two others."""
+    share = ((time[middle] - time[first]) / (time[last] - time[first]))[:, None]
+    return np.asarray(np.abs(values[middle] - (1.0 - share) * values[first] - share * values[last]))
