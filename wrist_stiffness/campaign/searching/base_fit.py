@@ -147,7 +147,7 @@ class BaseFit:
         names = np.array([free[u.free].effect.name in self._usual for u in self.problem.unknowns])
         return names & ~self.of_base
 
-    @property
+    @cached_property
     def _usual(self) -> dict[str, FreeEffect]:
         return {each.effect.name: each for each in free_base(self.problem.whole)[0]}
 

@@ -58,6 +58,12 @@ class WristCandidate:
         shape -> columns, where they are known between the points of the grid.
     seen : bool
         Whether a fit has found it before, whatever its size.
+    change : (u, 6) float, optional
+        What a whole fit with the effect changes, residual before less residual after [m, rad]; it
+        then stands in place of the columns.
+    strain : float
+        By how much that fit puts the tolerances of the base further from the drawing: sum of
+        squares, in their standard deviations.
     points : bool
         Whether it turns the platform's normal, which is all that two motors can turn back.
     """
