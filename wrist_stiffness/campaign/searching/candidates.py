@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import SET_UP, TOLERATED
 from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
+from wrist_stiffness.campaign.refitted import SET_UP, TOLERATED
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
 from wrist_stiffness.diagnosis import Parameter as Factor
