@@ -28,8 +28,9 @@ from closed_loop_page import write_page
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate, said_calibrated
 from wrist_stiffness.campaign.fitting.extend import extend
-from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP, commissioning
+from wrist_stiffness.campaign.fitting.free_effects import commissioning
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.refitted import BUILT, SET_UP
 from wrist_stiffness.campaign.searching.candidates import compensable
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.lookup.table import Table

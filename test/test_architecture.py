@@ -22,7 +22,6 @@ ROOMS_USED = {
     "workflows": CORE | {"shipped"},
     "cli": CORE | {"workflows", "shipped"},
     "ros": CORE | {"workflows", "shipped"},
-    "web": CORE | {"workflows", "shipped"},
     "errors": set(),
     "atomic_file": set(),
     "shipped": set(),
@@ -34,7 +33,6 @@ ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both
     "fem": ROBOT | {"netgen", "skfem", "pymetis"},
-    "web": ROBOT | {"nicegui", "plotly"},
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
     "workflows": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
 }

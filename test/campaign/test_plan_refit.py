@@ -118,7 +118,7 @@ def test_a_plan_ends_where_half_of_what_may_be_is_settled(model, noise, earlier,
         told.append(by_truth(*given))
         return told[-1]
 
-    monkeypatch.setattr("wrist_stiffness.campaign.planning.plan.by_truth", spy)
+    monkeypatch.setattr("wrist_stiffness.campaign.planning.aims.by_truth", spy)
     weight = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
     conditions = Conditions((weight,), PACE, noise, None, 0)
     question = asked("gravity@platform", HEAVY, "gravity@link_3")
@@ -135,7 +135,7 @@ def test_what_was_asked_is_open_however_settled_it_is_reckoned(model, noise, ear
     """
     monkeypatch.setattr(pool, "POOL", 10)
     monkeypatch.setattr(
-        "wrist_stiffness.campaign.planning.plan.carried_over",
+        "wrist_stiffness.campaign.planning.aims.carried_over",
         lambda *given: 4.0 * carried_over(*given),
     )
     weight = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
@@ -151,9 +151,9 @@ def test_earlier_data_put_nothing_in_reach(model, noise, earlier, monkeypatch):
     """Else a plan would ask for the longest time what its loads never tell."""
     monkeypatch.setattr(pool, "POOL", 10)
     # As if the pool told nothing, however long, and the earlier data all.
-    monkeypatch.setattr("wrist_stiffness.campaign.planning.plan.LONGER", 0.0)
+    monkeypatch.setattr("wrist_stiffness.campaign.planning.aims.LONGER", 0.0)
     monkeypatch.setattr(
-        "wrist_stiffness.campaign.planning.plan.carried_over",
+        "wrist_stiffness.campaign.planning.aims.carried_over",
         lambda *given: 4.0 * carried_over(*given),
     )
     question = asked("gravity@platform", HEAVY, "gravity@link_3")

@@ -96,6 +96,20 @@ def test_the_place_of_a_wrong_effect_goes_to_the_right_one(model, units, alone, 
 
 
 @pytest.mark.slow
+def test_a_rival_that_explains_less_is_not_fitted_with_the_base(model, units, alone, candidates):
+    width = effect("backlash@motor_1", width_mdeg=57.0)
+    start = reached(model, units, alone, width, effect("time_delay@motor_2", delay_ms=10.0))
+    rivals = [each for each in candidates if each.name != width.name]
+    promised = start.screen(without=width.name).leaders(rivals)[0][0]
+    assert promised > seeking.WORTH
+
+    def never(*given):
+        pytest.fail("fitted, which takes seconds")
+
+    assert seeking._contested(never, start, width.name, rivals) is start
+
+
+@pytest.mark.slow
 def test_contributions_tell_how_much_each_effect_adds_and_what_is_proven(both):
     ranked = contributions(both.base, {"backlash@motor_1"})
     kinds = {each.name: each.kind for each in ranked}

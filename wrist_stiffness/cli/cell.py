@@ -8,9 +8,9 @@ from pathlib import Path
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 
 DESCRIPTION = """\
-Start pose_error_predictor, angle_corrector and a virtual wrist as ROS 2 nodes on this machine.
-With --seconds the same motion runs twice, first without and then with correction, and the command
-ends by itself; else the motion goes on until Ctrl-C and
+Start pose_error_predictor, angle_corrector, model_monitor and a virtual wrist as ROS 2 nodes on
+this machine. With --seconds the same motion runs twice, first without and then with correction, and
+the command ends by itself; else the motion goes on until Ctrl-C and
 'ros2 service call /angle_corrector/enable std_srvs/srv/SetBool "{data: true}"' switches the
 correction on. Without ROS_DOMAIN_ID in the environment the nodes get a domain of their own."""
 

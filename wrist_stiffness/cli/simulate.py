@@ -178,7 +178,7 @@ def _settings(arguments: argparse.Namespace) -> CellSettings:
 def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
     from dataclasses import asdict
 
-    from wrist_stiffness.campaign.fitting.free_effects import SET_UP
+    from wrist_stiffness.campaign.refitted import SET_UP
     from wrist_stiffness.simulation.blind import draw
     from wrist_stiffness.simulation.catalogue import ALL
     from wrist_stiffness.workflows.json_file import write_json

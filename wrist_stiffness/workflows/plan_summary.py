@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from wrist_stiffness.campaign.planning.aims import LONGER, Answer
 from wrist_stiffness.campaign.planning.information import chance_right
-from wrist_stiffness.campaign.planning.plan import LONGER, Answer, Plan
+from wrist_stiffness.campaign.planning.plan import Plan
 from wrist_stiffness.campaign.planning.question import Question
 
 MOST_LINES = 15

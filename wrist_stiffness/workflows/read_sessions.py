@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from wrist_stiffness.campaign.fitting.calibrate import CALIBRATED
-from wrist_stiffness.campaign.fitting.free_effects import BUILT, SET_UP
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.refitted import BUILT, SET_UP
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.error_model import ErrorModel

@@ -7,36 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS
+from wrist_stiffness.campaign.refitted import BUILT, SET_UP
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
-
-SET_UP = (
-    ("measurement_frame", ("pose_sensor",)),
-    ("target_mounting", ("pose_sensor",)),
-    ("encoder_offset", MOTORS),
-    ("load_bias", ("load_sensor",)),
-)
-"""What is set up anew in every session."""
-
-BUILT = (
-    ("axis_misalignment", JOINTS),
-    ("flange_contact", PASSIVE_JOINTS),
-    ("link_stiffness", LINKS),
-    ("bushing_stiffness", JOINTS),
-    ("load_scale", ("load_sensor",)),
-)
-"""What differs from wrist to wrist within its tolerances.  The gaps of the flanges are among them
-because whoever fits a wrist shims them to its axes; the load sensor's scale, because softer parts
-look nearly like it.
-
-A gap is free here by the prior of its law, tens of micrometres: a calibration describes whatever
-wrist stands there.  A diagnosis holds it to what shims leave (`searching.base_fit`), because a
-flange that stands otherwise is a fault to be named."""
-
-TOLERATED = frozenset(law for law, _ in BUILT)
-"""Laws of the wrist's tolerances: what they do within their priors is no finding."""
 
 
 @dataclass(frozen=True)

@@ -189,7 +189,7 @@ def weight(law: Law, place: str, signals: frozenset[str], near: Mapping[str, flo
     for axis in "xyz":
         moment = Factor(f"moment_{axis}_gmm", plausible=30.0 * 20.0)
         columns.append(Column(moment, heavy | {f"{axis}_mm": ARM_MM}, MASS_G * ARM_MM, heavy))
-    for key in own.keys() - {"mass_g", "x_mm", "y_mm", "z_mm"}:
+    for key in [each for each in own if each not in ("mass_g", "x_mm", "y_mm", "z_mm")]:
         columns.append(Column(factor(own[key]), zero | {key: 100.0}, 100.0))
 
     def start(found: Mapping[str, float], at: Shape) -> Values:

@@ -13,19 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.campaign.planning.aims import Answer, aims
 from wrist_stiffness.campaign.planning.choice import LOOKED_AT, choose
-from wrist_stiffness.campaign.planning.goals import all_goals, nearest, needed
 from wrist_stiffness.campaign.planning.information import (
-    Goal,
     Information,
     MeasurementNoise,
-    by_truth,
-    calibrated,
-    carried_over,
-    discrimination,
     improvement,
     information,
-    wrong_bound,
 )
 from wrist_stiffness.campaign.planning.loads_file import Source
 from wrist_stiffness.campaign.planning.pool import (
@@ -36,7 +30,7 @@ from wrist_stiffness.campaign.planning.pool import (
     moved_outward,
     reference_pose,
 )
-from wrist_stiffness.campaign.planning.question import SESSION, TARE, Question
+from wrist_stiffness.campaign.planning.question import Question
 from wrist_stiffness.campaign.planning.refit import rivals_alike
 from wrist_stiffness.campaign.planning.signatures import signatures
 from wrist_stiffness.campaign.planning.timeline import (
@@ -46,19 +40,12 @@ from wrist_stiffness.campaign.planning.timeline import (
     Visit,
     run_through,
 )
-from wrist_stiffness.campaign.planning.truths import after_data, as_asked
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 
-LONGER = 10.0
-"""What so many times the whole pool cannot separate counts as out of reach."""
-
 LONGEST_S = 3600.0
 """Of a plan between rivals for which no duration is asked [s]."""
-
-LIKELY = 0.5
-"""Share of a rival's possible values for which a plan settles it; the next one knows which hold."""
 
 Progress = Callable[[int, int], None]
 
@@ -86,30 +73,6 @@ class Conditions:
     noise: MeasurementNoise
     seconds: float | None
     seed: int
-
-
-@dataclass(frozen=True)
-class Answer:
-    """How well the plan answers one question.
-
-    Parameters
-    ----------
-    goal : Goal
-        The question.
-    discrimination : float
-        Beyond what was measured before, in standard deviations.
-    reachable : bool
-        Whether `LONGER` times the pool with these loads could settle it.
-    """
-
-    goal: Goal
-    discrimination: float
-    reachable: bool
-
-    @property
-    def settled(self) -> bool:
-        """Whether the plan settles it."""
-        return self.discrimination >= needed(self.goal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,15 +134,9 @@ def plan(
     LoadRangeError
         If a load cannot be applied within the table's range.
     """
-    workspace, pace = model.table.workspace, conditions.pace
     rng = np.random.default_rng(conditions.seed)
-    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
-    fixed = fixed_visits(settings, pace, workspace)
     whole = question.goals is None
-    if not whole:
-        settings += [moved_outward(setting, workspace) for setting in settings]
-    order = rng.permutation(2 * len(settings))
-    pool = _Pool(settings, fixed, order, pace, model, both_sides=whole)
+    pool = _drawn(model, conditions, whole, rng)
     seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
     shortest = pool.arranged([], rng)
     if shortest.duration_s > seconds:
@@ -195,66 +152,35 @@ def plan(
     known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
     question = question.without(lacking)
     before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
-    goals = question.goals
-    if goals is None:
-        goals = all_goals(known)
-    start = np.zeros_like(known.total)
-    for each in before:
-        start += carried_over(each, (*SESSION, TARE))
-    if before:
-        truths = after_data(start, known.layout, question.alike, rng)
-    else:
-        truths = as_asked(known, question.alike)
-    grams, start, layout = truths.of(known.grams), truths.of(start), truths.layout
-    total = grams.sum(axis=0)
-    best = discrimination(start + LONGER * total, layout, goals, start)
-    reachable = {goal: bool(d >= needed(goal)) for goal, d in zip(goals, best, strict=True)}
-    aimed = [goal for goal in goals if reachable[goal]]
-    if not aimed and not whole:
-        least = [Answer(goal, float(d), False) for goal, d in zip(goals, best, strict=True)]
-        return Plan(None, (), tuple(least), lacking, {})
-    if whole:
-        aimed = nearest(aimed, discrimination(total, layout, aimed))
-
-    def utility(gram: Array) -> Array:
-        right = 1.0 - wrong_bound(discrimination(gram, layout, aimed, start)).mean(axis=-1)
-        return right + calibrated(gram, layout) if whole else right
-
-    def enough(gram: Array) -> bool:
-        if conditions.seconds is not None:
-            return False
-        each = zip(aimed, by_truth(gram, layout, aimed, start), strict=True)
-        return all(np.mean(d >= needed(goal)) >= LIKELY for goal, d in each)
-
+    own = aims(known, before, question, rng)
+    if not own.reachable and not whole:
+        return Plan(None, (), own.at_most, lacking, {})
     chosen = choose(
-        pool.by_unit(grams),
+        pool.by_unit(own.pool.grams),
         pool.cost_s,
-        start + pool.fixed_gram(grams),
+        own.start + pool.fixed_gram(own.pool.grams),
         seconds - shortest.duration_s,
-        utility,
-        enough,
+        own.worth,
+        own.settled if conditions.seconds is None else _never,
         rng,
         LOOKED_AT if whole else len(pool.cost_s),
         per_second=conditions.seconds is not None,
     )
-    visits = pool.visits_of(chosen)
-    timeline = pool.arranged(visits, rng)
-    while timeline.duration_s > seconds:
-        visits = visits[: -pool.in_unit]
-        # Arranged anew without visits, it might get a longer warm-up.
-        timeline = pool.arranged(visits, rng) if visits else shortest
+    visits, timeline = pool.within(seconds, chosen, shortest, rng)
     final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
-    reached = discrimination(start + truths.of(final.total), layout, goals, start)
-    answers = [
-        Answer(goal, float(d), reachable[goal]) for goal, d in zip(goals, reached, strict=True)
-    ]
+    gram = own.start + own.truths.of(final.total)
     return Plan(
         timeline,
         tuple(visits),
-        tuple(answers),
+        own.answers(gram),
         lacking,
-        improvement(start + truths.of(final.total), layout),
+        improvement(gram, own.pool.layout),
     )
+
+
+def _never(gram: Array) -> bool:
+    """Tell that no experiment is enough: all the time asked for is used."""
+    return False
 
 
 class _Stages:
@@ -314,9 +240,38 @@ class _Pool:
         places = (self.in_unit * unit + side for unit in chosen for side in range(self.in_unit))
         return [replace(self._visits[place]) for place in places]
 
+    def within(
+        self,
+        seconds: float,
+        chosen: Sequence[int],
+        shortest: Timeline,
+        rng: np.random.Generator,
+    ) -> tuple[list[Visit], Timeline]:
+        """Return the visits of the first of some units that fit into a duration, arranged."""
+        visits = self.visits_of(chosen)
+        timeline = self.arranged(visits, rng)
+        while timeline.duration_s > seconds:
+            visits = visits[: -self.in_unit]
+            # Arranged anew without visits, it might get a longer warm-up.
+            timeline = self.arranged(visits, rng) if visits else shortest
+        return visits, timeline
+
     def arranged(self, visits: Sequence[Visit], rng: np.random.Generator) -> Timeline:
         """Return the experiment of some visits."""
         return arrange(visits, self._fixed, self._workspace, self._pace, rng)
+
+
+def _drawn(
+    model: ErrorModel, conditions: Conditions, whole: bool, rng: np.random.Generator
+) -> _Pool:
+    """Draw settings: both sides of each for a whole wrist, moved outward as well between rivals."""
+    workspace, pace = model.table.workspace, conditions.pace
+    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
+    fixed = fixed_visits(settings, pace, workspace)
+    if not whole:
+        settings += [moved_outward(setting, workspace) for setting in settings]
+    order = rng.permutation(2 * len(settings))
+    return _Pool(settings, fixed, order, pace, model, both_sides=whole)
 
 
 def evaluated(

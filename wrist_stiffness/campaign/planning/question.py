@@ -9,29 +9,18 @@ import numpy as np
 
 from wrist_stiffness.campaign.planning.information import Goal
 from wrist_stiffness.campaign.planning.signatures import plausible
+from wrist_stiffness.campaign.refitted import BUILT, SET_UP, names_of
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import catalogue, find_law
 
-SESSION = (
-    "measurement_frame@pose_sensor",
-    "target_mounting@pose_sensor",
-    "encoder_offset@motor_1",
-    "encoder_offset@motor_2",
-)
+TARE = "load_bias@load_sensor"
+"""Set anew in every session, but known to its plausible size."""
+
+SESSION = tuple(name for name in names_of(SET_UP) if name != TARE)
 """Of which nothing is known in a session."""
 
-TARE = "load_bias@load_sensor"
-"""Set anew in every session as well, but known to its plausible size."""
-
-WRIST = (
-    TARE,
-    *(f"axis_misalignment@joint_{i}" for i in range(1, 6)),
-    *(f"link_stiffness@link_{i}" for i in range(1, 4)),
-    *(f"bushing_stiffness@joint_{i}" for i in range(1, 6)),
-    *(f"flange_contact@joint_{i}" for i in range(2, 5)),
-    "load_scale@load_sensor",
-)
+WRIST = (TARE, *names_of(BUILT))
 """Known to their plausible sizes."""
 
 TRUTHS = 2

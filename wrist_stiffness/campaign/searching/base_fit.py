@@ -15,9 +15,10 @@ from scipy.linalg import lstsq
 from scipy.stats import chi2
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import TOLERATED, FreeEffect, commissioning
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.campaign.refitted import TOLERATED
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
@@ -147,7 +148,7 @@ class BaseFit:
         names = np.array([free[u.free].effect.name in self._usual for u in self.problem.unknowns])
         return names & ~self.of_base
 
-    @property
+    @cached_property
     def _usual(self) -> dict[str, FreeEffect]:
         return {each.effect.name: each for each in free_base(self.problem.whole)[0]}
 

@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import SET_UP, TOLERATED
 from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
+from wrist_stiffness.campaign.refitted import SET_UP, TOLERATED
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
 from wrist_stiffness.diagnosis import Parameter as Factor
@@ -58,6 +58,12 @@ class WristCandidate:
         shape -> columns, where they are known between the points of the grid.
     seen : bool
         Whether a fit has found it before, whatever its size.
+    change : (u, 6) float, optional
+        What a whole fit with the effect changes, residual before less residual after [m, rad]; it
+        then stands in place of the columns.
+    strain : float
+        By how much that fit puts the tolerances of the base further from the drawing: sum of
+        squares, in their standard deviations.
     points : bool
         Whether it turns the platform's normal, which is all that two motors can turn back.
     """

@@ -102,6 +102,16 @@ def diagnose_sessions(
         Thresholds.
     tell : callable, optional
         Told what is being done, every few seconds.
+
+    Returns
+    -------
+    WristDiagnosis
+        What the statistics say, and the fits that this rests on.
+
+    Raises
+    ------
+    InputError
+        If there is no session, or one without any measured pose.
     """
     if not sessions:
         raise InputError("no session to diagnose")
