@@ -144,7 +144,7 @@ def in_the_cell():
         warm = {name: sample.temperature[:, place] for place, name in enumerate(SENSED)}
         return MeasuredSession(
             "a session",
-            Block(time, sample.encoder, sample.wrench, cell.speed(time), temperatures=warm),
+            Block(time, sample.encoder, sample.wrench, sample.speed, temperatures=warm),
             sample.measured_shift,
             sample.measured_rotation,
             np.diag(instrument(settings.instrument).sigma ** 2),
