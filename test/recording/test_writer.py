@@ -1,5 +1,9 @@
 """What a writer leaves behind, whatever happens."""
 
+import random
+import resource
+import string
+
 import pytest
 import yaml
 from rosbags.highlevel import AnyReader
@@ -16,7 +20,9 @@ from wrist_stiffness.recording.messages import (
     JointState,
     Pose,
     PoseStamped,
+    String,
 )
+from wrist_stiffness.recording.writer import CHUNK_BYTES
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 FORMS = pytest.mark.parametrize("name", ["bag", "file.mcap"], ids=["folder", "bare"])
@@ -169,3 +175,42 @@ def test_the_current_folder_is_no_name_for_a_recording(tmp_path, monkeypatch, ov
     ):
         pass
     assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.fixture
+def smallest_files():
+    """Let no file of this process grow beyond 4 KiB: as on a full disk, writing is refused."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@FORMS
+def test_a_disk_that_refuses_the_end_leaves_one_line_and_nothing_else(
+    tmp_path, name, smallest_files
+):
+    with (
+        pytest.raises(RecordingError, match=f"{name} cannot be written: File too large"),
+        RecordingWriter(tmp_path / name) as writer,
+    ):
+        writer.write("/recording_notes", noise(2 * 4096), 1)
+    assert list(tmp_path.iterdir()) == []
+
+
+@FORMS
+def test_a_recording_of_which_a_message_was_refused_is_not_finished(tmp_path, name, smallest_files):
+    writer = RecordingWriter(tmp_path / name)
+    writer.__enter__()
+    with pytest.raises(RecordingError, match="File too large"):
+        writer.write("/recording_notes", noise(2 * CHUNK_BYTES), 1)
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))  # Somebody has made room.
+    with pytest.raises(RecordingError, match="File too large"):
+        writer.__exit__(None, None, None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def noise(characters):
+    """Return a text that no compression makes small."""
+    return String("".join(random.Random(1).choices(string.printable, k=characters)))

@@ -1,5 +1,6 @@
-"""What a run's last samples need: their answers, and a recorder that hears them out."""
+"""What a run's end needs: answers to the samples, and a recorder that hears them out."""
 
+import re
 import time
 
 import numpy as np
@@ -7,14 +8,18 @@ import pytest
 import rclpy
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.ros import cell_simulator
+from wrist_stiffness.ros.answer_count import AnswerCount
 from wrist_stiffness.ros.cell_simulator import CellSimulator
 from wrist_stiffness.ros.recorder import Recorder
+from wrist_stiffness.workflows.node_list import UNANSWERED
 
 QUIET_S = 0.5
+RATE_HZ = 50.0
 SAMPLES = 300
 
 
@@ -56,15 +61,15 @@ def refused(writer, channel, payload, log_time_ns):
 
 
 class Run:
-    """A virtual wrist that moves for a second, and a node that answers nothing by itself."""
+    """A virtual wrist that moves for some seconds, and a node that answers nothing by itself."""
 
     def __init__(self, graph, topic, message_type):
         self._graph = graph
-        self._answers = graph.probe.create_publisher(message_type, topic, 10)
+        self.answers = graph.probe.create_publisher(message_type, topic, 10)
         self._message_type, self.quiet_s = message_type, 0.0
         graph.listen(JointState, "/joint_states")
-        graph.add(CellSimulator, programs=1, program_s=1.0, rate_hz=50.0, listeners=1)
-        graph.until(self._answers.get_subscription_count, "listener")
+        graph.add(CellSimulator, programs=1, program_s=1.0, rate_hz=RATE_HZ, listeners=1)
+        graph.until(self.answers.get_subscription_count, "listener")
 
     def spin(self, seconds):
         """Go on until so much time has passed without a further sample."""
@@ -82,7 +87,7 @@ class Run:
     def answer(self):
         """Answer the last sample."""
         header = self._graph.heard["/joint_states"][-1].header
-        self._answers.publish(self._message_type(header=header))
+        self.answers.publish(self._message_type(header=header))
 
 
 @pytest.mark.parametrize(
@@ -109,3 +114,71 @@ def test_a_run_waits_but_not_for_ever(graph, monkeypatch):
         run.spin(np.inf)
     # The last sample is heard a little after it was said.
     assert run.quiet_s > 0.5 * QUIET_S
+
+
+@pytest.mark.parametrize("gone", [False, True], ids=["hangs", "hangs for so long that it is gone"])
+@pytest.mark.parametrize("answered", [0, 10])
+def test_a_run_says_who_fell_silent(graph, monkeypatch, capsys, answered, gone):
+    monkeypatch.setattr(cell_simulator, "LONGEST_ANSWER_S", QUIET_S)
+    run = Run(graph, "/pose_error_predicted", PoseWithCovarianceStamped)
+    heard = graph.heard["/joint_states"]
+    for sample in range(answered):
+        graph.until(lambda sample=sample: len(heard) > sample, "sample")
+        run.answer()
+    graph.until(lambda: heard, "sample")
+    if gone:
+        graph.probe.destroy_publisher(run.answers)
+    with pytest.raises(SystemExit) as ended:
+        run.spin(np.inf)
+    assert ended.value.code == UNANSWERED
+    (line,) = capsys.readouterr().err.splitlines()
+    told = re.search(
+        "pose_error_predictor: no answer heard to ([0-9]+) of ([0-9]+) samples, ([0-9]+) of", line
+    )
+    missing, asked, silence = map(int, told.groups())
+    assert asked == len(heard) >= 2 * RATE_HZ
+    # The motors' queue holds one: of answers that come close together only the newest is heard.
+    assert asked - answered <= missing < asked + (answered == 0)
+    assert asked - answered - 5 <= silence <= missing
+
+
+def test_a_run_of_which_a_node_is_held_up_for_less_than_a_second_is_sound(graph, capsys):
+    run = Run(graph, "/pose_error_predicted", PoseWithCovarianceStamped)
+    heard, answered = graph.heard["/joint_states"], [0]
+
+    def answer_some():
+        if len(heard) >= answered[0] + 0.6 * RATE_HZ:
+            answered[0] = len(heard)
+            run.answer()
+
+    with pytest.raises(SystemExit) as ended:
+        graph.until(answer_some, "end of the run")
+    assert len(heard) > 1.5 * RATE_HZ
+    assert ended.value.code == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_run_does_not_wait_for_ever_for_a_corrector_that_hangs(graph, monkeypatch, capsys):
+    monkeypatch.setattr(cell_simulator, "LONGEST_SWITCHING_S", QUIET_S)
+    hung = rclpy.create_node("angle_corrector", context=graph.context)  # Nobody runs it.
+    hung.create_service(SetBool, "~/enable", lambda request, response: response)
+    hung.create_subscription(JointState, "/motor_commands", lambda message: None, 10)
+    graph.add(CellSimulator, programs=2, program_s=1.0, rate_hz=RATE_HZ, enable_at_repeat=True)
+    with pytest.raises(SystemExit) as ended:
+        graph.until(lambda: False, "end of the run")
+    hung.destroy_node()
+    assert ended.value.code == UNANSWERED
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "/angle_corrector/enable: no answer in 0.5 s" in line
+
+
+def test_answers_are_counted_by_the_numbers_of_their_samples():
+    count = AnswerCount(first=10)
+    assert (count.asked(10), count.missing(10), count.silence(10)) == (0, 0, 0)
+    assert (count.asked(15), count.missing(15), count.silence(15)) == (5, 5, 5)
+    for number in (12, 13, 13, 11, 5, 17):
+        count.hear(number)
+    # Without an answer: 10, 11, 14, 15, 16, 18, 19.
+    assert count.last == 17
+    assert (count.asked(20), count.missing(20), count.silence(20)) == (10, 7, 3)
+    assert count.silence(30) == 12

@@ -191,8 +191,9 @@ def test_another_day_is_of_the_same_wrist_and_effect(wrist, tmp_path, monkeypatc
     assert samples[1].time_ns[0] - samples[0].time_ns[0] == 86_400 * 10**9
     assert not np.allclose(samples[0].position, samples[1].position)
     for day in ("0", "10001"):
-        assert main([*common, "-o", str(tmp_path / "x"), "--day", day], [command]) == 2
-        assert f"day {day} is not 1 to 10000" in capsys.readouterr().err
+        for asked in (["-o", str(tmp_path / "x")], ["--reveal", "1"]):
+            assert main([*common, *asked, "--day", day], [command]) == 2
+            assert f"day {day} is not 1 to 10000" in capsys.readouterr().err
 
 
 def test_chosen_effect_is_hidden_and_a_wrong_name_refused(wrist):

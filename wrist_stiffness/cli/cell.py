@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, PROG, OneLineParser
 
 DESCRIPTION = """\
 Start pose_error_predictor, angle_corrector, model_monitor and a virtual wrist as ROS 2 nodes on
 this machine. With --seconds the same motion runs twice, first without and then with correction, and
 the command ends by itself; else the motion goes on until Ctrl-C and
 'ros2 service call /angle_corrector/enable std_srvs/srv/SetBool "{data: true}"' switches the
-correction on. Without ROS_DOMAIN_ID in the environment the nodes get a domain of their own."""
+correction on. Without ROS_DOMAIN_ID in the environment the nodes get a domain of their own.
+Exit code 1: a node fell silent, or did not end when it was told to; one line says which."""
 
 EPILOG = """\
 example:
@@ -49,14 +51,15 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.workflows.cell import run_cell
 
-    run_cell(
+    sound = run_cell(
         arguments.model,
         arguments.seconds,
         arguments.record,
         arguments.rate,
         arguments.seed,
         Progress("cell"),
+        lambda line: print(f"{PROG}: {line}", file=sys.stderr),
     )
     if arguments.record is not None:
         print(f"written: {arguments.record}")
-    return EXIT_DONE
+    return EXIT_DONE if sound else EXIT_NO

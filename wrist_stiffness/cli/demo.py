@@ -41,7 +41,9 @@ def _run(output: str, seconds: float) -> int:
 
     model = shipped_file("config/palmieri2015_model.yaml")
     print(f"Live: predictor, corrector and a virtual wrist as ROS 2 nodes, {seconds:g} s ...")
-    result = run_demo(output, model, seconds, Progress)
+    result = run_demo(
+        output, model, seconds, Progress, lambda line: print(f"{PROG}: {line}", file=sys.stderr)
+    )
 
     print("\nThe table")
     for name, text in facts(result.table):

@@ -127,6 +127,7 @@ def _run(arguments: argparse.Namespace) -> int:
     check_bounds(arguments.seconds, arguments.rate, arguments.seed)
     table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
     settings = _settings(arguments)
+    on_day(arguments.day, settings)  # Also where nothing is written, there is no such day.
     if arguments.reveal is not None:
         return _reveal(arguments, table, settings)
     if arguments.output is None:

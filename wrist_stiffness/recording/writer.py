@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections import Counter
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -66,6 +67,7 @@ class RecordingWriter:
         self._is_folder = self.path.suffix != ".mcap"
         self._partial = self.path.parent / f".{self.path.name}.{os.getpid()}.partial"
         self._stream: BinaryIO | None = None
+        self._refused: OSError | None = None
         self._channels: dict[str, tuple[Channel, int]] = {}
         self._counts: Counter[str] = Counter()
         self._first_ns = _LAST_TIME_NS
@@ -135,6 +137,7 @@ class RecordingWriter:
             channel_id = self._register(channel)
             self._mcap.add_message(channel_id, log_time_ns, payload, publish_time=log_time_ns)
         except OSError as error:
+            self._refused = error
             raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
         self._counts[channel.topic] += 1
         self._first_ns = min(self._first_ns, log_time_ns)
@@ -146,15 +149,26 @@ class RecordingWriter:
         exception: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Give the recording its name, or remove what was written of it."""
+        """Give the recording its name, or remove what was written of it.
+
+        Raises
+        ------
+        RecordingError
+            If the disk refuses the end, or has refused a message before.
+        """
         try:
+            if exception_type is None and self._refused is not None:
+                # What was refused may be written in part: an end behind it makes no whole file.
+                raise self._refused
             if exception_type is None:
                 self._finish()
         except OSError as error:
             raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
         finally:
             if self._stream is not None:
-                self._stream.close()
+                # Of a finished recording nothing is left to write; of another nothing is kept.
+                with suppress(OSError):
+                    self._stream.close()
                 self._stream = None
             _remove(self._partial)
 

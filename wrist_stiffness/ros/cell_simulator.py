@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, WrenchStamped
@@ -22,6 +23,7 @@ from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import ParameterEntry
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.ros.answer_count import AnswerCount
 from wrist_stiffness.ros.conversions import (
     joint_message,
     nanoseconds,
@@ -30,14 +32,13 @@ from wrist_stiffness.ros.conversions import (
 )
 from wrist_stiffness.ros.parameters import declare, model_path
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
-from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.run import run, tell
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-
-LARGEST_SEED = 2**31 - 1
+from wrist_stiffness.workflows.node_list import LARGEST_SEED, RATES_HZ, UNANSWERED
 
 PARAMETERS = (
     ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),
-    ParameterEntry("rate_hz", 100.0, "samples per second", lower=1.0, upper=2000.0),
+    ParameterEntry("rate_hz", 100.0, "samples per second", lower=RATES_HZ[0], upper=RATES_HZ[1]),
     ParameterEntry("program_s", 60.0, "length of the motion [s]", lower=1.0, upper=86400.0),
     ParameterEntry(
         "programs",
@@ -72,8 +73,20 @@ ANSWERS = {
 }
 """What the wrist's nodes say of a sample, beside the corrected command."""
 
+SPEAKERS = {
+    "/pose_error_predicted": "pose_error_predictor",
+    "/model_residual": "model_monitor",
+    CORRECTED: "angle_corrector",
+}
+
 LONGEST_ANSWER_S = 1.0
 """So long the last sample waits for its answers, where nobody may be there to give them."""
+
+SILENCE_S = 1.0
+"""A node that answers no sample for longer than that hangs; one that is held up loses some."""
+
+LONGEST_SWITCHING_S = 10.0
+"""So long the motion waits for the angle corrector to be switched on."""
 
 
 class CellSimulator(Node):
@@ -99,6 +112,7 @@ class CellSimulator(Node):
         self._step = 0
         self._program = -1
         self._enabling: Future | None = None
+        self._enabling_s = 0.0
 
         self._joints = self.create_publisher(JointState, "/joint_states", RELIABLE_QOS)
         self._load = self.create_publisher(WrenchStamped, "/load_estimate", RELIABLE_QOS)
@@ -111,8 +125,8 @@ class CellSimulator(Node):
             NOTES_QOS,
         )
         self._enable = self.create_client(SetBool, "/angle_corrector/enable")
-        self._asked_ns, self._asked_s = 0, time.monotonic()
-        self._answered = dict.fromkeys([CORRECTED, *ANSWERS], 0)
+        self._asked_s = time.monotonic()
+        self._answers: dict[str, AnswerCount] = {}
         self.create_subscription(JointState, CORRECTED, self._on_command, SENT_QUEUE)
         for topic, message_type in ANSWERS.items():
             answer = partial(self._on_answer, topic)
@@ -120,7 +134,11 @@ class CellSimulator(Node):
         self.create_timer(1.0 / settings.rate_hz, self._on_timer)
 
     def _on_answer(self, topic: str, message: JointState | PoseWithCovarianceStamped) -> None:
-        self._answered[topic] = nanoseconds(message.header.stamp)
+        if topic in self._answers and self._start_ns is not None:
+            since_s = (nanoseconds(message.header.stamp) - self._start_ns) / NANOSECONDS
+            number = round(since_s * self.cell.settings.rate_hz)
+            if number < self._step:
+                self._answers[topic].hear(number)
 
     def _on_command(self, message: JointState) -> None:
         self._on_answer(CORRECTED, message)
@@ -158,12 +176,16 @@ class CellSimulator(Node):
                 return False
             for publisher in self.publishers:
                 publisher.wait_for_all_acked(Duration(seconds=1.0))
-            raise SystemExit(0)
+            self._end(self._silent())
         corrects = self._enable_at_repeat and program > 0
         if corrects:
             if self._enabling is None:
                 self._enabling = self._enable.call_async(SetBool.Request(data=True))
+                self._enabling_s = time.monotonic()
             if not self._enabling.done():
+                if time.monotonic() > self._enabling_s + LONGEST_SWITCHING_S:
+                    switched = f"{self._enable.srv_name}: no answer in {LONGEST_SWITCHING_S:g} s"
+                    self._end([switched, *self._silent()])
                 return False
         self._program = program
         notes = {
@@ -179,14 +201,33 @@ class CellSimulator(Node):
     def _is_answered(self) -> bool:
         """Tell whether those who are there have answered the last sample, or take too long."""
         return time.monotonic() > self._asked_s + LONGEST_ANSWER_S or all(
-            stamp_ns >= self._asked_ns or not self.count_publishers(topic)
-            for topic, stamp_ns in self._answered.items()
+            answers.last == self._step - 1 or not self.count_publishers(topic)
+            for topic, answers in self._answers.items()
         )
+
+    def _silent(self) -> list[str]:
+        """Return who left samples without an answer for too long."""
+        longest = SILENCE_S * self.cell.settings.rate_hz
+        return [
+            f"{SPEAKERS[topic]}: no answer heard to {answers.missing(self._step)} of "
+            f"{answers.asked(self._step)} samples, {answers.silence(self._step)} of them in a row"
+            for topic, answers in self._answers.items()
+            if answers.silence(self._step) > longest
+        ]
+
+    def _end(self, faults: Sequence[str]) -> NoReturn:
+        if faults:
+            tell("; ".join(faults))
+        raise SystemExit(UNANSWERED if faults else 0)
 
     def _stamp_ns(self, time_s: float) -> int:
         return (self._start_ns or 0) + round(time_s * NANOSECONDS)
 
     def _publish(self, time_s: float) -> None:
+        for topic in SPEAKERS:
+            # Once it was there: of a node that hangs for long the middleware says that it has gone.
+            if topic not in self._answers and self.count_publishers(topic):
+                self._answers[topic] = AnswerCount(self._step)
         stamp_ns = self._stamp_ns(time_s)
         sample = self.cell.step(time_s, self._sent)
         # The load first: it belongs to the joint state of the same stamp.
@@ -197,7 +238,7 @@ class CellSimulator(Node):
         )
         self._true.publish(pose_message_stamped(stamp_ns, sample.pose_rotation, sample.pose_shift))
         self._command.publish(joint_message(stamp_ns, "", self._names, self.cell.desired(time_s)))
-        self._asked_ns, self._asked_s = stamp_ns, time.monotonic()
+        self._asked_s = time.monotonic()
 
 
 def main() -> int:

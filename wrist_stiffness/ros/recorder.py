@@ -124,9 +124,11 @@ class Recorder(Node):
                 if not take_in_order(data):
                     break
         finally:
-            # Whatever a full disk refuses of the last messages, the ones before are to be kept.
-            super().destroy_node()
-            self._recording.close()
+            # First the recording: a crash of the middleware as it ends must not cost it.
+            try:
+                self._recording.close()
+            finally:
+                super().destroy_node()
 
 
 def main() -> int:

@@ -32,15 +32,31 @@ def run(make_node: Callable[[], Node]) -> int:
     Returns
     -------
     int
-        0, or 2 if the node cannot start as asked; one line on stderr says why.
+        0, or 2 if the node cannot start, go on or end as asked; one line on stderr says why.
     """
     end_with_parent()
     interrupted = _interrupts_without_raising()
     rclpy.init()
     executor = StreamExecutor()
     try:
-        if interrupted:
-            return 0
+        if not interrupted:
+            _spin(executor, make_node)
+    except (WristError, ParameterException) as error:
+        tell(str(error))
+        return EXIT_BAD_INPUT
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+def tell(error: str) -> None:
+    """Say what is wrong in one line on stderr."""
+    print(f"wrist-stiffness node: error: {' '.join(error.split())}", file=sys.stderr)
+
+
+def _spin(executor: StreamExecutor, make_node: Callable[[], Node]) -> None:
+    """Make a node, run it until the context is shut down, and destroy it."""
+    try:
         executor.add_node(make_node())
         # What a node starts with stays: the collector need not go through it again and again.
         gc.collect()
@@ -48,9 +64,8 @@ def run(make_node: Callable[[], Node]) -> int:
         executor.spin()
     except ExternalShutdownException:
         pass
-    except (WristError, ParameterException) as error:
-        print(f"wrist-stiffness node: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+    except (WristError, ParameterException):
+        raise
     except Exception:
         # Told to stop while it was still starting: ROS then fails wherever the node happens to be.
         if rclpy.ok():
@@ -58,8 +73,6 @@ def run(make_node: Callable[[], Node]) -> int:
     finally:
         for node in executor.get_nodes():
             node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
 
 
 def _interrupts_without_raising() -> list[int]:

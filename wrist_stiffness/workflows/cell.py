@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,9 +16,12 @@ from typing import NoReturn
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.workflows.node_list import (
+    LARGEST_SEED,
     PARENT_PID,
+    RATES_HZ,
     RECORDER_NODE,
     SIMULATOR_NODE,
+    UNANSWERED,
     WRIST_NODES,
     NodeEntry,
     ParameterValue,
@@ -44,6 +47,7 @@ DOMAINS = 90
 """ROS domains 1 to 90; those above 101 clash with ports that Linux hands out."""
 
 Progress = Callable[[int, int], None]
+Tell = Callable[[str], None]
 
 
 def run_cell(
@@ -53,7 +57,8 @@ def run_cell(
     rate_hz: float = 100.0,
     seed: int = 0,
     progress: Progress = lambda done, total: None,
-) -> None:
+    tell: Tell = lambda line: None,
+) -> bool:
     """Run predictor, corrector and virtual cell until the motion is over; in the main thread.
 
     The same motion runs twice, first with the corrector off and then with it on, so that before
@@ -74,16 +79,24 @@ def run_cell(
         Of the motion and of the sensors' noise.
     progress : callable
         Called with seconds done and in all.
+    tell : callable
+        Called with a line for every node that had to be killed in the end.
+
+    Returns
+    -------
+    bool
+        Whether all nodes answered all along and ended when they were told to; the virtual cell
+        itself says on stderr which one fell silent.
 
     Raises
     ------
     WristError
-        If the model cannot be read, a node ends with an error, or the run does not end in time.
+        If a number or the model cannot be used, a node ends with an error, the run does not end in
+        time, or the recording is not complete.
     """
     if find_spec("rclpy") is None:
         raise InputError("cell: ROS 2 (rclpy) is not installed; pip install 'wrist_stiffness[ros]'")
-    if seconds is not None and not SHORTEST_S <= seconds <= LONGEST_S:
-        raise InputError(f"seconds: {seconds:g} is not {SHORTEST_S:g} to {LONGEST_S:g}")
+    check_numbers(seconds, rate_hz, seed)
     chosen: dict[str, ParameterValue] = {}
     if model is not None:
         load_model(model)
@@ -98,19 +111,48 @@ def run_cell(
     moves["listeners"] = 2 if record is None else 3
     if seconds is not None:
         moves |= {"program_s": seconds / 2.0, "programs": 2, "enable_at_repeat": True}
-    with _processes([*nodes, SIMULATOR_NODE.having({**chosen, **moves})]) as running:
-        _wait(running, seconds, progress)
+    killed: list[str] = []
+
+    def tell_killed(name: str) -> None:
+        killed.append(name)
+        tell(f"cell: node {name} had not ended {END_PATIENCE_S:g} s after it was told to; killed")
+
+    with _processes([*nodes, SIMULATOR_NODE.having({**chosen, **moves})], tell_killed) as running:
+        answered = _wait(running, seconds, progress)
+    if record is not None:
+        code = running[RECORDER_NODE.name].returncode
+        # A recording that has its name is complete, however the middleware ends after that.
+        if code > 0 or not Path(record).exists():
+            raise InputError(f"cell: node {RECORDER_NODE.name} ended with code {code}")
+    return answered and not killed
+
+
+def check_numbers(seconds: float | None, rate_hz: float = 100.0, seed: int = 0) -> None:
+    """Refuse numbers with which no run can be, before any node is started.
+
+    Raises
+    ------
+    InputError
+        With the limits.
+    """
+    if seconds is not None and not SHORTEST_S <= seconds <= LONGEST_S:
+        raise InputError(f"seconds: {seconds:g} is not {SHORTEST_S:g} to {LONGEST_S:g}")
+    if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
+        raise InputError(f"rate: {rate_hz:g} is not {RATES_HZ[0]:g} to {RATES_HZ[1]:g} per second")
+    if not 0 <= seed <= LARGEST_SEED:
+        raise InputError(f"seed: {seed} is not 0 to {LARGEST_SEED}")
 
 
 def _wait(
     running: Mapping[str, subprocess.Popen[bytes]], seconds: float | None, progress: Progress
-) -> None:
+) -> bool:
+    """Wait for the virtual cell to end; False where a node did not answer it."""
     start_s = time.monotonic()
     while True:
         for name, process in running.items():
             code = process.poll()
-            if code == 0 and name == SIMULATOR_NODE.name:
-                return
+            if code in (0, UNANSWERED) and name == SIMULATOR_NODE.name:
+                return code == 0
             if code is not None:
                 raise InputError(f"cell: node {name} ended with code {code}")
         elapsed_s = time.monotonic() - start_s
@@ -122,8 +164,10 @@ def _wait(
 
 
 @contextmanager
-def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.Popen[bytes]]]:
-    """Start nodes; end them in any case, first asked and then forced.
+def _processes(
+    nodes: Sequence[NodeEntry], tell_killed: Tell
+) -> Iterator[Mapping[str, subprocess.Popen[bytes]]]:
+    """Start nodes; end them in any case, first asked and then forced, which is told by name.
 
     The recorder ends last, so that it hears what the others say until they end.
     """
@@ -144,23 +188,27 @@ def _processes(nodes: Sequence[NodeEntry]) -> Iterator[Mapping[str, subprocess.P
             )
         yield running
     finally:
-        recorder = [running.pop(RECORDER_NODE.name)] if RECORDER_NODE.name in running else []
-        _end(running.values())
-        _end(recorder)
+        for last in (False, True):
+            ending = {n: each for n, each in running.items() if (n == RECORDER_NODE.name) is last}
+            for name in _end(ending):
+                tell_killed(name)
         signal.signal(signal.SIGTERM, previous)
 
 
-def _end(processes: Collection[subprocess.Popen[bytes]]) -> None:
-    """Ask processes to end, and force those that have not after one patience for all."""
-    for process in processes:
+def _end(processes: Mapping[str, subprocess.Popen[bytes]]) -> list[str]:
+    """Ask processes to end, force those that have not after one patience for all; name these."""
+    for process in processes.values():
         process.terminate()
     end_s = time.monotonic() + END_PATIENCE_S
-    for process in processes:
+    killed = []
+    for name, process in processes.items():
         try:
             process.wait(max(end_s - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+            killed.append(name)
+    return killed
 
 
 def _leave(number: int, frame: FrameType | None) -> NoReturn:

@@ -14,7 +14,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.writer import is_only_recording
 from wrist_stiffness.workflows.before_after import Pass, before_and_after
-from wrist_stiffness.workflows.cell import run_cell
+from wrist_stiffness.workflows.cell import Tell, check_numbers, run_cell
 from wrist_stiffness.workflows.compare_runs import RunComparison, compare_runs
 from wrist_stiffness.workflows.pictures.before_after import draw_before_after
 from wrist_stiffness.workflows.replay import ReplaySummary, replay
@@ -53,7 +53,11 @@ class DemoResult:
 
 
 def run_demo(
-    folder: str | Path, model: str | Path, seconds: float, progress: Callable[[str], Progress]
+    folder: str | Path,
+    model: str | Path,
+    seconds: float,
+    progress: Callable[[str], Progress],
+    tell: Tell,
 ) -> DemoResult:
     """Run the main job and leave its recordings and pictures in a folder.
 
@@ -67,6 +71,8 @@ def run_demo(
         About how long the live run takes [s].
     progress : callable
         Given a label, returns what is called with steps done and in all.
+    tell : callable
+        Called with a line for every node that had to be killed.
 
     Returns
     -------
@@ -76,8 +82,10 @@ def run_demo(
     Raises
     ------
     WristError
-        If a step fails, or the folder holds something else under a recording's name.
+        If a step fails or a live node fell silent, or the folder holds something else under a
+        recording's name.
     """
+    check_numbers(seconds)
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -93,7 +101,11 @@ def run_demo(
         (folder / name).unlink(missing_ok=True)
     table = load_model(model).table
     pictures = draw_maps(table, folder)
-    run_cell(Path(model), seconds, folder / LIVE, progress=progress("live nodes"))
+    sound = run_cell(
+        Path(model), seconds, folder / LIVE, progress=progress("live nodes"), tell=tell
+    )
+    if not sound:
+        raise InputError(f"demo: not every node answered and ended; {folder / LIVE} is kept")
     replayed = replay(folder / LIVE, model, folder / REPLAYED, progress=progress("replay"))
     before, after = before_and_after(folder / LIVE, table)
     picture = folder / PICTURES[-1]

@@ -6,6 +6,15 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+RATES_HZ = (1.0, 2000.0)
+"""Slowest and fastest samples of the virtual cell."""
+
+LARGEST_SEED = 2**31 - 1
+"""Of the virtual cell; a ROS parameter holds it, and so does every seed of NumPy."""
+
+UNANSWERED = 3
+"""Exit code of the virtual cell after a run in which a node fell silent."""
+
 ParameterValue = bool | int | float | str
 
 PARENT_PID = "WRIST_STIFFNESS_PARENT"
