@@ -50,6 +50,7 @@ from solvers import (
     stepwise_bic,
     told_the_answer,
 )
+from told_the_name import told_the_name
 
 from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
@@ -65,6 +66,7 @@ SOLVERS: dict[str, Solver] = {
     "diagnosis_core": diagnosis_core,
     "own_diagnosis": own_diagnosis,
     "own_diagnosis_mcap": own_diagnosis_mcap,
+    "told_the_name": told_the_name,
     "knows_the_laws": knows_the_laws,
 }
 SAMPLED = ("own_diagnosis_mcap", "diagnosis_core", "spans_of_the_laws", "knows_the_laws")
@@ -79,6 +81,7 @@ FILES = {
     "diagnosis_core": ("solvers.py", "diagnosis_core.py"),
     "own_diagnosis": ("own_diagnosis.py",),
     "own_diagnosis_mcap": ("own_diagnosis.py",),
+    "told_the_name": ("solvers.py", "told_the_name.py"),
     "knows_the_laws": ("solvers.py", "ceiling.py"),
 }
 
@@ -97,6 +100,11 @@ def version_of(solver: str) -> str:
         "own_diagnosis_mcap": (
             *OWN,
             "wrist_stiffness.workflows.simulate",
+        ),
+        "told_the_name": (
+            *OWN,
+            "wrist_stiffness.campaign.fitting.calibrate",
+            "wrist_stiffness.campaign.fitting.extend",
         ),
     }.get(solver, ())
     # The project's calibration of what is read is in the floor of every score.
