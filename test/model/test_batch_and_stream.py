@@ -12,9 +12,7 @@ from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.model import batch
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.contacts import solve_contacts
-from wrist_stiffness.model.contribution import Contribution
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.effects.load_scale import LoadScale
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
@@ -124,31 +122,6 @@ def test_a_calibrated_model_is_predicted_in_any_order(model, make):
                 scale = np.abs(expected).max(axis=0)
                 assert np.all(np.abs(getattr(one, key) - expected[row]) <= 1e-12 * scale)
     assert not loaded.with_effects(*loaded.effects, plausible("backlash", "motor_1")).stateless
-
-
-def test_a_scaled_load_is_another_load_by_the_spline_as_well(model, make):
-    spline, block = model.with_evaluation("spline"), make.block(1)
-    scaled = make.effect("load_scale@load_sensor", scale_percent=(25.0, 1.0))
-    found = spline.with_effects(scaled).predict(block.theta[0], Load(block.load[0]))
-    expected = spline.predict(block.theta[0], Load(0.8 * block.load[0]))
-    np.testing.assert_allclose(found.twist, expected.twist, rtol=1e-9)
-
-
-class PastDeadBand(LoadScale):
-    """A user's sensor, which says nothing of the first newton; the rest of it is as shipped."""
-
-    id = "past_dead_band"
-
-    def advance(self, at, place, values, state):
-        return Contribution(wrench=at.load / np.linalg.norm(at.load[:, :3], axis=1)[:, None]), None
-
-
-def test_of_a_users_law_only_its_own_answer_counts(model, make):
-    own = Effect(PastDeadBand(), "load_sensor", {"scale_percent": Estimate(25.0)})
-    theta, load = np.radians([10.0, -15.0]), np.array([0.0, 0.0, -2.0, 0.0, 0.0, 0.0])
-    found = model.with_effects(own).predict(theta, Load(load))
-    expected = model.predict(theta, Load(1.5 * load))
-    np.testing.assert_allclose(found.twist, expected.twist, rtol=1e-9)
 
 
 def test_preview_leaves_no_trace(model, make):
