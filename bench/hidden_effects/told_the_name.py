@@ -15,6 +15,7 @@ from solvers import Answer, nothing
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
 from wrist_stiffness.campaign.fitting.extend import extend
+from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.refitted import BUILT, names_of
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -22,7 +23,7 @@ from wrist_stiffness.model.registry import find_law
 
 
 def told_the_name(riddle: Riddle, words: Dictionary | None = None) -> Answer:
-    """Add what hides, by effect and place alone, to the wrist calibrated on the first day.
+    """Add what hides, by effect and place alone, and calibrate the wrist with it on the first day.
 
     Tolerances that hide something are refitted by the calibration itself.  Asked are one effect of
     the catalogue and two.
@@ -31,11 +32,14 @@ def told_the_name(riddle: Riddle, words: Dictionary | None = None) -> Answer:
         return nothing(riddle)
     names = [f"{hidden.effect}@{hidden.component}" for hidden in riddle.hidden]
     sessions = [riddle.days[0].read]
-    model = calibrate(ErrorModel("benchmark", wrist(), "closed_form"), sessions).model
-    for name in names:
-        if name not in names_of(BUILT):
-            law, _, place = name.partition("@")
-            model = extend(model, Effect(find_law(law), place), sessions).model
+    model = ErrorModel("benchmark", wrist(), "closed_form")
+    added = [name for name in names if name not in names_of(BUILT)]
+    for name in added:
+        law, _, place = name.partition("@")
+        # A recording is no knowledge twice.
+        model = extend(unfitted(model), Effect(find_law(law), place), sessions).model
+    if not added:
+        model = calibrate(model, sessions).model
     # Where the sensors stood on the first day is not of the wrist.
     lasting = model.with_effects(*(e for e in model.effects if e.law.id not in ABSORBED))
     one, two = (predicted(lasting, day) for day in riddle.days)
