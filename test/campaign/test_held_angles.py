@@ -42,3 +42,10 @@ def test_moves_with_rests_between_are_no_repetition():
 def test_one_joint_state_is_none():
     signal = Signal(TIME_NS[:1], np.zeros((1, 2)))
     assert without_held(signal) == (signal, 0.0)
+
+
+def test_a_few_jumps_tell_nothing():
+    """Nine jumps of a driver that starts, two states apart, in twenty seconds."""
+    jumps = np.minimum(np.arange(2000) // 2, 9)
+    signal = Signal(TIME_NS, counted(np.radians(0.5) * jumps))
+    assert without_held(signal) == (signal, 0.0)

@@ -5,7 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.reading.lost_beams import lost_beams
-from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.reading.machine_signals import MachineSignals
+from wrist_stiffness.campaign.reading.pose_track import PoseTrack
+from wrist_stiffness.campaign.reading.session import read_session, session_of
+from wrist_stiffness.campaign.reading.signals import Signal
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
@@ -95,3 +98,24 @@ def test_a_target_off_o_costs_no_sound_pose_and_hides_no_lost_beam(
     step = table.geometry.limits.encoder_step
     found = lost_beams(1.7e9 + time, shift, rotation, rigid, step)
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
+
+
+@pytest.mark.parametrize("late_ms", [20, 66])
+def test_a_late_stamp_hides_no_lost_beam_of_a_rotation(worked, table, late_ms):
+    """What a late stamp does in motion is as large as the lost beams; it is reckoned with first."""
+    time, sample, _, moving = worked
+    lost = moving[:: len(moving) // 15]
+    turn = np.zeros((1200, 3))
+    turn[lost, np.arange(len(lost)) % 3] = np.radians(0.2)
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ sample.measured_rotation
+    own = 10_000_000 * np.arange(12_050)
+    cell = VirtualCell(table, CellSettings(rate_hz=10.0), np.random.default_rng(1))
+    step = table.geometry.limits.encoder_step
+    angles = Signal(own, step * np.round(cell.desired(1e-9 * own) / step))
+    stamps = np.round(1e9 * time).astype(np.int64)
+    machine = MachineSignals(angles, None, Signal(stamps, sample.wrench), False, {}, {})
+    track = PoseTrack(stamps + 1_000_000 * late_ms, np.full((1200, 3), np.nan), rotation)
+    session = session_of("late", machine, track, table)
+    measured = session.measured.any(axis=1)
+    gone = np.round(1e9 * session.block.time[~measured]).astype(np.int64)
+    np.testing.assert_array_equal(gone, track.time_ns[lost])

@@ -120,3 +120,21 @@ def test_angles_that_are_sent_again_and_again_are_taken_when_they_appear(tmp_pat
     at_turn = (rows > 390) & (rows < 412) | (rows > 590) & (rows < 612)
     assert error[~at_turn].max() < 0.12
     assert len(session) > 780
+
+
+def test_where_a_motor_turns_back_in_a_pause_poses_have_no_angles(
+    tmp_path, campaign, table, monkeypatch
+):
+    """It is where it was at both ends of half a second, and was 3 deg away between."""
+
+    def there_and_back(own, time_ns):
+        t = 1e-9 * (np.asarray(time_ns) - own.joint_ns[0])
+        return np.radians(np.stack([12.0 * np.abs(t - 3.25), np.full(len(t), 5.0)], axis=1))
+
+    monkeypatch.setattr(type(campaign), "theta", there_and_back)
+    paused(campaign.with_joints(), 300, 350).with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    time_ns = np.round(1e9 * session.block.time).astype(np.int64)
+    error = np.abs(session.block.theta - campaign.theta(time_ns))
+    assert error.max() < np.radians(0.1)
+    assert 40 < 799 - len(session) <= 50

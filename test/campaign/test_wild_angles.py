@@ -41,3 +41,13 @@ def test_in_sparse_states_a_motor_may_have_gone_out_and_back():
     signal = swinging(10.0)
     signal.values[40] += np.radians(20.0)
     assert without_wild(signal)[1] == 0
+
+
+def test_beside_a_gap_a_motor_may_have_gone_out_and_back():
+    """One state between two gaps of 60 ms; nobody knows what the motor did in them."""
+    signal = swinging(100.0, period_s=10.0)
+    signal.values[500] += np.radians(3.0)
+    for gaps in (range(495, 500), range(501, 506)):
+        assert without_wild(signal)[1] == 1
+        kept = np.setdiff1d(np.arange(len(signal)), gaps)
+        assert without_wild(Signal(signal.time_ns[kept], signal.values[kept]))[1] == 0

@@ -112,3 +112,20 @@ def test_a_cell_whose_recorder_fails_as_it_ends_ends_in_an_error(tmp_path, capfd
     assert f"{path} cannot be written: File too large" in told
     assert "Traceback" not in told
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cell_whose_recorder_hangs_ends_in_an_error(tmp_path, monkeypatch):
+    """It ends by a signal, not by a code; what it had written has no name."""
+    monkeypatch.setattr(cell, "END_PATIENCE_S", 5.0)
+    path, stopped, told = tmp_path / "hung.mcap", [], []
+
+    def stop(done, total):
+        if not stopped and any(part.stat().st_size > SMALL_FILE for part in hidden_in(tmp_path)):
+            stopped.append(node_of_this_process("recorder"))
+            os.kill(stopped[0], signal.SIGSTOP)
+
+    with pytest.raises(InputError, match="node recorder ended with code -9"):
+        cell.run_cell(seconds=4.0, record=path, rate_hz=50.0, progress=stop, tell=told.append)
+    assert "cell: node recorder had not ended 5 s after it was told to; killed" in told
+    assert not path.exists()
+    assert [part.name.endswith(".partial") for part in tmp_path.iterdir()] == [True]
