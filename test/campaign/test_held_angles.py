@@ -49,3 +49,18 @@ def test_a_few_jumps_tell_nothing():
     jumps = np.minimum(np.arange(2000) // 2, 9)
     signal = Signal(TIME_NS, counted(np.radians(0.5) * jumps))
     assert without_held(signal) == (signal, 0.0)
+
+
+@pytest.mark.parametrize(("every", "jitter"), [(10.003, 0.3), (5.0, 0.3), (2.5, 0.0)])
+def test_out_of_step_with_the_encoders_no_held_angle_is_kept_in_motion(every, jitter):
+    """A reading may be a state late or early; what is kept is no older than one state."""
+    rng, rows = np.random.default_rng(1), np.arange(2000)
+    reading = np.sort(every * np.arange(-1, 2000) + jitter * rng.standard_normal(2001))
+    moment = reading[np.searchsorted(reading, rows, side="right") - 1]
+    motion = np.radians(10.0) * np.sin(2.0 * np.pi * rows / 300.0)
+    held = np.radians(10.0) * np.sin(2.0 * np.pi * moment / 300.0)
+    kept, held_s = without_held(Signal(TIME_NS, counted(held)))
+    assert held_s > 0.0
+    now = counted(motion)[np.searchsorted(TIME_NS, kept.time_ns)]
+    # One state is 0.2 deg in the middle of the swing.
+    assert np.degrees(np.abs(kept.values - now)).max() < 0.3

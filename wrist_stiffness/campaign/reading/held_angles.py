@@ -38,7 +38,13 @@ def without_held(angles: Signal) -> tuple[Signal, float]:
     # At rest a reading is as new as in motion, and looks like a repetition.
     rows = np.arange(len(angles))
     appeared = np.concatenate([[0], changed])
-    since = rows - appeared[np.searchsorted(appeared, rows, side="right") - 1]
-    kept = since % every == 0
+    newest = np.searchsorted(appeared, rows, side="right") - 1
+    since = rows - appeared[newest]
+    # A driver out of step with its encoders repeats once more or less: what repeats until the next
+    # reading is due is no reading.
+    left = np.append(changed, len(angles))[newest] - rows
+    kept = (since % every == 0) & ((since == 0) | (left > every // 2))
+    # A first angle that is sent less often than others appeared before the recording began.
+    kept[0] = changed[0] >= every
     period_s = float(np.median(np.diff(angles.time_ns))) / NANOSECONDS
     return Signal(angles.time_ns[kept], angles.values[kept]), every * period_s

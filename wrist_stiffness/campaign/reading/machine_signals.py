@@ -90,11 +90,14 @@ class MachineSignals:
         after = own[np.minimum(np.searchsorted(own, time_ns), len(own) - 1)]
         gap = after - before
         nearest = np.where(time_ns - before < after - time_ns, before, after)
-        moved = np.abs(angle(time_ns) - angle(nearest))
+        # As far as it came in as much time outside the pause, it may have gone on.
+        outside = np.clip(2 * nearest - time_ns, own[0], own[-1])
+        moved = np.max([np.abs(angle(t) - angle(nearest)) for t in (time_ns, outside)], axis=0)
         # A motor that turns back in a pause is where it was at both ends of it.
         around = (np.maximum(before - gap, own[0]), before, after, np.minimum(after + gap, own[-1]))
         way = np.diff(np.stack([angle(stamps) for stamps in around]), axis=0)
-        share = (time_ns - before) * (after - time_ns) / np.maximum(gap, 1) ** 2.0
+        into = (time_ns - before) / np.maximum(gap, 1)
+        share = into * (1.0 - into)
         bent = 0.5 * share[:, None] * np.max(np.abs(np.diff(way, axis=0)), axis=0)
         still = (np.maximum(moved, bent) <= STILL_RAD).all(axis=1)
         return (gap <= WAY_S * NANOSECONDS) | still
@@ -146,7 +149,7 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
             raise InputError(nothing)
     return MachineSignals(
         angles,
-        _told_speeds(samples.joints) or _speeds(angles),
+        _told_speeds(samples.joints, read) or _speeds(angles),
         loads,
         on_platform,
         _slow(samples.temperatures),
@@ -184,11 +187,14 @@ def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
     return in_order(loads.time_ns, wrench), any(on_platform.values())
 
 
-def _told_speeds(joints: JointSamples) -> Signal | None:
-    """Return the speeds, None where drivers leave them out or at zero."""
+def _told_speeds(joints: JointSamples, read: Signal) -> Signal | None:
+    """Return the speeds where angles were read, None where drivers leave them out or at zero."""
     speeds = in_order(joints.time_ns, joints.velocity)
     whole = len(speeds) == len(in_order(joints.time_ns, joints.position))
-    return speeds if whole and np.any(speeds.values != 0.0) else None
+    if not whole or not np.any(speeds.values != 0.0):
+        return None
+    rows = np.searchsorted(speeds.time_ns, read.time_ns)
+    return Signal(read.time_ns, speeds.values[rows])
 
 
 def _speeds(angles: Signal) -> Signal | None:
