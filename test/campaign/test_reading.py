@@ -13,10 +13,13 @@ from wrist_stiffness.errors import FrameError, StaleLoadError
 from wrist_stiffness.model.block import Load
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.messages import (
+    Header,
+    JointState,
     PoseStamped,
     PoseWithCovariance,
     PoseWithCovarianceStamped,
 )
+from wrist_stiffness.recording.samples import DEFAULT_JOINTS
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
@@ -50,10 +53,39 @@ def test_a_constant_count_stays_exactly_that_count():
     np.testing.assert_array_equal(signal.interpolated(at), np.full((3, 1), 0.1))
 
 
+def speeds(campaign, time_ns):
+    """Return the motors' speeds (n, 2) at stamps."""
+    late, early = (campaign.theta(time_ns + ns) for ns in (MILLISECOND, -MILLISECOND))
+    return (late - early) / 2e-3
+
+
 def test_speeds_are_used_where_drivers_tell_them(tmp_path, campaign, table):
+    """Also where they are a fifth larger than those of the angles."""
+    told = 1.2 * speeds(campaign, campaign.joint_ns)
+    for stamp, angles, velocity in zip(
+        campaign.joint_ns, campaign.theta(campaign.joint_ns), told, strict=True
+    ):
+        state = JointState(
+            Header(int(stamp), ""), DEFAULT_JOINTS, tuple(angles.tolist()), tuple(velocity.tolist())
+        )
+        campaign.add("/joint_states", stamp, state)
+    campaign.with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    true = 1.2 * speeds(campaign, campaign.pose_ns[: len(session)])
+    np.testing.assert_allclose(session.block.theta_dot, true, atol=2e-3 * np.abs(true).max())
+    assert session.remarks == ()
+
+
+def test_speeds_that_are_not_those_of_the_angles_are_left_and_said(tmp_path, campaign, table):
     campaign.with_joints(velocity=(0.25, -0.5)).with_loads().with_poses()
     session = read_session(campaign.written(tmp_path / "bag"), table)
-    np.testing.assert_allclose(session.block.theta_dot, np.tile([0.25, -0.5], (len(session), 1)))
+    true = speeds(campaign, campaign.pose_ns[: len(session)])
+    # Some of the recording's ends is cut off.
+    middle = slice(20, -20)
+    found = session.block.theta_dot[middle]
+    np.testing.assert_allclose(found, true[middle], atol=2e-3 * np.abs(true).max())
+    (said,) = session.remarks
+    assert "the speeds of motor_1 in the joint states are" in said
 
 
 @pytest.mark.parametrize("told", [{}, {"velocity": (0.0, 0.0)}])

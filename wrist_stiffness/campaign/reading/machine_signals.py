@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.campaign.reading.held_angles import without_held
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps, in_order
+from wrist_stiffness.campaign.reading.told_speeds import fault_of
 from wrist_stiffness.campaign.reading.wild_angles import without_wild
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
@@ -147,14 +148,16 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
     ):
         if len(signal) == 0:
             raise InputError(nothing)
+    told = _told_speeds(samples.joints, read)
+    fault = "" if told is None else fault_of(told, angles)
     return MachineSignals(
         angles,
-        _told_speeds(samples.joints, read) or _speeds(angles),
+        _speeds(angles) if told is None or fault else told,
         loads,
         on_platform,
         _slow(samples.temperatures),
         _slow(samples.covariates),
-        _said(wild, len(read), held_s),
+        (*_said(wild, len(read), held_s), *filter(None, [fault])),
     )
 
 
