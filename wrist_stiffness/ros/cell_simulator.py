@@ -10,6 +10,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, WrenchStamped
+from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -85,6 +87,9 @@ LONGEST_ANSWER_S = 1.0
 SILENCE_S = 1.0
 """A node that answers no sample for longer than that hangs; one that is held up loses some."""
 
+LONGEST_GREETING_S = 5.0
+"""So long the motion waits for its listeners to answer; one that hangs is named at the end."""
+
 LONGEST_SWITCHING_S = 10.0
 """So long the motion waits for the angle corrector to be switched on."""
 
@@ -113,6 +118,9 @@ class CellSimulator(Node):
         self._program = -1
         self._enabling: Future | None = None
         self._enabling_s = 0.0
+        self._listeners: list[Client] = []
+        self._greetings: list[Future] = []
+        self._found_s = 0.0
 
         self._joints = self.create_publisher(JointState, "/joint_states", RELIABLE_QOS)
         self._load = self.create_publisher(WrenchStamped, "/load_estimate", RELIABLE_QOS)
@@ -166,8 +174,28 @@ class CellSimulator(Node):
                 self._enable.service_is_ready() and self.count_subscribers("/motor_commands")
             ):
                 return False
+            if listeners and not self._is_known():
+                return False
             self._start_ns = self.get_clock().now().nanoseconds
         return True
+
+    def _is_known(self) -> bool:
+        """Tell whether the listeners know this node, or take too long.
+
+        That it sees them does not say that they see it: an announcement that got lost comes again
+        after about a second, and best-effort listeners miss the samples until then.  Who answers a
+        request has read what was announced before it.
+        """
+        if not self._listeners:
+            self._found_s = time.monotonic()
+            for each in self.get_subscriptions_info_by_topic("/joint_states"):
+                name = f"{each.node_namespace.rstrip('/')}/{each.node_name}/get_parameters"
+                self._listeners.append(self.create_client(GetParameters, name))
+        if not self._greetings and all(each.service_is_ready() for each in self._listeners):
+            request = GetParameters.Request(names=["use_sim_time"])
+            self._greetings = [each.call_async(request) for each in self._listeners]
+        answered = bool(self._greetings) and all(each.done() for each in self._greetings)
+        return answered or time.monotonic() > self._found_s + LONGEST_GREETING_S
 
     def _begin(self, program: int, time_s: float) -> bool:
         """Begin a repetition of the motion; False while the corrector has not answered yet."""

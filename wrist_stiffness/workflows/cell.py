@@ -40,6 +40,18 @@ CELL_PARAMETERS: dict[str, dict[str, ParameterValue]] = {
 }
 """The virtual cell's loads are weights: they do not depend on the motion, so there is no loop."""
 
+SPOKEN = (
+    "/pose_error_predicted",
+    "/motor_commands_corrected",
+    "/model_residual",
+    "/load_estimate",
+    "/joint_states",
+    "/motor_commands",
+    "/platform_pose_measured",
+    "/cell_simulator/platform_pose_true",
+)
+"""What the recorder must know of before it listens: of whom it does not know it hears nothing."""
+
 SHORTEST_S, LONGEST_S = 2.0, 172800.0
 """Two motions of a second each, or of a day."""
 
@@ -103,8 +115,7 @@ def run_cell(
         chosen["model_file"] = str(Path(model).resolve())
     nodes = [node.having({**chosen, **CELL_PARAMETERS.get(node.name, {})}) for node in WRIST_NODES]
     if record is not None:
-        heard = "/pose_error_predicted /motor_commands_corrected"
-        output = {"output": str(Path(record).resolve()), "begin_with": heard}
+        output = {"output": str(Path(record).resolve()), "begin_with": " ".join(SPOKEN)}
         nodes.append(RECORDER_NODE.having(output))
     moves: dict[str, ParameterValue] = {"rate_hz": float(rate_hz), "seed": seed}
     # Predictor and monitor listen to the joint states, and so does the recorder.

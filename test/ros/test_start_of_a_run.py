@@ -1,0 +1,53 @@
+"""What a run's start needs: that those who listen know who speaks, and not only the reverse."""
+
+import time
+
+import pytest
+import rclpy
+from sensor_msgs.msg import JointState
+
+from wrist_stiffness.ros import cell_simulator
+from wrist_stiffness.ros.cell_simulator import CellSimulator
+from wrist_stiffness.workflows import cell
+
+GREETED = "/silent/get_parameters"
+
+
+@pytest.fixture
+def silent(graph):
+    """Return a node that listens but does not run."""
+    node = rclpy.create_node("silent", context=graph.context)
+    node.create_subscription(JointState, "/joint_states", lambda message: None, 10)
+    yield node
+    node.destroy_node()
+
+
+def moving(graph):
+    """Return a virtual wrist that waits for two listeners: the probe and the silent one."""
+    graph.listen(JointState, "/joint_states")
+    return graph.add(CellSimulator, program_s=1.0, rate_hz=50.0, listeners=2)
+
+
+def test_the_motion_waits_until_every_listener_answers(graph, silent):
+    simulator = moving(graph)
+    graph.until(lambda: simulator.count_clients(GREETED), "request to the silent listener")
+    answered_ns = simulator.get_clock().now().nanoseconds
+    graph.executor.add_node(silent)
+    graph.until(lambda: graph.heard["/joint_states"], "first sample")
+    stamp = graph.heard["/joint_states"][0].header.stamp
+    assert stamp.sec * 10**9 + stamp.nanosec > answered_ns
+
+
+def test_a_listener_that_hangs_holds_the_motion_up_for_a_while_only(graph, silent, monkeypatch):
+    monkeypatch.setattr(cell_simulator, "LONGEST_GREETING_S", 0.5)
+    simulator = moving(graph)
+    graph.until(lambda: simulator.count_clients(GREETED), "request to the silent listener")
+    asked_s = time.monotonic()
+    graph.until(lambda: graph.heard["/joint_states"], "first sample")
+    assert time.monotonic() - asked_s > 0.4
+
+
+def test_the_recorder_waits_for_all_that_the_virtual_cell_says(graph):
+    simulator = graph.add(CellSimulator, rate_hz=50.0)
+    said = {publisher.topic_name for publisher in simulator.publishers}
+    assert said - {"/recording_notes", "/rosout", "/parameter_events"} <= set(cell.SPOKEN)
