@@ -2,6 +2,8 @@
 
 import re
 import time
+from itertools import count
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from std_srvs.srv import SetBool
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import RecordingWriter, open_recording
-from wrist_stiffness.ros import cell_simulator
+from wrist_stiffness.ros import cell_simulator, executor
 from wrist_stiffness.ros.answer_count import AnswerCount
 from wrist_stiffness.ros.cell_simulator import CellSimulator
 from wrist_stiffness.ros.recorder import Recorder
@@ -20,11 +22,11 @@ from wrist_stiffness.workflows.node_list import UNANSWERED
 
 QUIET_S = 0.5
 RATE_HZ = 50.0
-SAMPLES = 300
+SAMPLES, TAKEN_IN_A_TURN = 300, 10
 
 
-def test_a_recorder_that_is_told_to_stop_writes_what_it_has_heard(graph, tmp_path):
-    path = tmp_path / "run.mcap"
+def recorder_behind(graph, path):
+    """Return a recorder that has heard samples and has not taken them, as the context ends."""
     graph.listen(JointState, "/joint_states")
     recorder = graph.add(Recorder, output=str(path))
     graph.until(lambda: list(recorder.subscriptions), "subscriptions of the recorder")
@@ -36,10 +38,29 @@ def test_a_recorder_that_is_told_to_stop_writes_what_it_has_heard(graph, tmp_pat
     graph.until(lambda: len(graph.heard["/joint_states"]) == SAMPLES - 1, "all samples")
     # As a signal ends a process: first the context, then the node.
     rclpy.shutdown(context=graph.context)
-    recorder.destroy_node()
+    return recorder
+
+
+def stamps_in(path):
     recording = open_recording(path)
-    stamps = [message.header.stamp_ns for _, _, message in recording.messages(["/joint_states"])]
-    assert stamps == list(range(1, SAMPLES))
+    return [message.header.stamp_ns for _, _, message in recording.messages(["/joint_states"])]
+
+
+def test_a_recorder_that_is_told_to_stop_writes_what_it_has_heard(graph, tmp_path):
+    path = tmp_path / "run.mcap"
+    recorder_behind(graph, path).destroy_node()
+    assert stamps_in(path) == list(range(1, SAMPLES))
+
+
+def test_where_few_messages_are_taken_in_a_turn_all_are_written(graph, tmp_path, monkeypatch):
+    """As on a slow computer."""
+    path = tmp_path / "run.mcap"
+    recorder = recorder_behind(graph, path)
+    looks, step_s = count(), executor.LONGEST_RUN_S / TAKEN_IN_A_TURN
+    slow = SimpleNamespace(monotonic=lambda: step_s * next(looks))
+    monkeypatch.setattr(executor, "time", slow)
+    recorder.destroy_node()
+    assert stamps_in(path) == list(range(1, SAMPLES))
 
 
 def test_a_recorder_whose_disk_refuses_the_last_message_is_closed(graph, tmp_path, monkeypatch):

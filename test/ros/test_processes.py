@@ -14,7 +14,7 @@ from wrist_stiffness.cli import main as command_line
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording import open_recording
 from wrist_stiffness.ros.conversions import nanoseconds
-from wrist_stiffness.workflows.cell import run_cell
+from wrist_stiffness.workflows import cell
 from wrist_stiffness.workflows.node_list import WRIST_NODES
 from wrist_stiffness.workflows.replay import replay
 
@@ -77,6 +77,17 @@ def test_a_node_does_not_start_with_wrong_parameters(parameters, text):
     assert text in ended.stderr.splitlines()[-1]
 
 
+@pytest.mark.parametrize("arguments", ["-p begin_with:=", "--params-file nowhere.yaml", "--bogus"])
+def test_a_node_does_not_start_with_ros_arguments_that_cannot_be_read(arguments):
+    command = [*NODES["pose_error_predictor"].command(), "--ros-args", *arguments.split()]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
+    assert ended.returncode == 2
+    assert "Traceback" not in ended.stderr
+    last = ended.stderr.splitlines()[-1]
+    assert last.startswith("wrist-stiffness node: error: ROS 2 cannot start: ")
+    assert arguments.split()[-1] in last
+
+
 def test_a_killed_node_comes_back(graph):
     node = NODES["pose_error_predictor"]
     for _ in range(2):
@@ -137,7 +148,7 @@ def payloads(path, topic):
 
 def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path):
     live, replayed = tmp_path / "live", tmp_path / "replayed"
-    assert run_cell(seconds=3.0, record=live, rate_hz=50.0)
+    assert cell.run_cell(seconds=3.0, record=live, rate_hz=50.0)
     counts = {topic.name: topic.count for topic in open_recording(live).topics}
     assert counts["/joint_states"] > 100
     for topic in (
@@ -223,11 +234,11 @@ def test_a_killed_cell_leaves_no_node_behind_and_a_whole_recording(tmp_path):
     assert open_recording(path).damage == ""
 
 
-def test_the_cell_says_which_node_failed(tmp_path, capfd):
-    (tmp_path / "taken").mkdir()
-    with pytest.raises(InputError, match="node recorder ended with code 2"):
-        run_cell(seconds=20.0, record=tmp_path / "taken")
-    assert "exists already" in capfd.readouterr().err
+def test_the_cell_says_which_node_failed(monkeypatch, capfd):
+    monkeypatch.setitem(cell.CELL_PARAMETERS, "model_monitor", {"load_age_limit_s": -1.0})
+    with pytest.raises(InputError, match="node model_monitor ended with code 2"):
+        cell.run_cell(seconds=20.0)
+    assert "load_age_limit_s" in capfd.readouterr().err
 
 
 def test_the_cell_refuses_wrong_input(tmp_path, capsys):
@@ -261,3 +272,17 @@ def test_a_number_that_cannot_be_is_refused_before_a_node_starts(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"wrist-stiffness: error: {option}: ")
     assert f"is not {limits}" in line
+
+
+@pytest.mark.parametrize(
+    ("place", "why"), [("taken", "exists already"), ("nowhere/live", "does not exist")]
+)
+def test_a_place_that_takes_no_recording_is_refused_before_a_node_starts(
+    tmp_path, monkeypatch, capsys, place, why
+):
+    (tmp_path / "taken").mkdir()
+    monkeypatch.setattr(subprocess, "Popen", None)
+    assert command_line.main(["cell", "--record", str(tmp_path / place)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"wrist-stiffness: error: {tmp_path / place}")
+    assert why in line

@@ -75,7 +75,7 @@ class RecordingWriter:
 
     def __enter__(self) -> RecordingWriter:
         """Begin the recording under its temporary name."""
-        self._check_target()
+        self.check_target()
         try:
             if self._is_folder:
                 self._partial.mkdir()
@@ -89,6 +89,25 @@ class RecordingWriter:
                 raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
             raise
         return self
+
+    def check_target(self) -> None:
+        """Refuse a path under which no recording can be written, as the ``with`` block does.
+
+        Raises
+        ------
+        RecordingError
+            If the path exists, or its parent does not or is a recording itself.
+        """
+        if not self.path.parent.is_dir():
+            raise RecordingError(f"{self.path}: folder {self.path.parent} does not exist")
+        if (self.path.parent / METADATA_FILE).exists():
+            raise RecordingError(f"{self.path}: folder {self.path.parent} is a recording itself")
+        if not self.path.exists():
+            return
+        if not self._overwrite:
+            raise RecordingError(f"{self.path} exists already and is not overwritten")
+        if self.path.is_dir() != self._is_folder or not is_only_recording(self.path):
+            raise RecordingError(f"{self.path} is not only a recording and is never overwritten")
 
     def write(self, topic: str, message: Message, log_time_ns: int) -> None:
         """Append a message.
@@ -175,18 +194,6 @@ class RecordingWriter:
     @property
     def _storage_path(self) -> Path:
         return self._partial / f"{self.path.name}_0.mcap" if self._is_folder else self._partial
-
-    def _check_target(self) -> None:
-        if not self.path.parent.is_dir():
-            raise RecordingError(f"{self.path}: folder {self.path.parent} does not exist")
-        if (self.path.parent / METADATA_FILE).exists():
-            raise RecordingError(f"{self.path}: folder {self.path.parent} is a recording itself")
-        if not self.path.exists():
-            return
-        if not self._overwrite:
-            raise RecordingError(f"{self.path} exists already and is not overwritten")
-        if self.path.is_dir() != self._is_folder or not is_only_recording(self.path):
-            raise RecordingError(f"{self.path} is not only a recording and is never overwritten")
 
     def _register(self, channel: Channel) -> int:
         known = self._channels.get(channel.topic)

@@ -36,7 +36,12 @@ def run(make_node: Callable[[], Node]) -> int:
     """
     end_with_parent()
     interrupted = _interrupts_without_raising()
-    rclpy.init()
+    try:
+        rclpy.init()
+    # What rclpy raises for ROS arguments that cannot be read has no other public class.
+    except RuntimeError as error:
+        tell(f"ROS 2 cannot start: {error}")
+        return EXIT_BAD_INPUT
     executor = StreamExecutor()
     try:
         if not interrupted:

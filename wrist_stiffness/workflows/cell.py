@@ -15,6 +15,7 @@ from typing import NoReturn
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.workflows.node_list import (
     LARGEST_SEED,
     PARENT_PID,
@@ -103,8 +104,8 @@ def run_cell(
     Raises
     ------
     WristError
-        If a number or the model cannot be used, a node ends with an error, the run does not end in
-        time, or the recording is not complete.
+        If a number, the model or the recording's place cannot be used, a node ends with an error,
+        the run does not end in time, or the recording is not complete.
     """
     if find_spec("rclpy") is None:
         raise InputError("cell: ROS 2 (rclpy) is not installed; pip install 'wrist_stiffness[ros]'")
@@ -115,6 +116,7 @@ def run_cell(
         chosen["model_file"] = str(Path(model).resolve())
     nodes = [node.having({**chosen, **CELL_PARAMETERS.get(node.name, {})}) for node in WRIST_NODES]
     if record is not None:
+        RecordingWriter(record).check_target()
         output = {"output": str(Path(record).resolve()), "begin_with": " ".join(SPOKEN)}
         nodes.append(RECORDER_NODE.having(output))
     moves: dict[str, ParameterValue] = {"rate_hz": float(rate_hz), "seed": seed}
