@@ -55,6 +55,21 @@ def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
+def test_a_count_that_flickers_at_rest_does_not_tell_what_jitter_of_stamps_does_in_motion(table):
+    """A minute at 100 Hz with four seconds of 30 deg/s; 2 ms of jitter are as much as lost beams."""
+    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(6)
+    time = 0.01 * np.arange(6000)
+
+    def theta(moment):
+        way = np.radians(30.0) * (np.abs((moment % 15.0) - 7.5) - 7.0).clip(max=0.0)
+        return np.stack([way, 0.5 * way], axis=1)
+
+    flicker = step * rng.integers(0, 2, (6000, 2))
+    rigid = rigid_rotation(table, step * np.round(theta(time) / step) + flicker)
+    rotation = rigid_rotation(table, theta(time + 2e-3 * rng.standard_normal(6000)))
+    assert not lost_beams(1.7e9 + time, np.full((6000, 3), np.nan), rotation, rigid, step).any()
+
+
 @pytest.fixture(scope="module")
 def worked(table):
     """Two minutes of the cell at 10 Hz: the rotations in the cell's frame, moving poses apart."""

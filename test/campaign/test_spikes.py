@@ -8,6 +8,7 @@ from wrist_stiffness.campaign.reading.spikes import spikes
 LEAST = 1e-6
 STILL = np.zeros(500)
 NEVER = STILL > 0.0
+MOVING = np.arange(500) % 5 == 0
 
 
 def noisy(size, at=(100, 101, 400)):
@@ -37,14 +38,27 @@ def test_where_others_are_missing_spikes_are_found_all_the_same():
 
 @pytest.mark.parametrize(("share", "found"), [(0.0, [100, 101, 400]), (0.2, [])])
 def test_as_much_as_motion_does_everywhere_is_no_spike(share, found):
-    """Every fifth sample moves, and late stamps make a share of the swing of it."""
-    moving = np.arange(500) % 5 == 0
+    """Late stamps make a share of the swing of it."""
     values = noisy(150e-6)
-    values[moving, 0] += share * 1e-3
+    values[MOVING, 0] += share * 1e-3
     swing = np.full(500, 1e-3)
-    assert np.flatnonzero(spikes(values, LEAST, swing, moving)).tolist() == found
+    assert np.flatnonzero(spikes(values, LEAST, swing, MOVING)).tolist() == found
 
 
 def test_of_few_moves_all_is_put_down_to_the_motion_that_may_be():
     swing = np.where(np.arange(500) == 400, 1e-3, 0.0)
     assert np.flatnonzero(spikes(noisy(150e-6), LEAST, swing, swing > 0.0)).tolist() == [100, 101]
+
+
+def test_noise_in_slow_motion_is_no_excuse_in_fast_motion():
+    """Slow moves swing by 0.1 mm, of which noise of 5 um is much; one in eleven is ten times as fast."""
+    swing = np.where(np.arange(500) % 55 == 0, 1e-3, 1e-4)
+    values = noisy(200e-6, at=(110, 275))
+    assert np.flatnonzero(spikes(values, LEAST, swing, MOVING)).tolist() == [110, 275]
+
+
+def test_few_moves_that_are_off_by_thrice_what_most_are_off_are_no_spikes():
+    values = noisy(0.0, at=())
+    off = np.where(np.arange(500) % 55 == 0, 0.3e-3, 0.1e-3)
+    values[MOVING, 0] += off[MOVING]
+    assert not spikes(values, LEAST, np.full(500, 1e-3), MOVING).any()
