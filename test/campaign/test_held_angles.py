@@ -10,27 +10,49 @@ COUNT = np.radians(0.015)
 TIME_NS = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(2000)
 
 
-def counted(angle):
-    return np.stack([np.round(angle / COUNT), np.round(0.3 * angle / COUNT)], axis=1) * COUNT
+ENCODERS = pytest.mark.parametrize(
+    "count", [COUNT, *(2.0 * np.pi / 2.0**bits for bits in (12, 18))], ids=["usual", "12", "18"]
+)
 
 
-def moves():
+def counted(angle, count=COUNT):
+    return np.stack([np.round(angle / count), np.round(0.3 * angle / count)], axis=1) * count
+
+
+def moves(count=COUNT):
     """Swings of 10 deg with rests between."""
     t = 0.01 * np.arange(2000)
-    return counted(np.radians(10.0) * np.sin(np.clip(t % 5.0, 0.0, 2.0 * np.pi / 2.0)))
+    return counted(np.radians(10.0) * np.sin(np.clip(t % 5.0, 0.0, 2.0 * np.pi / 2.0)), count)
 
 
+@ENCODERS
 @pytest.mark.parametrize("every", [2, 5, 10])
-def test_repetitions_are_left_out(every):
+def test_repetitions_are_left_out(every, count):
     rows = np.arange(2000)
-    kept, held_s = without_held(Signal(TIME_NS, moves()[rows - rows % every]))
+    kept, held_s = without_held(Signal(TIME_NS, moves(count)[rows - rows % every]))
     assert held_s == pytest.approx(0.01 * every)
     np.testing.assert_array_equal(kept.time_ns, TIME_NS[::every])
 
 
+@ENCODERS
 @pytest.mark.parametrize("speed_deg_s", [0.2, 1.0, 5.0, 30.0])
-def test_slow_motion_in_counts_is_no_repetition(speed_deg_s):
-    signal = Signal(TIME_NS, counted(np.radians(speed_deg_s) * 0.01 * np.arange(2000)))
+def test_slow_motion_in_counts_is_no_repetition(speed_deg_s, count):
+    signal = Signal(TIME_NS, counted(np.radians(speed_deg_s) * 0.01 * np.arange(2000), count))
+    assert without_held(signal) == (signal, 0.0)
+
+
+def test_counts_that_are_zeroed_anew_are_no_repetition():
+    """By a third of a count, which is no step of the encoder then."""
+    angles = counted(np.radians(0.2) * 0.01 * (np.arange(2000) % 1000))
+    angles[1000:] += COUNT / 3.0
+    signal = Signal(TIME_NS, angles)
+    assert without_held(signal) == (signal, 0.0)
+
+
+def test_a_count_that_is_rounded_in_two_ways_is_one_count():
+    angles = counted(np.radians(0.2) * 0.01 * (np.arange(2000) % 1000), 2.0 * np.pi / 2.0**12)
+    angles[1000:] *= 1.0 + 1e-15
+    signal = Signal(TIME_NS, angles)
     assert without_held(signal) == (signal, 0.0)
 
 

@@ -56,7 +56,7 @@ def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table
 
 
 def test_a_count_that_flickers_at_rest_does_not_tell_what_jitter_of_stamps_does_in_motion(table):
-    """A minute at 100 Hz with four seconds of 30 deg/s; 2 ms of jitter are as much as lost beams."""
+    """A minute at 100 Hz, four seconds of it at 30 deg/s; 2 ms of jitter are as much as a beam."""
     step, rng = table.geometry.limits.encoder_step, np.random.default_rng(6)
     time = 0.01 * np.arange(6000)
 

@@ -51,7 +51,7 @@ def test_of_few_moves_all_is_put_down_to_the_motion_that_may_be():
 
 
 def test_noise_in_slow_motion_is_no_excuse_in_fast_motion():
-    """Slow moves swing by 0.1 mm, of which noise of 5 um is much; one in eleven is ten times as fast."""
+    """Of 0.1 mm, the swing of slow moves, noise of 5 um is much; some are ten times as fast."""
     swing = np.where(np.arange(500) % 55 == 0, 1e-3, 1e-4)
     values = noisy(200e-6, at=(110, 275))
     assert np.flatnonzero(spikes(values, LEAST, swing, MOVING)).tolist() == [110, 275]

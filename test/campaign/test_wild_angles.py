@@ -37,6 +37,29 @@ def test_a_single_wild_one_is_left_out_also_in_motion(rate_hz):
     )
 
 
+def test_stamps_that_jitter_make_no_angle_wild_and_hide_no_wild_one():
+    """A millisecond of jitter at up to 90 deg/s; half a minute."""
+    rng, time = np.random.default_rng(3), 0.01 * np.arange(3000)
+    angle = COUNT * np.round(np.radians(10.0) * np.sin(2.0 * np.pi * time / 0.7) / COUNT)
+    stamps = 1_700_000_000_000_000_000 + np.round(
+        1e9 * (time + 1e-3 * rng.standard_normal(len(time)))
+    ).astype(np.int64)
+    sound = Signal(stamps, np.stack([angle, 0.5 * angle], axis=1))
+    assert without_wild(sound)[1] == 0
+    sound.values[[400, 1200], [0, 1]] += np.radians(1.0)
+    kept, _ = without_wild(sound)
+    np.testing.assert_array_equal(np.setdiff1d(stamps, kept.time_ns), stamps[[400, 1200]])
+
+
+def test_stamps_that_are_right_though_irregular_make_no_angle_wild():
+    """Read whenever the bus was free."""
+    rng = np.random.default_rng(3)
+    time = 0.01 * (np.arange(3000) + rng.uniform(-0.4, 0.4, 3000))
+    angle = COUNT * np.round(np.radians(10.0) * np.sin(2.0 * np.pi * time / 0.7) / COUNT)
+    time_ns = 1_700_000_000_000_000_000 + np.round(1e9 * time).astype(np.int64)
+    assert without_wild(Signal(time_ns, np.stack([angle, 0.5 * angle], axis=1)))[1] == 0
+
+
 def test_in_sparse_states_a_motor_may_have_gone_out_and_back():
     signal = swinging(10.0)
     signal.values[40] += np.radians(20.0)

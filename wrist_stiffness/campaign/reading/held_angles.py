@@ -6,9 +6,16 @@ import numpy as np
 
 from wrist_stiffness.campaign.reading.signals import Signal
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.mechanism.components import Array
 
 LEAST_CHANGE_RAD = float(np.radians(0.05))
-"""Some counts: a motor that moves by so much at once moves on in the next reading [rad]."""
+"""Held for a while, a smaller change does little harm [rad]."""
+
+LEAST_CHANGE_COUNTS = 1.5
+"""A motor that moves by two counts at once moves on in the next reading."""
+
+SAME_RAD = 1e-9
+"""Angles that differ by less are one count, rounded in two ways [rad]."""
 
 LEAST_CHANGES = 20
 
@@ -28,9 +35,10 @@ def without_held(angles: Signal) -> tuple[Signal, float]:
     held_s : float
         How long an angle in motion is repeated, zero where none is [s].
     """
-    change = np.max(np.abs(np.diff(angles.values, axis=0)), axis=1, initial=0.0)
-    changed = 1 + np.flatnonzero(change > 0.0)
-    large = change[changed - 1] > LEAST_CHANGE_RAD
+    change = np.abs(np.diff(angles.values, axis=0))
+    changed = 1 + np.flatnonzero((change > 0.0).any(axis=1))
+    least = np.maximum(LEAST_CHANGE_RAD, LEAST_CHANGE_COUNTS * _steps(angles.values))
+    large = (change[changed - 1] > least).any(axis=1)
     messages = np.diff(changed)[large[1:] & large[:-1]]
     every = round(float(np.median(messages))) if len(messages) >= LEAST_CHANGES else 1
     if every == 1:
@@ -48,3 +56,12 @@ def without_held(angles: Signal) -> tuple[Signal, float]:
     kept[0] = changed[0] >= every
     period_s = float(np.median(np.diff(angles.time_ns))) / NANOSECONDS
     return Signal(angles.time_ns[kept], angles.values[kept]), every * period_s
+
+
+def _steps(values: Array) -> Array:
+    """Return the smallest difference between any two angles (m, 2) of each motor, (2,) [rad].
+
+    Of angles in counts it is one count; the geometry's may be that of another encoder.
+    """
+    apart = (np.diff(np.unique(column)) for column in values.T)
+    return np.array([np.min(each[each > SAME_RAD], initial=np.inf) for each in apart])

@@ -35,19 +35,27 @@ def without_wild(angles: Signal) -> tuple[Signal, int]:
     """
     if len(angles) < 5 or np.median(np.diff(angles.time_ns)) > DENSE_S * NANOSECONDS:
         return angles, 0
-    time = (angles.time_ns - angles.time_ns[0]) / NANOSECONDS
-    # Rows of each state with those around it, and of its neighbours with those without it.
-    off, before, after = (
-        _off_the_line(time, angles.values, *(np.arange(2, len(time) - 2) + k for k in ks))
-        for ks in ((-1, 0, 1), (-2, -1, 1), (-1, 1, 2))
-    )
-    alone = off > np.maximum(LEAST_WILD_RAD, ALONE * np.maximum(before, after))
+    # A stamp that is not quite right puts a sound angle off the line as well; angles that are read
+    # regularly are on it by their number.
+    stamped = (angles.time_ns - angles.time_ns[0]) / NANOSECONDS
+    numbered = np.arange(len(angles), dtype=float)
+    alone = _alone(stamped, angles.values) & _alone(numbered, angles.values)
     # Far apart in time nobody knows what the motor did between.
     own = np.diff(angles.time_ns)[1:-1]
     near = np.maximum(own[:-1], own[1:]) <= 2 * DENSE_S * NANOSECONDS
     kept = np.ones(len(angles), dtype=bool)
     kept[2:-2] = ~(alone.any(axis=1) & near)
     return Signal(angles.time_ns[kept], angles.values[kept]), int(np.sum(~kept))
+
+
+def _alone(time: Array, values: Array) -> NDArray[np.bool_]:
+    """Tell which values (n, 2), the outer ones aside, are alone off the line, (n - 4, 2)."""
+    # Rows of each value with those around it, and of its neighbours with those without it.
+    off, before, after = (
+        _off_the_line(time, values, *(np.arange(2, len(time) - 2) + k for k in ks))
+        for ks in ((-1, 0, 1), (-2, -1, 1), (-1, 1, 2))
+    )
+    return np.asarray(off > np.maximum(LEAST_WILD_RAD, ALONE * np.maximum(before, after)))
 
 
 def _off_the_line(
