@@ -38,7 +38,7 @@ def without_held(angles: Signal) -> tuple[Signal, float]:
     change = np.abs(np.diff(angles.values, axis=0))
     changed = 1 + np.flatnonzero((change > 0.0).any(axis=1))
     least = np.maximum(LEAST_CHANGE_RAD, LEAST_CHANGE_COUNTS * _steps(angles.values))
-    large = (change[changed - 1] > least).any(axis=1)
+    large = np.any(change[changed - 1] > least, axis=1)
     messages = np.diff(changed)[large[1:] & large[:-1]]
     every = round(float(np.median(messages))) if len(messages) >= LEAST_CHANGES else 1
     if every == 1:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.campaign.reading.held_angles import without_held
 from wrist_stiffness.campaign.reading.signals import Signal, Stamps, in_order
 from wrist_stiffness.campaign.reading.told_speeds import fault_of
-from wrist_stiffness.campaign.reading.wild_angles import without_wild
+from wrist_stiffness.campaign.reading.wild_angles import DENSE_S, without_wild
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import FrameError, InputError
@@ -25,6 +25,10 @@ JOINT_GAP_S = 0.5
 WAY_S = 0.2
 """Joint states farther apart than this do not tell the way of a moving motor: at 50 deg/s^2 a
 straight one is wrong by 0.25 deg, and by 6 deg between states a second apart [s]."""
+
+BENT_RAD = float(np.radians(0.2))
+"""So far from straight the way between nearer ones may be, as it is at 10 Hz and 160 deg/s^2; dense
+ones are not looked at: a motor cannot bend its way by so much in their time [rad]."""
 
 STILL_RAD = float(np.radians(0.05))
 """So much, some counts, the angles beside a pause may be from those of a pose in it [rad]."""
@@ -66,26 +70,38 @@ class MachineSignals:
         self, time_ns: Stamps, load_age_limit_s: float
     ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Tell at which stamps (n,) [ns] angles and load are known, and why not at the others."""
-        angles = self.angles.near(time_ns, round(JOINT_GAP_S * NANOSECONDS))
+        own = self.angles.time_ns
+        during = (own[0] <= time_ns) & (time_ns <= own[-1])
+        near = self.angles.near(time_ns, round(JOINT_GAP_S * NANOSECONDS))
+        way, straight = self._between(time_ns)
         newest = self.loads.newest(time_ns)
         age = time_ns - self.loads.time_ns[newest]
         loads = (newest >= 0) & (age <= round(load_age_limit_s * NANOSECONDS))
-        way = self._way_is_known(time_ns)
-        reasons = []
+        usable, reasons = np.ones(len(time_ns), dtype=bool), []
         for known, what in (
-            (angles, f"no joint state within {JOINT_GAP_S:g} s"),
+            (during, "before the motor angles were first read or after they were last read"),
+            (near, f"no joint state within {JOINT_GAP_S:g} s"),
+            (way, f"the motors moved between joint states more than {WAY_S:g} s apart"),
             (
-                way | ~angles,
-                f"the motors moved between joint states more than {WAY_S:g} s apart",
+                straight,
+                "the motors' speed changed between joint states so that their angles may be wrong "
+                f"by more than {np.degrees(BENT_RAD):g} deg",
             ),
-            (loads | ~(angles & way), f"no load estimate in the {load_age_limit_s:g} s before"),
+            (loads, f"no load estimate in the {load_age_limit_s:g} s before"),
         ):
-            if not known.all():
-                reasons.append(f"{np.sum(~known)} measured poses are not used: {what}")
-        return angles & way & loads, tuple(reasons)
+            if unknown := np.sum(usable & ~known):
+                reasons.append(f"{unknown} measured poses are not used: {what}")
+            usable &= known
+        return usable, tuple(reasons)
 
-    def _way_is_known(self, time_ns: Stamps) -> NDArray[np.bool_]:
-        """Tell which stamps (n,) lie in no pause of the joint states, or in one without motion."""
+    def _between(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Tell what is known of the way between the joint states around stamps (n,).
+
+        Returns
+        -------
+        way, straight : (n,) bool
+            Where it is no pause, or one without motion; where it is as good as straight.
+        """
         own, angle = self.angles.time_ns, self.angles.interpolated
         before = own[np.maximum(self.angles.newest(time_ns), 0)]
         after = own[np.minimum(np.searchsorted(own, time_ns), len(own) - 1)]
@@ -95,13 +111,17 @@ class MachineSignals:
         outside = np.clip(2 * nearest - time_ns, own[0], own[-1])
         moved = np.max([np.abs(angle(t) - angle(nearest)) for t in (time_ns, outside)], axis=0)
         # A motor that turns back in a pause is where it was at both ends of it.
-        around = (np.maximum(before - gap, own[0]), before, after, np.minimum(after + gap, own[-1]))
-        way = np.diff(np.stack([angle(stamps) for stamps in around]), axis=0)
+        around = np.stack([before - gap, before, after, after + gap])
+        way = np.diff([angle(stamps) for stamps in around], axis=0)
+        # Beyond the first and the last state nobody knows of another speed.
+        way[0, around[0] < own[0]] = way[1, around[0] < own[0]]
+        way[2, around[3] > own[-1]] = way[1, around[3] > own[-1]]
         into = (time_ns - before) / np.maximum(gap, 1)
         share = into * (1.0 - into)
         bent = 0.5 * share[:, None] * np.max(np.abs(np.diff(way, axis=0)), axis=0)
         still = (np.maximum(moved, bent) <= STILL_RAD).all(axis=1)
-        return (gap <= WAY_S * NANOSECONDS) | still
+        dense, near = (gap <= limit * NANOSECONDS for limit in (DENSE_S, WAY_S))
+        return near | still, dense | (bent <= BENT_RAD).all(axis=1)
 
     def at(self, time_ns: Stamps) -> Block:
         """Return the signals that belong to usable stamps (n,) [ns], which rise."""
