@@ -55,6 +55,17 @@ def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
+def test_a_count_that_flickers_gives_no_direction_to_what_a_load_turns(table):
+    """0.3 deg to either side; across the way of a flicker would be now all of it, now nothing."""
+    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(4)
+    time, theta = 0.01 * np.arange(400), 0.1 + step * rng.integers(0, 2, (400, 2))
+    turn = np.radians(0.3) * np.where(np.arange(400) < 200, 1.0, -1.0)[:, None] * [[1.0, 0.0, 0.0]]
+    still = rigid_rotation(table, np.full((400, 2), 0.1))
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ still
+    nowhere = np.full((400, 3), np.nan)
+    assert not lost_beams(1.7e9 + time, nowhere, rotation, rigid_rotation(table, theta), step).any()
+
+
 def test_a_count_that_flickers_at_rest_does_not_tell_what_jitter_of_stamps_does_in_motion(table):
     """A minute at 100 Hz, four seconds of it at 30 deg/s; 2 ms of jitter are as much as a beam."""
     step, rng = table.geometry.limits.encoder_step, np.random.default_rng(6)
@@ -112,6 +123,26 @@ def test_a_target_off_o_costs_no_sound_pose_and_hides_no_lost_beam(
     shift[lost, 2] += 0.2e-3
     step = table.geometry.limits.encoder_step
     found = lost_beams(1.7e9 + time, shift, rotation, rigid, step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)
+
+
+@pytest.mark.parametrize("jitter_ms", [2.0, 20.0])
+def test_stamps_that_jitter_hide_no_lost_beam_across_the_motion(worked, table, jitter_ms):
+    """The instrument stands askew, as far as readings are not refused for it."""
+    time, sample, rigid, moving = worked
+    lost = moving[:: len(moving) // 15]
+    way = Rotation.from_matrix(rigid[lost + 1] @ np.swapaxes(rigid[lost - 1], 1, 2)).as_rotvec()
+    across = np.cross(way, [0.0, 0.0, 1.0])
+    turn = np.zeros((1200, 3))
+    turn[lost] = np.radians(0.2) * across / np.linalg.norm(across, axis=1, keepdims=True)
+    askew = Rotation.from_euler("xyz", [3.0, -3.0, 9.0], degrees=True)
+    rotation = (askew * Rotation.from_rotvec(turn)).as_matrix() @ sample.measured_rotation
+    cell = VirtualCell(table, CellSettings(rate_hz=10.0), np.random.default_rng(1))
+    jitter = 1e-3 * jitter_ms * np.random.default_rng(3).standard_normal(1200)
+    step = table.geometry.limits.encoder_step
+    said = rigid_rotation(table, step * np.round(cell.desired((time + jitter).clip(0.0)) / step))
+    nowhere = np.full((1200, 3), np.nan)
+    found = lost_beams(1.7e9 + time + jitter, nowhere, rotation, said, step)
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 

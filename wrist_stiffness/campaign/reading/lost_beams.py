@@ -19,6 +19,9 @@ LEAST_SPIKE_M = 30e-6
 LEAST_SPIKE_STEPS = 4.0
 """In encoder steps: in motion the measured rotation leaves the encoders' by counts."""
 
+TELLING_STEPS = 3.0
+"""In encoder steps: a larger turn from the pose before to the one after tells its direction."""
+
 LATE_S = 0.1
 """So late a stamp may be: what turns meanwhile is no spike."""
 
@@ -50,20 +53,35 @@ def lost_beams(
     """
     if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
         return np.zeros(len(time), dtype=bool)
-    swing = _swing(time, rigid)
+    steps = rigid[1:] @ np.swapaxes(rigid[:-1], 1, 2)
+    way = log_motion(steps, np.zeros((len(steps), 3)))[:, 3:]
+    swing = _swing(time, way)
     moving = swing > MOVING_RAD
     turn = turn_left(rotation, rigid)
     place, lever = place_left(shift, rigid)
-    turned = spikes(turn, LEAST_SPIKE_STEPS * step, swing, moving)
-    return turned | spikes(place, LEAST_SPIKE_M, lever * swing, moving)
+    # Stamps that jitter hide much along the motion and nothing across it.
+    lost = spikes(place, LEAST_SPIKE_M, lever * swing, moving)
+    for each in (turn, _across(turn, way, step)):
+        lost |= spikes(each, LEAST_SPIKE_STEPS * step, swing, moving)
+    return lost
 
 
-def _swing(time: Array, rigid: Array) -> Array:
-    """Return how far the wrist turns beside each pose while a stamp may be late, (n,) [rad]."""
-    interval = np.diff(time)
-    turned = log_motion(np.swapaxes(rigid[:-1], 1, 2) @ rigid[1:], np.zeros((len(interval), 3)))
+def _swing(time: Array, way: Array) -> Array:
+    """Return how far the wrist turns beside each pose while a stamp may be late, (n,) [rad].
+
+    Its way from pose to pose is (n - 1, 3) rotation vectors.
+    """
     # Neighbours differ by half a window's turn at most: a count that flickers at 1 kHz is no speed.
-    share = LATE_S / np.maximum(interval, LATE_S / (WINDOW // 2))
-    swing = share * np.linalg.norm(turned[:, 3:], axis=1)
+    share = LATE_S / np.maximum(np.diff(time), LATE_S / (WINDOW // 2))
+    swing = share * np.linalg.norm(way, axis=1)
     near = sliding_window_view(np.pad(swing, WINDOW // 2), WINDOW - 1)
     return np.asarray(np.max(near, axis=1))
+
+
+def _across(turn: Array, way: Array, step: float) -> Array:
+    """Return the parts of turns (n, 3) across the way (n - 1, 3); all of them where it is short."""
+    beside = sliding_window_view(np.pad(way, ((1, 1), (0, 0))), 2, axis=0).sum(axis=2)
+    size = np.linalg.norm(beside, axis=1, keepdims=True)
+    told = size > TELLING_STEPS * step
+    along = np.divide(beside, size, out=np.zeros_like(beside), where=told)
+    return turn - np.sum(turn * along, axis=1, keepdims=True) * along

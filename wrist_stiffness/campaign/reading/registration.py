@@ -17,7 +17,7 @@ ROUNDS = 4
 """After which registrations change no more."""
 
 SOUND = 3.0
-"""Times the median misfit up to which a position has a say in where the target is."""
+"""Times the median misfit up to which a measurement has a full say in a registration."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,6 @@ class Agreement:
 def agreement(measured: Array, rigid: Array) -> Agreement:
     """Compare measured with rigid rotations.
 
-    With a turn X of the instrument in F and one Y of the target on the platform, measured is
-    X rigid Y.  So the rotations from the mean of one side are those of the other, turned by X
-    alone.
-
     Parameters
     ----------
     measured, rigid : (n, 3, 3) float
@@ -58,16 +54,26 @@ def agreement(measured: Array, rigid: Array) -> Agreement:
     """
     used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
     seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
+    turn = _instrument(seen, said, np.ones(len(used)))
     seen, said = seen * seen.mean().inv(), said * said.mean().inv()
-    left, _, right = np.linalg.svd(seen.as_rotvec().T @ said.as_rotvec())
-    left[:, 2] *= np.linalg.det(left @ right)
-    turn = Rotation.from_matrix(left @ right)
     turned = turn * said * turn.inv()
     return Agreement(
         float(np.median((seen * said.inv()).magnitude())),
         float(np.median((seen * turned.inv()).magnitude())),
         float(turn.magnitude()),
     )
+
+
+def _instrument(seen: Rotation, said: Rotation, weight: Array) -> Rotation:
+    """Return the turn X of the instrument in F that fits best.
+
+    With X and a turn Y of the target on the platform, measured is X rigid Y.  So the rotations from
+    the mean of one side are those of the other, turned by X alone.
+    """
+    measured, rigid = ((each * each.mean(weight).inv()).as_rotvec() for each in (seen, said))
+    left, _, right = np.linalg.svd((weight * measured.T) @ rigid)
+    left[:, 2] *= np.linalg.det(left @ right)
+    return Rotation.from_matrix(left @ right)
 
 
 def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
@@ -115,7 +121,8 @@ def turn_left(measured: Array, rigid: Array) -> Array:
     Returns
     -------
     (n, 3) float
-        Rotation vectors from X rigid Y to measured [rad].
+        Rotation vectors in F, from rigid to measured with the instrument and the target turned
+        back [rad].
     """
     left = np.full((len(measured), 3), np.nan)
     known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
@@ -123,12 +130,14 @@ def turn_left(measured: Array, rigid: Array) -> Array:
         return left
     seen, said = Rotation.from_matrix(measured[known]), Rotation.from_matrix(rigid[known])
     used = np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))
-    seen_used, said_used = seen[used], said[used]
-    instrument = Rotation.identity()
+    seen_used, said_used, weight = seen[used], said[used], np.ones(len(used))
     for _ in range(ROUNDS):
-        target = (said_used.inv() * instrument.inv() * seen_used).mean()
-        instrument = (seen_used * (said_used * target).inv()).mean()
-    left[known] = (seen * (instrument * said * target).inv()).as_rotvec()
+        instrument = _instrument(seen_used, said_used, weight)
+        target = (said_used.inv() * instrument.inv() * seen_used).mean(weight)
+        off = (seen_used * (instrument * said_used * target).inv()).magnitude()
+        # All keep a say: at rest the misfit is least, and it is motion that tells the instrument.
+        weight = 1.0 / (off**2 + (SOUND * np.median(off)) ** 2 + np.finfo(float).eps)
+    left[known] = (instrument.inv() * seen * target.inv() * said.inv()).as_rotvec()
     return left
 
 
