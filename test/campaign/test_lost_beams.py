@@ -55,30 +55,39 @@ def test_lost_beams_of_a_rotation_are_seen_while_a_count_flickers(rate_hz, table
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
-def test_a_count_that_flickers_gives_no_direction_to_what_a_load_turns(table):
-    """0.3 deg to either side; across the way of a flicker would be now all of it, now nothing."""
-    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(4)
-    time, theta = 0.01 * np.arange(400), 0.1 + step * rng.integers(0, 2, (400, 2))
-    turn = np.radians(0.3) * np.where(np.arange(400) < 200, 1.0, -1.0)[:, None] * [[1.0, 0.0, 0.0]]
-    still = rigid_rotation(table, np.full((400, 2), 0.1))
-    rotation = Rotation.from_rotvec(turn).as_matrix() @ still
-    nowhere = np.full((400, 3), np.nan)
-    assert not lost_beams(1.7e9 + time, nowhere, rotation, rigid_rotation(table, theta), step).any()
+MINUTE = 0.01 * np.arange(6000)
 
 
-def test_a_count_that_flickers_at_rest_does_not_tell_what_jitter_of_stamps_does_in_motion(table):
-    """A minute at 100 Hz, four seconds of it at 30 deg/s; 2 ms of jitter are as much as a beam."""
+def flickering(table):
+    """Rigid rotations by counts and measured ones; four seconds at 30 deg/s, 2 ms of jitter."""
     step, rng = table.geometry.limits.encoder_step, np.random.default_rng(6)
-    time = 0.01 * np.arange(6000)
 
     def theta(moment):
         way = np.radians(30.0) * (np.abs((moment % 15.0) - 7.5) - 7.0).clip(max=0.0)
         return np.stack([way, 0.5 * way], axis=1)
 
     flicker = step * rng.integers(0, 2, (6000, 2))
-    rigid = rigid_rotation(table, step * np.round(theta(time) / step) + flicker)
-    rotation = rigid_rotation(table, theta(time + 2e-3 * rng.standard_normal(6000)))
-    assert not lost_beams(1.7e9 + time, np.full((6000, 3), np.nan), rotation, rigid, step).any()
+    rigid = rigid_rotation(table, step * np.round(theta(MINUTE) / step) + flicker)
+    return rigid, rigid_rotation(table, theta(MINUTE + 2e-3 * rng.standard_normal(6000)))
+
+
+def test_a_count_that_flickers_at_rest_does_not_tell_what_jitter_of_stamps_does_in_motion(table):
+    """It is as much as a lost beam."""
+    rigid, rotation = flickering(table)
+    nowhere, step = np.full((6000, 3), np.nan), table.geometry.limits.encoder_step
+    assert not lost_beams(1.7e9 + MINUTE, nowhere, rotation, rigid, step).any()
+
+
+def test_a_count_that_flickers_gives_no_direction_to_what_a_load_turns(table):
+    """Across the way of a flicker would be now all of it, now nothing, and much would be usual."""
+    rigid, rotation = flickering(table)
+    turn = np.radians(0.1) * np.where(MINUTE % 15.0 < 7.5, 1.0, -1.0)[:, None] * [[1.0, 0.0, 0.0]]
+    lost = np.flatnonzero(MINUTE % 15.0 < 0.4)[5::10]
+    turn[lost] += np.radians([0.0, 0.0, 0.25])
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ rotation
+    nowhere, step = np.full((6000, 3), np.nan), table.geometry.limits.encoder_step
+    found = lost_beams(1.7e9 + MINUTE, nowhere, rotation, rigid, step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
 @pytest.fixture(scope="module")
