@@ -46,8 +46,11 @@ def test_as_much_as_motion_does_everywhere_is_no_spike(share, found):
 
 
 def test_of_few_moves_all_is_put_down_to_the_motion_that_may_be():
-    swing = np.where(np.arange(500) == 400, 1e-3, 0.0)
-    assert np.flatnonzero(spikes(noisy(150e-6), LEAST, swing, swing > 0.0)).tolist() == [100, 101]
+    """Of 25, one is off: what the others do tells nothing yet."""
+    swing = np.where(np.arange(500) % 20 == 0, 1e-3, 0.0)
+    assert np.flatnonzero(
+        spikes(noisy(150e-6, at=(101, 400)), LEAST, swing, swing > 0.0)
+    ).tolist() == [101]
 
 
 def test_noise_in_slow_motion_is_no_excuse_in_fast_motion():
