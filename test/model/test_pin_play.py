@@ -47,6 +47,21 @@ def test_a_search_that_begins_near_the_end_is_short(monkeypatch):
     assert len(steps) - cold < 0.5 * cold
 
 
+def test_a_rest_told_by_many_samples_is_sought_once(monkeypatch):
+    rows = np.array([0, 0, 0, 1, 1, 0])
+    parts = [vars(hindered(seed)) for seed in range(2)]
+    names = ("force", "gap", "opening", "approach")
+    several = (np.concatenate([part[name] for part in parts])[rows] for name in names)
+    sought, own = [], Play._hindered
+    monkeypatch.setattr(
+        Play, "_hindered", lambda self, x, near: sought.append(len(x)) or own(self, x, near)
+    )
+    found = Play(RADIAL, *several).resting()
+    assert sought == [3]
+    alone = np.concatenate([hindered(seed).resting() for seed in range(2)])
+    assert np.abs(found - alone[rows]).max() < ROUNDING
+
+
 @pytest.fixture
 def states(monkeypatch):
     """Return a list that grows with each state that a search asks for."""

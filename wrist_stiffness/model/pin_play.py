@@ -70,12 +70,26 @@ class Play:
         (n, 4) float
             Upper end, lower end; each across the axis.
         """
+        new = self._unlike_the_one_before()
+        if not new.all():
+            # A rest is told by many samples.
+            once = self.take(new).resting(None if near is None else near[new])
+            return np.asarray(once[np.cumsum(new) - 1])
         x = self._unhindered()
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
         held = np.flatnonzero((gap < 0.0).any(axis=1))
         if len(held):
             x[held] = self.take(held)._hindered(x[held], None if near is None else near[held])
         return x
+
+    def _unlike_the_one_before(self) -> NDArray[np.bool_]:
+        """Tell which samples differ from the one before in anything, (n,)."""
+        new = np.zeros(len(self.force), dtype=bool)
+        new[:1] = True
+        for each in (self.force, self.gap, self.opening, self.approach):
+            flat = each.reshape(len(new), -1)
+            new[1:] |= (flat[1:] != flat[:-1]).any(axis=1)
+        return new
 
     def _hindered(self, x: Array, near: Array | None) -> Array:
         """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
