@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign import units as units_module
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import as_units
@@ -78,3 +79,26 @@ def test_kept_moments_tell_what_all_samples_tell(model, session, added, share):
     assert np.median(off[~dwell]) < 1e-3
     most = 0.42 if added.law.id == "joint_clearance" else 0.05
     assert np.quantile(off[~dwell], 0.99) < most
+
+
+def test_what_has_no_past_needs_no_path(model, session, monkeypatch):
+    """Play seeks near the moment before; that is a guess, and no past."""
+    monkeypatch.setattr(units_module, "MOST_MOVING", 5)
+    units = as_units(model, session)
+    inside = np.count_nonzero(units.cut.unit >= 0)
+    assert inside < 0.5 * len(units.block)
+    asked, own = [], ErrorModel.batch_with
+    monkeypatch.setattr(
+        ErrorModel,
+        "batch_with",
+        lambda self, block, *more: asked.append(len(block)) or own(self, block, *more),
+    )
+    for added, moments in (
+        (effect("joint_clearance@joint_3", clearance_um=5.0), inside),
+        (effect("creep@joint_3", delayed_percent=20.0, time_constant_s=5.0), len(units.block)),
+    ):
+        (whole,) = own(model, units.block, [(added,)])
+        asked.clear()
+        (found,) = SessionModel(model, units, ()).along([(*model.effects, added)])
+        assert asked == [moments]
+        assert found == pytest.approx(units.mean(whole.measured), rel=1e-9, abs=1e-18)

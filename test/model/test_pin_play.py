@@ -45,3 +45,52 @@ def test_a_search_that_begins_near_the_end_is_short(monkeypatch):
     cold = len(steps)
     play.resting(rests * (1.0 + 1e-4))
     assert len(steps) - cold < 0.5 * cold
+
+
+def test_a_rest_told_by_many_samples_is_sought_once(monkeypatch):
+    rows = np.array([0, 0, 0, 1, 1, 0])
+    parts = [vars(hindered(seed)) for seed in range(2)]
+    names = ("force", "gap", "opening", "approach")
+    several = (np.concatenate([part[name] for part in parts])[rows] for name in names)
+    sought, own = [], Play._hindered
+    monkeypatch.setattr(
+        Play, "_hindered", lambda self, x, near: sought.append(len(x)) or own(self, x, near)
+    )
+    found = Play(RADIAL, *several).resting()
+    assert sought == [3]
+    alone = np.concatenate([hindered(seed).resting() for seed in range(2)])
+    assert np.abs(found - alone[rows]).max() < ROUNDING
+
+
+@pytest.fixture
+def states(monkeypatch):
+    """Return a list that grows with each state that a search asks for."""
+    asked = []
+    own = Play._state
+    monkeypatch.setattr(Play, "_state", lambda self, *a: asked.append(1) or own(self, *a))
+    return asked
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("turn", "size", "most"), [(0.1, 1.0, 6), (0.5, 1.0, 14), (0.0, 0.9, 14)])
+def test_a_search_follows_the_walls(states, seed, turn, size, most):
+    """Straight steps would run into them: that took up to 96 states."""
+    play = hindered(seed)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    begin = play.resting().reshape(2, 2) @ [[cosine, sine], [-sine, cosine]]
+    states.clear()
+    play.resting(size * begin.reshape(1, 4))
+    assert len(states) <= most
+
+
+def test_a_flange_alone_presses_a_pin_into_its_wall(states):
+    """No force of its own says how deep."""
+    overlap, opening = np.full((1, 1), -5.0 * RADIAL), np.array([[[1.0, 0.0, 0.2, 0.0]]])
+    play = Play(RADIAL, np.zeros((1, 4)), overlap, opening, np.full((1, 1, 1), 1e-7))
+    upper, _, lower, _ = play.resting()[0] / RADIAL
+    assert len(states) < 8
+    # What is left of the overlap presses with 1 N per 0.1 um, and the wall gives 0.01 um.
+    force = (5.0 - upper - 0.2 * lower) * RADIAL / 1e-7
+    assert [upper - 1.0, lower - 1.0] == pytest.approx(
+        [force / 1e8 / RADIAL, 0.2 * force / 1e8 / RADIAL], rel=1e-3
+    )

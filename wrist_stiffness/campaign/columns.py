@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum, auto
 from functools import cached_property
 from typing import Any
 
@@ -14,12 +15,22 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
-from wrist_stiffness.model.prediction import BlockPrediction
 
 Effects = tuple[Effect, ...]
 
 AT_A_TIME = 256
 """Trials evaluated together: they share the work of the base, and their results are in memory."""
+
+
+class Moments(Enum):
+    """At which moments a model is evaluated."""
+
+    MEAN = auto()
+    """At the mean one of each unit."""
+    UNITS = auto()
+    """At all that are kept of each unit."""
+    PATH = auto()
+    """At those that lie between units as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,35 +62,46 @@ class SessionModel:
         )
 
     def _has_memory(self, effect: Effect) -> bool:
-        known, asked = self.session.remembering, (effect.law, effect.component)
+        return effect.law.many_waves or self._has_state(effect)
+
+    def _has_past(self, effect: Effect) -> bool:
+        """Tell whether earlier moments decide what an effect does; play only seeks near them."""
+        return self._has_state(effect) and not effect.law.state_is_a_guess
+
+    def _has_state(self, effect: Effect) -> bool:
+        known, asked = self.session.with_a_state, (effect.law, effect.component)
         if asked not in known:
             first = self.session.block.take(slice(0, 1))
             usual = Effect(*asked)
             memory = evaluate(self.model.with_effects(usual), first, None).memory
-            known[asked] = effect.law.many_waves or memory.states[0] is not None
+            known[asked] = memory.states[0] is not None
         return known[asked]
 
     def along(self, trials: Sequence[Effects]) -> list[Array]:
-        """Return what the sensor would say of each unit, from all moments of its path, (u, 6).
+        """Return what the sensor would say of each unit, from all its moments, (u, 6).
 
         In motion the mean of a pose is not the pose at the mean angles: a target a millimetre off
         bends that by micrometres.
         """
-        return [
-            self.session.mean(found.measured)
-            for start in range(0, len(trials), AT_A_TIME)
-            for found in self._batch(trials[start : start + AT_A_TIME], on_path=True)
-        ]
+        return self.predicted(trials, [True] * len(trials))
 
-    def _batch(self, trials: Sequence[Effects], on_path: bool) -> list[BlockPrediction]:
-        """Predict trials on the path or at mean moments; pins begin where they rested last."""
-        block = self.session.block if on_path else self.session.still
-        found = self.model.with_effects().batch_with(block, trials, self._rests.get(on_path, ()))
-        self._rests[on_path] = found[0].guesses
-        return found
+    def _batch(self, trials: Sequence[Effects], moments: Moments) -> list[Array]:
+        """Return what the sensor would say of each unit, (u, 6); pins begin where they rested."""
+        session = self.session if moments is Moments.PATH else self._without_path
+        block = self.session.still if moments is Moments.MEAN else session.block
+        rests = self._rests.get(moments, ())
+        found = self.model.with_effects().batch_with(block, trials, rests)
+        self._rests[moments] = found[0].guesses
+        if moments is Moments.MEAN:
+            return [each.measured for each in found]
+        return [session.mean(each.measured) for each in found]
 
     @cached_property
-    def _rests(self) -> dict[bool, tuple[Mapping[str, Any], ...]]:
+    def _without_path(self) -> UnitSession:
+        return replace(self.session, cut=self.session.cut.without_path)
+
+    @cached_property
+    def _rests(self) -> dict[Moments, tuple[Mapping[str, Any], ...]]:
         return {}
 
     def predicted(
@@ -95,15 +117,22 @@ class SessionModel:
             Which of them are evaluated on the path; by default those that remember.
         """
         path = [self.remembers(trial) for trial in trials] if along is None else along
+        wanted = [self._moments(*each) for each in zip(trials, path, strict=True)]
         out: list[Array] = [np.empty(0)] * len(trials)
-        for needs_path in (False, True):
-            chosen = [i for i, own in enumerate(path) if own == needs_path]
+        for moments in Moments:
+            chosen = [i for i, own in enumerate(wanted) if own is moments]
             for start in range(0, len(chosen), AT_A_TIME):
                 part = chosen[start : start + AT_A_TIME]
-                found = self._batch([trials[i] for i in part], needs_path)
+                found = self._batch([trials[i] for i in part], moments)
                 for i, each in zip(part, found, strict=True):
-                    out[i] = self.session.mean(each.measured) if needs_path else each.measured
+                    out[i] = each
         return out
+
+    def _moments(self, effects: Effects, along: bool) -> Moments:
+        """Return where effects must be evaluated; what has no past needs no path between units."""
+        if not along:
+            return Moments.MEAN
+        return Moments.PATH if any(map(self._has_past, effects)) else Moments.UNITS
 
     def changes(self, trials: Sequence[Effects]) -> list[Array]:
         """Return the change of the units' predicted poses by other effects than the point's.

@@ -98,8 +98,8 @@ class UnitSession:
         )
 
     @cached_property
-    def remembering(self) -> dict[tuple[Law, str], bool]:
-        """Whether laws at places need the path and not the moment alone, as far as was asked."""
+    def with_a_state(self) -> dict[tuple[Law, str], bool]:
+        """Whether laws at places carry a state from moment to moment, as far as was asked."""
         return {}
 
     def mean(self, values: Array) -> Array:

@@ -91,6 +91,20 @@ class Cut:
     at_rest: Mask
     sense: Array
 
+    @property
+    def without_path(self) -> Cut:
+        """The same units with only those moments kept that belong to one."""
+        used = self.unit >= 0
+        return replace(
+            self,
+            kept=self.kept[used],
+            block=self.block.take(used),
+            unit=self.unit[used],
+            weight=self.weight[used],
+            speed=self.speed[used],
+            mean_speed=self.mean_speed[used],
+        )
+
 
 def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     """Find the units of a session, at a cost linear in its samples.

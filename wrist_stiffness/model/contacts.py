@@ -171,21 +171,22 @@ def forces_of(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
     ----------
     approach : (n, m, m) float
         A [m/N].
-    gap : (n, m) float
-        Openings without contact forces [m].
+    gap : (n, m) or (n, m, t) float
+        Openings without contact forces, or t of them [m].
     closed : (n, m) bool
         Sectors held closed.
 
     Returns
     -------
-    (n, m) float
+    (n, m) or (n, m, t) float
         Forces, linear in `gap`; zero where not held [N].
     """
-    force = np.zeros_like(gap)
+    columns = gap if gap.ndim == 3 else gap[..., None]
+    force = np.zeros_like(columns)
     for rows, places, held, matrix in _held(approach, closed):
         own = rows[:, None], places
-        force[own] = np.linalg.solve(matrix, np.where(held, -gap[own], 0.0)[..., None])[..., 0]
-    return force
+        force[own] = np.linalg.solve(matrix, np.where(held[..., None], -columns[own], 0.0))
+    return force.reshape(gap.shape)
 
 
 def _held(

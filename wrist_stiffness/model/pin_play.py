@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.contacts import Held, solve_contacts
+from wrist_stiffness.model.contacts import forces_of, solve_contacts
 
 SMALL_FORCE = 1e-2
 """An end that carries less radial force than this does not reach its wall altogether [N]."""
@@ -70,6 +70,11 @@ class Play:
         (n, 4) float
             Upper end, lower end; each across the axis.
         """
+        new = self._unlike_the_one_before()
+        if not new.all():
+            # A rest is told by many samples.
+            once = self.take(new).resting(None if near is None else near[new])
+            return np.asarray(once[np.cumsum(new) - 1])
         x = self._unhindered()
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
         held = np.flatnonzero((gap < 0.0).any(axis=1))
@@ -77,33 +82,45 @@ class Play:
             x[held] = self.take(held)._hindered(x[held], None if near is None else near[held])
         return x
 
+    def _unlike_the_one_before(self) -> NDArray[np.bool_]:
+        """Tell which samples differ from the one before in anything, (n,)."""
+        new = np.zeros(len(self.force), dtype=bool)
+        new[:1] = True
+        for each in (self.force, self.gap, self.opening, self.approach):
+            flat = each.reshape(len(new), -1)
+            new[1:] |= (flat[1:] != flat[:-1]).any(axis=1)
+        return new
+
     def _hindered(self, x: Array, near: Array | None) -> Array:
         """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
         begin = x if near is None else near
-        found, active, rests = self._newton(begin, WALLS[-1], FORCE_TOLERANCE)
+        found, gradient, active, rests = self._newton(begin, WALLS[-1], FORCE_TOLERANCE)
         left = np.flatnonzero(~rests)
         if len(left):
             part, on_the_way = self.take(left), x[left]
             for wall in WALLS[:-1]:
                 on_the_way = part._newton(on_the_way, wall, ROUGH_TOLERANCE)[0]
-            found[left], active[left], _ = part._newton(on_the_way, WALLS[-1], FORCE_TOLERANCE)
-        return self._settled(found, active)
+            rested = part._newton(on_the_way, WALLS[-1], FORCE_TOLERANCE)
+            found[left], gradient[left], active[left], _ = rested
+        # One more step, so that no trace of the way is left.
+        return found + self._step(found, WALLS[-1], gradient, active)
 
-    def _settled(self, x: Array, active: NDArray[np.bool_]) -> Array:
-        """Go one more step from where the pins rest, so that no trace of the way is left."""
-        _, gradient, active = self._state(x, WALLS[-1], active)
-        hessian = self._hessian(x, WALLS[-1], active)
-        settled: Array = x - np.linalg.solve(hessian, gradient[..., None])[..., 0]
-        return settled
+    def _step(self, x: Array, wall: float, gradient: Array, active: NDArray[np.bool_]) -> Array:
+        """Return Newton's step, (n, 4)."""
+        hessian = self._hessian(x, wall, active)
+        return np.asarray(np.linalg.solve(hessian, -gradient[..., None])[..., 0], dtype=float)
 
     def _newton(
         self, x: Array, wall: float, tolerance: float
-    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return where the steps end, (n, 4), the sectors touching there, and which pins rest."""
+    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return where the steps end and the gradient there, (n, 4), touching sectors, who rests.
+
+        Steps are bent along the walls: straight ones would run into them.
+        """
         x, rows, left = x.copy(), np.arange(len(x)), self
         rests = np.zeros(len(x), dtype=bool)
         energy, gradient, active = self._state(x, wall, None)
-        touching = active.copy()
+        slopes, touching = gradient.copy(), active.copy()
         for _ in range(MAX_STEPS):
             bound = tolerance * (1.0 + np.abs(left.force).max(axis=1))
             moving = np.abs(gradient).max(axis=1) > bound
@@ -113,23 +130,36 @@ class Play:
             if not moving.all():
                 rows, left = rows[moving], left.take(moving)
                 energy, gradient, active = energy[moving], gradient[moving], active[moving]
-            hessian = left._hessian(x[rows], wall, active)
-            step = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
+            step = left._step(x[rows], wall, gradient, active)
             slope = np.einsum("ni,ni->n", gradient, step)
             start, size, far = energy.copy(), np.ones(len(rows)), np.arange(len(rows))
+            tried = np.empty_like(step)
+            depth = np.linalg.norm(gradient.reshape(-1, 2, 2), axis=-1) / wall
             for halved in range(MAX_HALVINGS):
                 size[far] *= 0.5 if halved else 1.0
-                tried = x[rows[far]] + size[far, None] * step[far]
                 part = left if len(far) == len(rows) else left.take(far)
-                energy[far], gradient[far], active[far] = part._state(tried, wall, active[far])
+                tried[far] = part._along(x[rows[far]], size[far, None] * step[far], depth[far])
+                energy[far], gradient[far], active[far] = part._state(tried[far], wall, active[far])
                 # Rounding of the energy is no reason to stay.
                 enough = start + ARMIJO * size * slope + 1e-14 * np.abs(start)
                 far = far[energy[far] > enough[far]]
                 if len(far) == 0:
                     break
-            x[rows] += size[:, None] * step
-            touching[rows] = active
-        return x, touching, rests
+            x[rows], slopes[rows], touching[rows] = tried, gradient, active
+        return x, slopes, touching, rests
+
+    def _along(self, x: Array, step: Array, depth: Array) -> Array:
+        """Return where a step leads, (n, 4), with ends as far in their walls as it says.
+
+        Ends off their walls, of which it knows nothing, go into them by at most `depth` (n, 2).
+        """
+        size, into, direction = self._at_walls(x)
+        outward = size + (direction * step.reshape(-1, 2, 2)).sum(axis=-1)
+        most = np.where(into > 0.0, np.maximum(outward, 0.5 * self.radial), self.radial + depth)
+        ends = (x + step).reshape(-1, 2, 2)
+        length = np.linalg.norm(ends, axis=-1)
+        share = np.divide(most, length, out=np.ones_like(length), where=length > most)
+        return (share[..., None] * ends).reshape(-1, 4)
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Play:
         """Return some of the samples."""
@@ -165,8 +195,8 @@ class Play:
         return energy, wall.reshape(-1, 4) - self.force - pushed, active
 
     def _hessian(self, x: Array, stiffness: float, active: NDArray[np.bool_]) -> Array:
-        held = Held.of(self.approach, active).stiffness
-        hessian: Array = np.swapaxes(self.opening, -1, -2) @ held @ self.opening
+        held = forces_of(self.approach, self.opening, active)
+        hessian: Array = -np.swapaxes(self.opening, -1, -2) @ held
         size, into, direction = self._at_walls(x)
         along = direction[..., :, None] * direction[..., None, :]
         share = np.divide(into, size, out=np.zeros_like(into), where=size > 0.0)

@@ -8,33 +8,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.recording import RecordingWriter, topics
-from wrist_stiffness.recording.messages import (
-    Header,
-    JointState,
-    Point,
-    Pose,
-    PoseStamped,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    Quaternion,
-    String,
-    Temperature,
-    Vector3,
-    Wrench,
-    WrenchStamped,
-)
-from wrist_stiffness.recording.samples import DEFAULT_JOINTS
+from wrist_stiffness.recording.messages import String
 from wrist_stiffness.simulation.blind import draw
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
-from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.size import Scale
+from wrist_stiffness.workflows.cell_messages import CellMessages
 
-BASE_FRAME = "wrist_base"
 START_NS = 1_700_000_000_000_000_000
 """Stamp of a recording's first sample: a fixed date, so that a seed gives the same bytes."""
 
@@ -46,16 +30,11 @@ LAST_DAY = 10_000
 DAY_SEEDS = 1_000_003
 """From the seed of one day's noise and program to that of the next."""
 
-THERMOMETER_STEP_K = 0.1
-
 BLOCK = 500
 """Samples in memory at a time."""
 
 LONGEST_S, FASTEST_HZ = 24.0 * 3600.0, 5000.0
 """A recording is no longer and has no more samples per second than that."""
-
-NOT_MEASURED = 1e6
-"""Variance of a part of the pose that the sensor does not see [m^2, rad^2]."""
 
 
 @dataclass(frozen=True)
@@ -125,16 +104,14 @@ def simulate_recording(
     with RecordingWriter(path, overwrite=overwrite) as writer:
         notes = String(json.dumps(recording_notes(table, settings), sort_keys=True))
         writer.write(topics.RECORDING_NOTES, notes, start_ns)
+        messages = CellMessages(writer, whole=settings.sees == "pose")
         for first in range(0, total, BLOCK):
             number = np.arange(first, min(first + BLOCK, total))
             time_s = number / settings.rate_hz
             sent = cell.desired(time_s)
             block = cell.run(time_s, sent)
-            for i, t in enumerate(time_s):
-                stamp_ns = start_ns + round(t * 1e9)
-                _write_sample(writer, stamp_ns, sent[i], block[i], settings)
-                if (first + i) % thermometer == 0:
-                    _write_temperatures(writer, stamp_ns, block[i])
+            stamps_ns = start_ns + np.round(time_s * 1e9).astype(np.int64)
+            messages.write(stamps_ns.tolist(), sent, block, number % thermometer == 0)
             if progress is not None:
                 progress(int(number[-1]) + 1, total)
     return Simulated(Path(path), total, total / settings.rate_hz)
@@ -240,63 +217,3 @@ def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
         "load_source": "ft",
         "session": "simulated",
     }
-
-
-def _write_sample(
-    writer: RecordingWriter,
-    stamp_ns: int,
-    command: np.ndarray,
-    sample: CellSample,
-    settings: CellSettings,
-) -> None:
-    """Write one sample; the load goes first, so that it has arrived with its joint state."""
-    header = Header(stamp_ns, BASE_FRAME)
-    force, moment = sample.wrench[:3].tolist(), sample.wrench[3:].tolist()
-    motors = Header(stamp_ns, "")
-    angles, speeds = tuple(sample.encoder.tolist()), tuple(sample.speed.tolist())
-    for topic, message in (
-        (topics.LOAD_ESTIMATE, WrenchStamped(header, Wrench(Vector3(*force), Vector3(*moment)))),
-        (topics.MOTOR_COMMANDS, JointState(motors, DEFAULT_JOINTS, tuple(command.tolist()))),
-        (topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, angles, speeds)),
-    ):
-        writer.write(topic, message, stamp_ns)
-    pose = pose_message(header, sample, whole=settings.sees == "pose")
-    if pose is not None:
-        writer.write(topics.PLATFORM_POSE, pose, stamp_ns)
-
-
-def pose_message(
-    header: Header, sample: CellSample, whole: bool
-) -> PoseStamped | PoseWithCovarianceStamped | None:
-    """Return the measured pose, None where nothing was measured.
-
-    Parameters
-    ----------
-    header : Header
-        Of the message.
-    sample : CellSample
-        One sample.
-    whole : bool
-        Whether the sensor sees position and rotation; else a huge variance says which it does not.
-    """
-    moved, turned = (
-        bool(np.isfinite(part).all()) for part in (sample.measured_shift, sample.measured_rotation)
-    )
-    if not (moved or turned):
-        return None
-    place = sample.measured_shift if moved else np.zeros(3)
-    rotation = Rotation.from_matrix(sample.measured_rotation if turned else np.eye(3))
-    quaternion = rotation.as_quat(canonical=True)
-    pose = Pose(Point(*place.tolist()), Quaternion(*quaternion.tolist()))
-    if whole:
-        return PoseStamped(header, pose)
-    variance = NOT_MEASURED * ~np.repeat([moved, turned], 3)
-    covariance = tuple(np.diag(variance).ravel().tolist())
-    return PoseWithCovarianceStamped(header, PoseWithCovariance(pose, covariance))
-
-
-def _write_temperatures(writer: RecordingWriter, stamp_ns: int, sample: CellSample) -> None:
-    for component, celsius in zip(SENSED, sample.temperature.tolist(), strict=True):
-        shown = THERMOMETER_STEP_K * round(celsius / THERMOMETER_STEP_K)
-        message = Temperature(Header(stamp_ns, component), shown, THERMOMETER_STEP_K**2 / 12.0)
-        writer.write(topics.TEMPERATURES, message, stamp_ns)

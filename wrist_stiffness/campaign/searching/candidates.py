@@ -260,8 +260,9 @@ def wrist_candidates(
     point: Point,
     absent: Collection[str],
     near: Mapping[str, Mapping[str, float]],
+    laws: Collection[str] | None = None,
 ) -> tuple[WristCandidate, ...]:
-    """Evaluate the whole catalogue about a point.
+    """Evaluate the catalogue about a point.
 
     Parameters
     ----------
@@ -271,11 +272,13 @@ def wrist_candidates(
         Effects that cannot be candidates: the model has them, and they are no part of the base.
     near : dict of str to dict
         Values of some effects, by name, about which their columns are wanted.
+    laws : collection of str, optional
+        Which of the catalogue; if None, all.
     """
     plans = [
         (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
         for law in catalogue().values()
-        if law.id not in SET_UP_ANEW
+        if law.id not in SET_UP_ANEW and (laws is None or law.id in laws)
         for place in law.places
         if f"{law.id}@{place}" not in absent
     ]

@@ -227,12 +227,12 @@ class Search:
             begun = _without(self._fitter, begun, name)
         if begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
             return None
-        known = self.beside(begun.base).candidates
-        trials = self._trials(begun, [each for each in known if each.law.id in LOOSE])
+        trials = self._trials(begun, self.beside(begun.base, LOOSE).candidates)
         trials = {name: each for name, each in trials.items() if each.total < begun.total}
         if not trials:
             return None
         self._finish(trials)
+        known = self.beside(begun.base).candidates
         return replace(_as_they_are(begun, known, trials), known=True)
 
     def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
@@ -262,16 +262,17 @@ class Search:
         fits = [best, *(replace(best, base=base) for base in ends)]
         trials[name] = min(fits, key=lambda each: each.total)
 
-    def beside(self, base: BaseFit) -> Place:
+    def beside(self, base: BaseFit, laws: Collection[str] | None = None) -> Place:
         """Return the place where everything that was fitted along with a base is known.
 
         How a gap closes is of its law, which is not exact: the bushing in it is not asked for.
+        Of some laws alone where these are asked for: with play in the base all take long.
         """
         held = {effect.name for effect in base.problem.model.effects} | set(base.extras)
         gaps = [each.component for each in base.beyond().values() if each.law.id in LOOSE]
         held |= {f"{law}@{gap}" for law in CLOSING for gap in gaps}
         point = point_of(base, with_extras=True)
-        return Place(base, self._evaluated(point, held, {}), known=True)
+        return Place(base, self._evaluated(point, held, {}, laws), known=True)
 
     def after(self, base: BaseFit) -> Place:
         """Return the place of a whole fit, to ask whether anything is left.
@@ -287,10 +288,15 @@ class Search:
         return self._evaluated(point_of(reached.base), held, near)
 
     def _evaluated(
-        self, point: Point, held: Collection[str], near: Mapping[str, Mapping[str, float]]
+        self,
+        point: Point,
+        held: Collection[str],
+        near: Mapping[str, Mapping[str, float]],
+        laws: Collection[str] | None = None,
     ) -> Candidates:
-        self._fitter.tell("trying every effect of the catalogue")
-        return wrist_candidates(point, held, near)
+        tried = ", ".join(sorted(laws)) if laws else "every effect of the catalogue"
+        self._fitter.tell(f"trying {tried}")
+        return wrist_candidates(point, held, near, laws)
 
 
 def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached]) -> Place:

@@ -44,16 +44,15 @@ class JointClearance(Law):
         radial = 0.5 * values["clearance_um"]
         if radial == 0.0:
             return NOTHING, None
-        near: Array | None = state
-        if near is not None and len(near) != len(at.block):
-            near = None
+        # In units of the play: with a little more of it the pin rests at its wall still.
+        near = None if state is None or len(state) != len(at.block) else radial * state
         ends = end_screws(at.table.geometry, place)
         opening = np.stack([at.carried(at.screw(place, end))[1] for end in ends], axis=-1)
         carried = at.at_home(place, at.through_place(place)) @ ends.T
         flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
         play = Play(radial, carried - flanges, at.free[1], opening, at.operators.approach)
         resting = play.resting(near)
-        return at.screw(place, resting @ ends), resting
+        return at.screw(place, resting @ ends), resting / radial
 
 
 def end_screws(geometry: Geometry, joint: str) -> Array:
