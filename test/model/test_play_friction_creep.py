@@ -220,6 +220,29 @@ def test_a_bristle_gives_way_by_a_distance_and_by_so_much_a_newton(free_model, m
     assert by_newton[0] < 0.5 * moved(preload_N=100.0, presliding_um=0.01)
 
 
+@pytest.mark.parametrize("joint", PASSIVE_JOINTS)
+def test_a_pin_in_its_play_feels_the_friction_of_another_joint(free_model, make, joint):
+    """Both ends lie along the force that they carry, whatever part of it rubs."""
+    place = "joint_5" if joint == "joint_2" else "joint_1"
+    rubbing = make.effect(f"joint_friction@{joint}", coefficient=0.5, preload_N=2.0)
+    loose = make.effect(f"joint_clearance@{place}", clearance_um=2e6 * RADIAL)
+    result = evaluate(free_model.with_effects(rubbing, loose), swing(20.0), None)
+    ends = end_screws(result.situation.table.geometry, place)
+
+    def pressed(at):
+        return (at.at_home(place, at.through_place(place)) @ ends.T).reshape(-1, 2, 2)
+
+    smooth = evaluate(free_model.with_effects(loose), swing(20.0), None)
+    assert np.abs(pressed(result.situation) - pressed(smooth.situation)).max() > 0.1
+    added = result.contributions[1]
+    screw = result.situation.at_home(place, added.limb_1 if added.limb_2 is None else added.limb_2)
+    moved = np.linalg.lstsq(ends.T, screw.T, rcond=None)[0].T.reshape(-1, 2, 2)
+    force = pressed(result.situation)
+    crossed = moved[..., 0] * force[..., 1] - moved[..., 1] * force[..., 0]
+    assert np.abs(crossed).max() < 1e-6 * RADIAL
+    assert np.sum(moved * force, axis=-1).min() > 0.0
+
+
 def test_slide_locks_when_the_load_comes_at_rest(free_model, make):
     """A stiff bristle with a large budget holds the slide that a load at rest would make."""
     joint, number = "joint_3", 1

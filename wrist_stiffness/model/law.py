@@ -15,11 +15,11 @@ from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSig
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
 
-Stage = Literal["parts", "load", "geometry", "reaction", "sensor"]
-STAGES: tuple[Stage, ...] = ("parts", "load", "geometry", "reaction", "sensor")
+Stage = Literal["parts", "load", "geometry", "friction", "reaction", "sensor"]
+STAGES: tuple[Stage, ...] = ("parts", "load", "geometry", "friction", "reaction", "sensor")
 """What a law changes, in the order of evaluation: elastic parts; wrenches on the bodies; screws and
-gaps that no force decides; screws and wrenches that follow the forces through the components; what
-the pose sensor says."""
+gaps that no force decides; forces of joints that rub; screws and wrenches that follow the forces
+through the components; what the pose sensor says."""
 
 
 class Law(ABC):

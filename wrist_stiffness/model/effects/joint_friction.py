@@ -31,7 +31,7 @@ class JointFriction(Law):
     """
 
     id = "joint_friction"
-    stage = "reaction"
+    stage = "friction"
     places = PASSIVE_JOINTS
     sentence = "{place} rubs: the pose depends on the way it was reached"
     check = "turn the joint by hand; clean it; compare an approach under load with a load at rest"
