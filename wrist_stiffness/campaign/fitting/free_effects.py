@@ -26,14 +26,14 @@ class FreeEffect:
         infinite for none.  A parameter that is left out keeps its value.
     per_session : bool
         Whether every session has values of its own.
-    widening : float
-        By how much the priors are wider than usual, of parameters that say how large the effect is.
+    widening : dict of str to float
+        By how much the priors of some parameters are wider than usual.
     """
 
     effect: Effect
     scale: Mapping[str, float] = field(default_factory=dict)
     per_session: bool = False
-    widening: float = 1.0
+    widening: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def step(self) -> dict[str, float]:
@@ -104,14 +104,17 @@ def unfitted(model: ErrorModel) -> ErrorModel:
     """Return a model without what a fit has found of its set-up and of the wrist's tolerances.
 
     For another fit to the same data.  They would count twice, first as knowledge; and what stood in
-    for a missing effect would go on standing in for it, at no price.
+    for a missing effect would go on standing in for it, at no price.  A tolerance that was added as
+    a finding stays.
     """
     laws = {law for law, _ in (*SET_UP, *BUILT)}
+    added = {step.added for step in model.lineage}
     return model.with_effects(
         *(
             effect
             for effect in model.effects
             if effect.law.id not in laws
+            or effect.name in added
             or all(estimate.sigma == 0.0 for estimate in effect.estimates.values())
         )
     )
