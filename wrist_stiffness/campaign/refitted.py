@@ -26,8 +26,8 @@ because whoever fits a wrist shims them to its axes; the load sensor's scale, be
 look nearly like it.
 
 A gap is free here by the prior of its law, tens of micrometres: a calibration describes whatever
-wrist stands there.  A diagnosis holds it to what shims leave (`searching.base_fit`), because a
-flange that stands otherwise is a fault to be named."""
+wrist stands there.  A diagnosis, and the fit of what it names, hold it to what shims leave
+(`fitting.free_effects`), because a flange that stands otherwise is a fault to be named."""
 
 TOLERATED = frozenset(law for law, _ in BUILT)
 """Laws of the wrist's tolerances: what they do within their priors is no finding."""

@@ -10,7 +10,11 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated, told_model
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
+from wrist_stiffness.campaign.fitting.free_effects import (
+    FreeEffect,
+    commissioning,
+    within_tolerances,
+)
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
 from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting.recipes import recipe
@@ -171,7 +175,8 @@ def extend(
         If the model has the effect already or calibration fits it anyway, or the recordings lack a
         signal that it needs.
     """
-    free, held = commissioning(model, said_calibrated(sessions))
+    loose, held = commissioning(model, said_calibrated(sessions))
+    free = within_tolerances(loose)
     _require_new(model, effect, free)
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.refitted import BUILT, SET_UP
+from wrist_stiffness.campaign.refitted import BUILT, SET_UP, TOLERATED
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
+
+SHIM_UM = 1.5
+"""Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
+
+EVENLY_SPREAD = 1.0 / np.sqrt(3.0)
+"""Standard deviation over the limit of a tolerance: a part lies anywhere within (GUM 4.3.7)."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +104,23 @@ def commissioning(
         if name not in free and (again := refitted(effect)).scale:
             free[name] = again
     return tuple(free.values()), tuple(own[name] for name in own if name not in free)
+
+
+def within_tolerances(free: Sequence[FreeEffect]) -> tuple[FreeEffect, ...]:
+    """Return free effects, those of the wrist with the priors of what is built as drawn.
+
+    So a search holds them, and so does the fit of what it named: a flange that stands otherwise
+    is a fault with a name of its own, and gaps that may go anywhere would take a part of any other.
+    """
+    return tuple(_within_tolerance(each) for each in free)
+
+
+def _within_tolerance(free: FreeEffect) -> FreeEffect:
+    if free.effect.law.id not in TOLERATED:
+        return free
+    if free.effect.law.id == "flange_contact":
+        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM))
+    return replace(free, scale={key: EVENLY_SPREAD * limit for key, limit in free.scale.items()})
 
 
 def unfitted(model: ErrorModel) -> ErrorModel:
