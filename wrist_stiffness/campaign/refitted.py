@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS
 
+AXES, GAPS = "axis_misalignment", "flange_contact"
+
 SET_UP = (
     ("measurement_frame", ("pose_sensor",)),
     ("target_mounting", ("pose_sensor",)),
@@ -15,8 +17,8 @@ SET_UP = (
 """What is set up anew in every session."""
 
 BUILT = (
-    ("axis_misalignment", JOINTS),
-    ("flange_contact", PASSIVE_JOINTS),
+    (AXES, JOINTS),
+    (GAPS, PASSIVE_JOINTS),
     ("link_stiffness", LINKS),
     ("bushing_stiffness", JOINTS),
     ("load_scale", ("load_sensor",)),

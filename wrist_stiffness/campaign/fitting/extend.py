@@ -23,7 +23,7 @@ from wrist_stiffness.campaign.fitting.start_search import start_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
 from wrist_stiffness.campaign.observing import UnitSession, as_units
-from wrist_stiffness.campaign.refitted import TOLERATED
+from wrist_stiffness.campaign.refitted import AXES, TOLERATED
 from wrist_stiffness.diagnosis.sealed import bought, refuted
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -176,7 +176,7 @@ def extend(
         signal that it needs.
     """
     loose, held = commissioning(model, said_calibrated(sessions))
-    free = within_tolerances(loose)
+    free = within_tolerances(loose, shimmed=effect.law.id != AXES)
     _require_new(model, effect, free)
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.refitted import BUILT, SET_UP, TOLERATED
+from wrist_stiffness.campaign.refitted import AXES, BUILT, GAPS, SET_UP, TOLERATED
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
@@ -106,20 +106,27 @@ def commissioning(
     return tuple(free.values()), tuple(own[name] for name in own if name not in free)
 
 
-def within_tolerances(free: Sequence[FreeEffect]) -> tuple[FreeEffect, ...]:
+def within_tolerances(free: Sequence[FreeEffect], shimmed: bool = True) -> tuple[FreeEffect, ...]:
     """Return free effects, those of the wrist with the priors of what is built as drawn.
 
     So a search holds them, and so does the fit of what it named: a flange that stands otherwise
     is a fault with a name of its own, and gaps that may go anywhere would take a part of any other.
+
+    Parameters
+    ----------
+    free : sequence of FreeEffect
+        With the priors of their laws.
+    shimmed : bool
+        Whether the gaps still are as shims left them; an axis that moved later opened them.
     """
-    return tuple(_within_tolerance(each) for each in free)
+    return tuple(_within_tolerance(each, shimmed) for each in free)
 
 
-def _within_tolerance(free: FreeEffect) -> FreeEffect:
+def _within_tolerance(free: FreeEffect, shimmed: bool) -> FreeEffect:
     if free.effect.law.id not in TOLERATED:
         return free
-    if free.effect.law.id == "flange_contact":
-        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM))
+    if free.effect.law.id == GAPS:
+        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM)) if shimmed else free
     return replace(free, scale={key: EVENLY_SPREAD * limit for key, limit in free.scale.items()})
 
 
@@ -128,10 +135,12 @@ def unfitted(model: ErrorModel) -> ErrorModel:
 
     For another fit to the same data.  They would count twice, first as knowledge; and what stood in
     for a missing effect would go on standing in for it, at no price.  A tolerance that was added as
-    a finding stays.
+    a finding stays, and with an axis the gaps that it left.
     """
     laws = {law for law, _ in (*SET_UP, *BUILT)}
     added = {step.added for step in model.lineage}
+    if any(name.startswith(f"{AXES}@") for name in added):
+        laws -= {GAPS}
     return model.with_effects(
         *(
             effect
