@@ -1,17 +1,22 @@
 """A tolerance that was found is one no more: it is added like any effect, and it stays."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
+from wrist_stiffness.campaign.fitting.extend import HASTE, _widened
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows import calibrate as calibrating
@@ -23,7 +28,8 @@ from wrist_stiffness.workflows.read_sessions import Recordings
 SHIPPED = shipped_file("config/palmieri2015_model.yaml")
 RUN = Run("extend ...", "2026-01-01T00:00:00+00:00")
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
-KNOWN = ["measurement_frame", "target_mounting", "axis_misalignment", "flange_contact"]
+GAPS = "flange_contact"
+KNOWN = ["measurement_frame", "target_mounting", "axis_misalignment", GAPS]
 
 SOFT = "bushing_stiffness@joint_2"
 SOFTER_PERCENT = 3000.0
@@ -104,3 +110,46 @@ def test_what_is_set_up_anew_is_no_finding(recorded, tmp_path, name):
     with pytest.raises(InputError, match=f"{name}: 'calibrate' fits it anew to every recording"):
         extended(SHIPPED, name, recorded[0], tmp_path / "none.yaml")
     assert not Path(tmp_path / "none.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "gap_um"), [("backlash@motor_1", 1.5), ("axis_misalignment@joint_3", 30.0)]
+)
+def test_gaps_are_as_shims_left_them_unless_an_axis_moved_later(recorded, name, gap_um):
+    _, day = recorded
+    notes = {"calibrated": [each for each in KNOWN if each not in ("axis_misalignment", GAPS)]}
+    found = extending.extend(load_model(SHIPPED), effect(name), [replace(day, notes=notes)])
+    gaps = [p for p in found.parameters if p.effect.startswith(GAPS)]
+    assert gaps
+    assert {gap.prior_sigma for gap in gaps} == {gap_um}
+    assert {gap.usual for gap in gaps} == {gap_um}
+
+
+def test_with_an_axis_that_was_added_the_gaps_stay_that_it_left():
+    model = load_model(SHIPPED)
+    names = ("axis_misalignment@joint_3", "flange_contact@joint_3", SOFT)
+    fitted = [
+        replace(each, estimates={p.key: Estimate(1.0, 0.5) for p in each.parameters})
+        for each in map(effect, names)
+    ]
+    for added, stay in ((names[0], names[:2]), (SOFT, (SOFT,)), ("", ())):
+        step = Step("extend", "2026-01-01", "ab" * 32, {}, added)
+        child = replace(model.with_effects(*fitted), lineage=(step,))
+        assert tuple(each.name for each in unfitted(child).effects) == stay
+
+
+def test_priors_widen_to_the_size_that_a_parameter_has():
+    loose = effect("creep@joint_1")
+    own = FreeEffect(loose, {p.key: p.scale for p in loose.parameters})
+    assert _widened(own, {"delayed_percent": 7.0, "time_constant_s": 9.0}) == {
+        "delayed_percent": 7.0
+    }
+    # What the law is not proportional to has a size of its own; nothing becomes narrower.
+    wave = effect("transmission_error@motor_1")
+    sizes = dict.fromkeys((p.key for p in wave.parameters), 3.0) | {"run_out_cos_percent": 0.5}
+    wider = _widened(FreeEffect(wave, {}, widening={"run_out_cos_percent": 2.0}), sizes)
+    assert wider["cos_mdeg"] == wider["sin_3_mdeg"] == pytest.approx(3.0)
+    assert wider["run_out_cos_percent"] == 2.0
+    assert wider["run_out_sin_percent"] == pytest.approx(3.0)
+    assert "order" not in wider
+    assert _widened(own, {"delayed_percent": 7.0}, HASTE) == {"delayed_percent": 49.0}
