@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -15,7 +16,7 @@ from wrist_stiffness.model.registry import find_law
 SHIM_UM = 1.5
 """Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
 
-EVENLY_SPREAD = 1.0 / np.sqrt(3.0)
+EVENLY_SPREAD = 1.0 / math.sqrt(3.0)
 """Standard deviation over the limit of a tolerance: a part lies anywhere within (GUM 4.3.7)."""
 
 
