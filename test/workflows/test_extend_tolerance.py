@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
-from wrist_stiffness.campaign.fitting.extend import HASTE, _widened
+from wrist_stiffness.campaign.fitting.extend import _widened
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
@@ -139,17 +139,17 @@ def test_with_an_axis_that_was_added_the_gaps_stay_that_it_left():
 
 
 def test_priors_widen_to_the_size_that_a_parameter_has():
+    """And beyond it by as much again, because the prior had held it back."""
     loose = effect("creep@joint_1")
     own = FreeEffect(loose, {p.key: p.scale for p in loose.parameters})
     assert _widened(own, {"delayed_percent": 7.0, "time_constant_s": 9.0}) == {
-        "delayed_percent": 7.0
+        "delayed_percent": 49.0
     }
     # What the law is not proportional to has a size of its own; nothing becomes narrower.
     wave = effect("transmission_error@motor_1")
     sizes = dict.fromkeys((p.key for p in wave.parameters), 3.0) | {"run_out_cos_percent": 0.5}
     wider = _widened(FreeEffect(wave, {}, widening={"run_out_cos_percent": 2.0}), sizes)
-    assert wider["cos_mdeg"] == wider["sin_3_mdeg"] == pytest.approx(3.0)
+    assert wider["cos_mdeg"] == wider["sin_3_mdeg"] == pytest.approx(9.0)
     assert wider["run_out_cos_percent"] == 2.0
-    assert wider["run_out_sin_percent"] == pytest.approx(3.0)
+    assert wider["run_out_sin_percent"] == pytest.approx(9.0)
     assert "order" not in wider
-    assert _widened(own, {"delayed_percent": 7.0}, HASTE) == {"delayed_percent": 49.0}

@@ -161,7 +161,7 @@ def extend(
     sessions : sequence of MeasuredSession
         In the order of time.
     progress : callable
-        Told steps done and steps at most of each fit in turn: three, and one more for each time
+        Told steps done and steps at most of each fit in turn: four, and one more for each time
         that the effect's prior is made wider.
 
     Returns
@@ -187,10 +187,7 @@ def extend(
     without = before if others == free else judged(replace(base, free=others), progress=progress)
     values = start_values(without.fit, effect)
     own = _free(effect, units)
-    begun = {
-        p.key: abs(values[p.key] - p.mean) / p.scale for p in effect.parameters if p.key in values
-    }
-    wide = replace(base, free=(*others, replace(own, widening=_widened(own, begun))))
+    wide = replace(base, free=(*others, own))
     start = _with_effect(wide, without.fit, values)
     wide, after = _judged_at_size(wide, start, progress)
     everything = fit(wide, start_of(wide, after.fit.problem, after.fit.z), progress=progress)
@@ -205,10 +202,12 @@ def _judged_at_size(
     A prior of the usual size would hold a fault that is far beyond it back; and what is held back
     goes into whatever else is free, most of all into the tare.
     """
-    after = judged(wide, start, progress)
+    # Flanges and play let a base that took up a part of the effect not find back: from the drawing.
+    starts = judged(wide, start, progress), judged(wide, progress=progress)
+    after = min(starts, key=lambda each: _left(each.fit, by=starts[0].fit))
     for _ in range(MOST_WIDENINGS):
         own = wide.free[-1]
-        widening = _widened(own, _sizes(after.fit), HASTE)
+        widening = _widened(own, _sizes(after.fit))
         if widening == own.widening:
             break
         wide = replace(wide, free=(*wide.free[:-1], replace(own, widening=widening)))
@@ -216,7 +215,13 @@ def _judged_at_size(
     return wide, after
 
 
-def _widened(own: FreeEffect, sizes: Mapping[str, float], haste: float = 1.0) -> dict[str, float]:
+def _left(found: Fit, by: Fit) -> float:
+    """Return the sum of squares that a fit leaves, priors included, by the noise of a like one."""
+    white = by.noise.whiten(by.seen, np.nan_to_num(found.residual)[:, :, None])
+    return float((white**2).sum() + ((found.problem.weights * found.z) ** 2).sum())
+
+
+def _widened(own: FreeEffect, sizes: Mapping[str, float]) -> dict[str, float]:
     """Return how wide the priors of an effect should be, never less than they are.
 
     A common factor on all parameters that the effect is proportional to is the most probable one
@@ -229,8 +234,6 @@ def _widened(own: FreeEffect, sizes: Mapping[str, float], haste: float = 1.0) ->
         With its priors as they are.
     sizes : dict of str to float
         How large its parameters are, in usual widths.
-    haste : float
-        Power by which to widen more than the sizes ask for, where priors held them back.
     """
     known = [p for p in own.effect.parameters if p.key in sizes and np.isfinite(p.scale)]
     linear = [sizes[p.key] for p in known if p.linear]
@@ -241,7 +244,7 @@ def _widened(own: FreeEffect, sizes: Mapping[str, float], haste: float = 1.0) ->
             now = widening.get(p.key, 1.0)
             beyond = (together if p.linear else sizes[p.key]) / now
             if beyond > WORTH_WIDENING:
-                widening[p.key] = min(now * beyond**haste, MOST_WIDENED)
+                widening[p.key] = min(now * beyond**HASTE, MOST_WIDENED)
     return widening
 
 
