@@ -1,4 +1,4 @@
-"""What naming is worth: the project's `calibrate` and `extend`, told the true names.
+"""What naming is worth: the project's `extend`, told the true names.
 
 Where this does not come to the floor either, no better search would: the law of the catalogue, the
 fit or two minutes of data are what is missing.
@@ -13,33 +13,27 @@ from observe import Riddle
 from own_diagnosis import predicted
 from solvers import Answer, nothing
 
-from wrist_stiffness.campaign.fitting.calibrate import calibrate
 from wrist_stiffness.campaign.fitting.extend import extend
-from wrist_stiffness.campaign.fitting.free_effects import unfitted
-from wrist_stiffness.campaign.refitted import BUILT, names_of
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
 
 
 def told_the_name(riddle: Riddle, words: Dictionary | None = None) -> Answer:
-    """Add what hides, by effect and place alone, and calibrate the wrist with it on the first day.
+    """Add what hides, by effect and place alone, to the wrist as it was on the first day.
 
-    Tolerances that hide something are refitted by the calibration itself.  Asked are one effect of
-    the catalogue and two.
+    Asked are one effect of the catalogue and two.
     """
     if riddle.case.kind not in ("single", "double"):
         return nothing(riddle)
     names = [f"{hidden.effect}@{hidden.component}" for hidden in riddle.hidden]
     sessions = [riddle.days[0].read]
-    model = ErrorModel("benchmark", wrist(), "closed_form")
-    added = [name for name in names if name not in names_of(BUILT)]
-    for name in added:
+    known = ErrorModel("benchmark", wrist(), "closed_form")
+    for name in names:
         law, _, place = name.partition("@")
+        model = extend(known, Effect(find_law(law), place), sessions).model
         # A recording is no knowledge twice.
-        model = extend(unfitted(model), Effect(find_law(law), place), sessions).model
-    if not added:
-        model = calibrate(model, sessions).model
+        known = model.with_effects(*(each for each in model.effects if each.name in names))
     # Where the sensors stood on the first day is not of the wrist.
     lasting = model.with_effects(*(e for e in model.effects if e.law.id not in ABSORBED))
     one, two = (predicted(lasting, day) for day in riddle.days)

@@ -1,9 +1,11 @@
 """One limit says what is far beyond the usual, whether a fault is named or added."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from wrist_stiffness.campaign.fitting.result import Fitted
-from wrist_stiffness.campaign.searching.refit import sized
+from wrist_stiffness.campaign.searching.refit import sized, valued
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
@@ -11,8 +13,8 @@ from wrist_stiffness.model.registry import find_law
 USUAL, KEY = 500.0, "compliance_mdeg_per_Nm"
 
 
-def named(value):
-    """Return what a diagnosis says of a compliance of that value [mdeg/(N m)]."""
+def diagnosed(value):
+    """Return a diagnosis that names a compliance of that value [mdeg/(N m)]."""
     finding = Finding(
         (("drive_compliance", "motor_1"),),
         {KEY: (value, 10.0)},
@@ -27,9 +29,13 @@ def named(value):
     )
     error = {"s_um": 1.0}
     rest = Unexplained((), 0.02, "")
-    answer = Diagnosis("effect", "dwell", error, error, error, (), (finding,), rest, (), 0, "one")
+    return Diagnosis("effect", "dwell", error, error, error, (), (finding,), rest, (), 0, "one")
+
+
+def named(value):
+    """Return what a diagnosis says of a compliance of that value [mdeg/(N m)]."""
     effect = Effect(find_law("drive_compliance"), "motor_1").with_values({KEY: value})
-    return sized(answer, [effect]).findings[0].evidence
+    return sized(diagnosed(value), [effect]).findings[0].evidence
 
 
 def added(value):
@@ -42,3 +48,11 @@ def added(value):
 def test_what_is_named_is_far_beyond_the_usual_where_what_is_added_is(sizes):
     told = "far beyond its usual size: compliance_mdeg_per_Nm" in named(sizes * USUAL)
     assert told == added(sizes * USUAL) == (sizes > 3.0)
+
+
+@pytest.mark.parametrize(("whole", "told"), [(520.0, 500.0), (540.0, 540.0), (2000.0, 2000.0)])
+def test_where_slopes_do_not_hold_the_law_says_the_value(whole, told):
+    """A bushing 35 times as soft read 7 from its slopes, beside a sentence that knew better."""
+    fitted = SimpleNamespace(values_on_top=lambda name: {KEY: (whole, 5.0)})
+    (finding,) = valued(diagnosed(500.0), fitted).findings
+    assert finding.parameters == {KEY: (told, 10.0 if told == 500.0 else 5.0)}

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from wrist_stiffness.cli.main import main
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.recording import RecordingWriter, open_recording, topics
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
+from wrist_stiffness.workflows.replay import replay
 
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
 
@@ -29,7 +31,18 @@ def test_a_copy_of_a_recording_is_no_second_session(tmp_path, table):
     copy = shutil.copy(THURSDAY, tmp_path / "friday.mcap")
     (session,) = read([THURSDAY, copy], table).values()
     assert session.name == "thursday.mcap"
-    assert session.remarks[-1] == f"{copy} is a copy of it: used once"
+    assert session.remarks[-1] == f"{copy} holds the same measurements: used once"
+
+
+def test_a_replay_and_an_import_of_a_recording_are_no_further_sessions(tmp_path, table):
+    replayed, exported = tmp_path / "replayed.mcap", tmp_path / "thursday.csv"
+    replay(THURSDAY, shipped_file("config/palmieri2015_model.yaml"), replayed)
+    assert main(["export", str(THURSDAY), "-o", str(exported)]) == 0
+    assert main(["import", str(exported), "-o", str(tmp_path / "again")]) == 0
+    (session,) = read([THURSDAY, tmp_path], table).values()
+    assert [text for text in session.remarks if "used once" in text] == [
+        f"{path} holds the same measurements: used once" for path in (tmp_path / "again", replayed)
+    ]
 
 
 def test_a_note_that_calls_calibrated_what_no_fit_refits_is_said(tmp_path, table):

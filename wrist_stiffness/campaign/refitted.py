@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS
 
+AXES, GAPS = "axis_misalignment", "flange_contact"
+
 SET_UP = (
     ("measurement_frame", ("pose_sensor",)),
     ("target_mounting", ("pose_sensor",)),
@@ -15,8 +17,8 @@ SET_UP = (
 """What is set up anew in every session."""
 
 BUILT = (
-    ("axis_misalignment", JOINTS),
-    ("flange_contact", PASSIVE_JOINTS),
+    (AXES, JOINTS),
+    (GAPS, PASSIVE_JOINTS),
     ("link_stiffness", LINKS),
     ("bushing_stiffness", JOINTS),
     ("load_scale", ("load_sensor",)),
@@ -26,8 +28,8 @@ because whoever fits a wrist shims them to its axes; the load sensor's scale, be
 look nearly like it.
 
 A gap is free here by the prior of its law, tens of micrometres: a calibration describes whatever
-wrist stands there.  A diagnosis holds it to what shims leave (`searching.base_fit`), because a
-flange that stands otherwise is a fault to be named."""
+wrist stands there.  A diagnosis, and the fit of what it names, hold it to what shims leave
+(`fitting.free_effects`), because a flange that stands otherwise is a fault to be named."""
 
 TOLERATED = frozenset(law for law, _ in BUILT)
 """Laws of the wrist's tolerances: what they do within their priors is no finding."""

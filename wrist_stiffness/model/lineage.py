@@ -21,18 +21,22 @@ class Step:
         Of the parent's model file.
     recordings : dict of str to str
         SHA-256 of each recording by its name.
+    added : str
+        `law@component` of the effect that the step added; empty for none.
     """
 
     command: str
     date: str
     parent_sha256: str
     recordings: Mapping[str, str]
+    added: str = ""
 
     def as_values(self) -> dict[str, Any]:
         """Return the step as the model file holds it."""
-        return {
+        values: dict[str, Any] = {
             "command": self.command,
             "date": self.date,
             "parent_sha256": self.parent_sha256,
             "recordings": dict(self.recordings),
         }
+        return values | ({"added": self.added} if self.added else {})

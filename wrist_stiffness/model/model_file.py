@@ -224,6 +224,7 @@ def _step(block: Block) -> Step:
         block.text("date"),
         block.text("parent_sha256"),
         {str(name): recordings.text(name) for name in recordings.values},
+        block.text("added") if "added" in block.values else "",
     )
     block.no_more_keys()
     return step

@@ -302,7 +302,7 @@ def extend_model(
     measured = tuple(sessions.values())
     covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
     effect = addition.effect(sorted(covariates))
-    step = run.step(model, sessions)
+    step = replace(run.step(model, sessions), added=effect.name)
     known = unfitted(parent) if was_fitted_to(parent, sessions) else parent
     found = extend(known, effect, measured, progress)
     save_model(replace(found.model, lineage=(*parent.lineage, step)), output)

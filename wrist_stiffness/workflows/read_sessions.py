@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from wrist_stiffness.campaign.fitting.calibrate import CALIBRATED
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.folder import recordings_in
@@ -55,7 +57,8 @@ def read_sessions(
     Returns
     -------
     dict of Path to MeasuredSession
-        In the order of time.  A copy of another one is no second session, and is said.
+        In the order of time.  A copy of another one, also by way of `replay` or of a table, is no
+        second session, and is said.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def read_sessions(
     """
     paths, motors = recordings_in(recordings.paths), recordings.settings.motors
     found: dict[Path, MeasuredSession] = {}
-    first: dict[str, Path] = {}
+    first: dict[bytes, Path] = {}
     for done, path in enumerate(paths):
         progress(done, len(paths))
         session = read_session(
@@ -75,11 +78,12 @@ def read_sessions(
             frames=recordings.settings.frames,
             load_age_limit_s=recordings.settings.load_age_limit_s,
         )
-        same = first.setdefault(recording_sha256(path), path)
+        same = first.setdefault(_what_was_measured(session), path)
         if same == path:
             found[path] = _with_remarks(session, _without_meaning(session))
         else:
-            found[same] = _with_remarks(found[same], [f"{path} is a copy of it: used once"])
+            said = f"{path} holds the same measurements: used once"
+            found[same] = _with_remarks(found[same], [said])
     progress(len(paths), len(paths))
     names = Counter(session.name for session in found.values())
     named = {
@@ -87,6 +91,14 @@ def read_sessions(
         for path, session in found.items()
     }
     return dict(sorted(named.items(), key=lambda item: float(item[1].block.time[0])))
+
+
+def _what_was_measured(session: MeasuredSession) -> bytes:
+    """Return what no other session can have: when which pose was measured, to the bit."""
+    rows = session.measured.any(axis=1)
+    poses = np.hstack([session.shift[rows], session.rotation[rows].reshape(-1, 9)])
+    said = np.column_stack([session.block.time[rows], np.nan_to_num(poses)])
+    return hashlib.sha256(said.tobytes()).digest()
 
 
 def _with_remarks(session: MeasuredSession, remarks: Sequence[str]) -> MeasuredSession:

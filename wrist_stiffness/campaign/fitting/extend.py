@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,15 +10,20 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated, told_model
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
+from wrist_stiffness.campaign.fitting.free_effects import (
+    FreeEffect,
+    commissioning,
+    within_tolerances,
+)
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
-from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
 from wrist_stiffness.campaign.fitting.recipes import recipe
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.fitting.start_search import start_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
 from wrist_stiffness.campaign.observing import UnitSession, as_units
+from wrist_stiffness.campaign.refitted import AXES, TOLERATED
 from wrist_stiffness.diagnosis.sealed import bought, refuted
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -32,7 +37,7 @@ WORTH_WIDENING = 1.15
 """A prior is made wider if its parameters are so many times its width."""
 
 HASTE = 2.0
-"""Power by which a round widens more than the parameters ask for, which the old prior held back."""
+"""Power by which a round widens more than the parameters, held back by the old priors, ask for."""
 
 MOST_WIDENINGS, MOST_WIDENED = 4, 100.0
 """Rounds, and how much wider a prior may become."""
@@ -96,7 +101,11 @@ class Extension:
         Both from the recordings without the held-out part.
         """
         after = {(p.effect, p.key, p.session): p for p in self.after.fit.parameters}
-        pairs = [(p, after[p.effect, p.key, p.session]) for p in self.before.fit.parameters]
+        pairs = [
+            (p, after[p.effect, p.key, p.session])
+            for p in self.before.fit.parameters
+            if p.effect != self.effect.name
+        ]
         moved = [
             (abs(b.value - a.value) / a.sigma, a, b)
             for a, b in pairs
@@ -152,7 +161,7 @@ def extend(
     sessions : sequence of MeasuredSession
         In the order of time.
     progress : callable
-        Told steps done and steps at most of each fit in turn: three, and one more for each time
+        Told steps done and steps at most of each fit in turn: four, and one more for each time
         that the effect's prior is made wider.
 
     Returns
@@ -166,14 +175,20 @@ def extend(
         If the model has the effect already or calibration fits it anyway, or the recordings lack a
         signal that it needs.
     """
-    free, held = commissioning(model, said_calibrated(sessions))
+    loose, held = commissioning(model, said_calibrated(sessions))
+    free = within_tolerances(loose, shimmed=effect.law.id != AXES)
     _require_new(model, effect, free)
     units = tuple(as_units(model, session) for session in sessions)
     _require_signals(model, effect, units)
     base = FitProblem(model.with_effects(*held), units, free)
     before = judged(base, progress=progress)
-    wide = replace(base, free=(*free, _free(effect, units)))
-    start = _with_effect(wide, before.fit, start_values(before.fit, effect))
+    # A tolerance that is found is one no more: the usual prior would hold it back.
+    others = tuple(each for each in free if each.effect.name != effect.name)
+    without = before if others == free else judged(replace(base, free=others), progress=progress)
+    values = start_values(without.fit, effect)
+    own = _free(effect, units)
+    wide = replace(base, free=(*others, own))
+    start = _with_effect(wide, without.fit, values)
     wide, after = _judged_at_size(wide, start, progress)
     everything = fit(wide, start_of(wide, after.fit.problem, after.fit.z), progress=progress)
     return Extension(effect, everything, before, after)
@@ -185,34 +200,63 @@ def _judged_at_size(
     """Judge the fit with the priors of the effect, the last one, as wide as it turns out large.
 
     A prior of the usual size would hold a fault that is far beyond it back; and what is held back
-    goes into whatever else is free, most of all into the tare.  A common factor on all parameters
-    is the most probable one (empirical Bayes): those that are not told still stay at nothing.
+    goes into whatever else is free, most of all into the tare.
     """
-    after = judged(wide, start, progress)
+    # Flanges and play let a base that took up a part of the effect not find back: from the drawing.
+    starts = judged(wide, start, progress), judged(wide, progress=progress)
+    after = min(starts, key=lambda each: _left(each.fit, by=starts[0].fit))
     for _ in range(MOST_WIDENINGS):
-        beyond = _beyond_prior(after.fit)
         own = wide.free[-1]
-        widening = min(own.widening * beyond**HASTE, MOST_WIDENED)
-        if beyond < WORTH_WIDENING or widening <= own.widening:
+        widening = _widened(own, _sizes(after.fit))
+        if widening == own.widening:
             break
         wide = replace(wide, free=(*wide.free[:-1], replace(own, widening=widening)))
         after = judged(wide, (after.fit.problem, after.fit.z), progress)
     return wide, after
 
 
-def _beyond_prior(found: Fit) -> float:
-    """Return the root mean square of the last effect's sizes in widths of their priors."""
+def _left(found: Fit, by: Fit) -> float:
+    """Return the sum of squares that a fit leaves, priors included, by the noise of a like one."""
+    white = by.noise.whiten(by.seen, np.nan_to_num(found.residual)[:, :, None])
+    return float((white**2).sum() + ((found.problem.weights * found.z) ** 2).sum())
+
+
+def _widened(own: FreeEffect, sizes: Mapping[str, float]) -> dict[str, float]:
+    """Return how wide the priors of an effect should be, never less than they are.
+
+    A common factor on all parameters that the effect is proportional to is the most probable one
+    (empirical Bayes): those that are not told still stay at nothing.  Any other that is nothing as
+    a rule has a factor of its own; shapes, which have a mean, keep their prior.
+
+    Parameters
+    ----------
+    own : FreeEffect
+        With its priors as they are.
+    sizes : dict of str to float
+        How large its parameters are, in usual widths.
+    """
+    known = [p for p in own.effect.parameters if p.key in sizes and np.isfinite(p.scale)]
+    linear = [sizes[p.key] for p in known if p.linear]
+    together = float(np.sqrt(np.mean(np.square(linear)))) if linear else 0.0
+    widening = dict(own.widening)
+    for p in known:
+        if p.linear or p.mean == 0.0:
+            now = widening.get(p.key, 1.0)
+            beyond = (together if p.linear else sizes[p.key]) / now
+            if beyond > WORTH_WIDENING:
+                widening[p.key] = min(now * beyond**HASTE, MOST_WIDENED)
+    return widening
+
+
+def _sizes(found: Fit) -> dict[str, float]:
+    """Return the root mean squares of the last effect's parameters in usual widths."""
     last = len(found.problem.free) - 1
-    sizes = {p.key for p in found.problem.free[last].effect.parameters if p.linear}
-    places = [
-        place
-        for place, unknown in enumerate(found.problem.unknowns)
-        if unknown.free == last and unknown.key in sizes and unknown.weight > NO_PRIOR
-    ]
-    if not places:
-        return 0.0
-    square = found.z[places] ** 2 + np.diag(found.covariance)[places]
-    return float(np.sqrt(np.mean(found.problem.weights[places] ** 2 * square)))
+    square = found.z**2 + np.diag(found.covariance)
+    return {
+        unknown.key: float(np.sqrt(size))
+        for unknown, size in zip(found.problem.unknowns, square, strict=True)
+        if unknown.free == last
+    }
 
 
 def _free(effect: Effect, units: Sequence[UnitSession]) -> FreeEffect:
@@ -235,10 +279,15 @@ def _with_effect(wide: FitProblem, base: Fit, values: dict[str, float]) -> tuple
 
 
 def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:
-    if any(own.name == effect.name for own in model.effects):
+    tolerances = {each.effect.name for each in free if each.effect.law.id in TOLERATED}
+    added = {step.added for step in model.lineage}
+    there = any(own.name == effect.name for own in model.effects)
+    if effect.name in added if effect.name in tolerances else there:
         raise InputError(f"{effect.name}: the model has it already; 'calibrate' fits it again")
-    if any(each.effect.name == effect.name for each in free):
-        raise InputError(f"{effect.name}: 'calibrate' fits it, there is nothing to add")
+    if any(each.effect.name == effect.name and each.per_session for each in free):
+        raise InputError(
+            f"{effect.name}: 'calibrate' fits it anew to every recording, there is nothing to add"
+        )
 
 
 def _require_signals(model: ErrorModel, effect: Effect, units: Sequence[UnitSession]) -> None:

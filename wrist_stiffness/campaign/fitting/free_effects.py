@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.refitted import BUILT, SET_UP
+from wrist_stiffness.campaign.refitted import AXES, BUILT, GAPS, SET_UP, TOLERATED
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
+
+SHIM_UM = 1.5
+"""Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
+
+EVENLY_SPREAD = 1.0 / math.sqrt(3.0)
+"""Standard deviation over the limit of a tolerance: a part lies anywhere within (GUM 4.3.7)."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +33,14 @@ class FreeEffect:
         infinite for none.  A parameter that is left out keeps its value.
     per_session : bool
         Whether every session has values of its own.
-    widening : float
-        By how much the priors are wider than usual, of parameters that say how large the effect is.
+    widening : dict of str to float
+        By how much the priors of some parameters are wider than usual.
     """
 
     effect: Effect
     scale: Mapping[str, float] = field(default_factory=dict)
     per_session: bool = False
-    widening: float = 1.0
+    widening: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def step(self) -> dict[str, float]:
@@ -100,18 +107,47 @@ def commissioning(
     return tuple(free.values()), tuple(own[name] for name in own if name not in free)
 
 
+def within_tolerances(free: Sequence[FreeEffect], shimmed: bool = True) -> tuple[FreeEffect, ...]:
+    """Return free effects, those of the wrist with the priors of what is built as drawn.
+
+    So a search holds them, and so does the fit of what it named: a flange that stands otherwise
+    is a fault with a name of its own, and gaps that may go anywhere would take a part of any other.
+
+    Parameters
+    ----------
+    free : sequence of FreeEffect
+        With the priors of their laws.
+    shimmed : bool
+        Whether the gaps still are as shims left them; an axis that moved later opened them.
+    """
+    return tuple(_within_tolerance(each, shimmed) for each in free)
+
+
+def _within_tolerance(free: FreeEffect, shimmed: bool) -> FreeEffect:
+    if free.effect.law.id not in TOLERATED:
+        return free
+    if free.effect.law.id == GAPS:
+        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM)) if shimmed else free
+    return replace(free, scale={key: EVENLY_SPREAD * limit for key, limit in free.scale.items()})
+
+
 def unfitted(model: ErrorModel) -> ErrorModel:
     """Return a model without what a fit has found of its set-up and of the wrist's tolerances.
 
     For another fit to the same data.  They would count twice, first as knowledge; and what stood in
-    for a missing effect would go on standing in for it, at no price.
+    for a missing effect would go on standing in for it, at no price.  A tolerance that was added as
+    a finding stays, and with an axis the gaps that it left.
     """
     laws = {law for law, _ in (*SET_UP, *BUILT)}
+    added = {step.added for step in model.lineage}
+    if any(name.startswith(f"{AXES}@") for name in added):
+        laws -= {GAPS}
     return model.with_effects(
         *(
             effect
             for effect in model.effects
             if effect.law.id not in laws
+            or effect.name in added
             or all(estimate.sigma == 0.0 for estimate in effect.estimates.values())
         )
     )

@@ -18,7 +18,6 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.parameters import Parameter
 
 NO_PRIOR = 1e-3
 """Weight where a law knows no prior: a thousand times its first value, so that what the data do not
@@ -87,10 +86,8 @@ class Unknown:
         return min(max(self.mean + steps * self.step, self.lower), self.upper)
 
 
-def _weight(free: FreeEffect, parameter: Parameter, scale: float) -> float:
-    if not np.isfinite(scale):
-        return NO_PRIOR
-    return 1.0 / free.widening if parameter.linear else 1.0
+def _weight(free: FreeEffect, key: str) -> float:
+    return 1.0 / free.widening.get(key, 1.0) if np.isfinite(free.scale[key]) else NO_PRIOR
 
 
 def _together(one: Effect, other: Effect) -> Effect:
@@ -137,11 +134,11 @@ class FitProblem:
                         session,
                         free.effect.estimates[key].value,
                         free.step[key],
-                        _weight(free, bounds[key], scale),
+                        _weight(free, key),
                         bounds[key].lower,
                         bounds[key].upper,
                     )
-                    for key, scale in free.scale.items()
+                    for key in free.scale
                 ]
         return tuple(found)
 

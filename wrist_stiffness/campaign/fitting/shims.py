@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wrist_stiffness.campaign.refitted import AXES, GAPS
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import situation_of
 
-AXES, GAPS, GAP = "axis_misalignment", "flange_contact", "gap_um"
+GAP = "gap_um"
 
 UM = 1e6
 

@@ -7,7 +7,7 @@ fit repeats Gauss-Newton steps on the model itself, and only what is left is tak
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,21 +15,18 @@ from scipy.linalg import lstsq
 from scipy.stats import chi2
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning
+from wrist_stiffness.campaign.fitting.free_effects import (
+    FreeEffect,
+    commissioning,
+    within_tolerances,
+)
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
-from wrist_stiffness.campaign.refitted import TOLERATED
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-
-SHIM_UM = 1.5
-"""Standard deviation of a flange gap after fitting: shims come in steps of 5 um."""
-
-EVENLY_SPREAD = 1.0 / np.sqrt(3.0)
-"""Standard deviation over the limit of a tolerance: a part lies anywhere within (GUM 4.3.7)."""
 
 MOST_STEPS = 20
 
@@ -224,16 +221,7 @@ class BaseFit:
 def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
     """Return what of the base is free, and the effects that stay as they are."""
     free, held = commissioning(model)
-    return tuple(_within_tolerance(each) for each in free), held
-
-
-def _within_tolerance(free: FreeEffect) -> FreeEffect:
-    """Return a part of the wrist with the prior of what is built within its tolerance."""
-    if free.effect.law.id not in TOLERATED:
-        return free
-    if free.effect.law.id == "flange_contact":
-        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM))
-    return replace(free, scale={key: EVENLY_SPREAD * limit for key, limit in free.scale.items()})
+    return within_tolerances(free), held
 
 
 def fit_base(
