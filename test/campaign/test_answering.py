@@ -13,7 +13,8 @@ from wrist_stiffness.campaign.searching.diagnose import (
     _settled,
     _table,
 )
-from wrist_stiffness.campaign.searching.seeking import PRESSING, Place
+from wrist_stiffness.campaign.searching.place import Place
+from wrist_stiffness.campaign.searching.seeking import PRESSING
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.result import Finding, Unexplained
 

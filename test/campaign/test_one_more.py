@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_equal
 
-from wrist_stiffness.campaign.searching import seeking
+from wrist_stiffness.campaign.searching import place, seeking
+from wrist_stiffness.campaign.searching.place import EXACT, ROUGH, WORTH, Reached
 from wrist_stiffness.campaign.searching.screening import Fitted
-from wrist_stiffness.campaign.searching.seeking import EXACT, INEXACT, ROUGH, WORTH, Reached, Search
+from wrist_stiffness.campaign.searching.seeking import INEXACT, Search
 
 COST = 1000.0
 PRICE = 5.0
@@ -158,14 +159,16 @@ def wrist(monkeypatch):
     """A wrist whose catalogue is all that any of its fits knows."""
     wrist = Wrist()
 
-    def catalogue(point, held, near):
+    def catalogue(point, held, near, laws=None):
         names = sorted(frozenset().union(*wrist.left))
+        names = [name for name in names if laws is None or name.split("@")[0] in laws]
         return tuple(candidate(name) for name in names if name not in held)
 
     monkeypatch.setattr(seeking, "wrist_candidates", catalogue)
-    monkeypatch.setattr(seeking, "point_of", lambda base, with_extras=False: None)
+    for module in (place, seeking):
+        monkeypatch.setattr(module, "point_of", lambda base, with_extras=False: None)
     monkeypatch.setattr(seeking, "free_base", lambda model: ((), ()))
-    monkeypatch.setattr(seeking, "Screen", wrist.screen)
+    monkeypatch.setattr(place, "Screen", wrist.screen)
     return wrist
 
 

@@ -12,7 +12,7 @@ from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.fitter import Fitter
-from wrist_stiffness.campaign.searching.seeking import Reached, point_of
+from wrist_stiffness.campaign.searching.place import WORTH, Reached, point_of
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
@@ -101,7 +101,7 @@ def test_a_rival_that_explains_less_is_not_fitted_with_the_base(model, units, al
     start = reached(model, units, alone, width, effect("time_delay@motor_2", delay_ms=10.0))
     rivals = [each for each in candidates if each.name != width.name]
     promised = start.screen(without=width.name).leaders(rivals)[0][0]
-    assert promised > seeking.WORTH
+    assert promised > WORTH
 
     def never(*given):
         pytest.fail("fitted, which takes seconds")

@@ -16,7 +16,7 @@ from wrist_stiffness.campaign.searching.diagnose import (
     _wander,
     diagnose_sessions,
 )
-from wrist_stiffness.campaign.searching.seeking import point_of
+from wrist_stiffness.campaign.searching.place import point_of
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.result import Finding, Unexplained
 from wrist_stiffness.model.effect import Effect

@@ -18,6 +18,7 @@ from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
 from wrist_stiffness.campaign.searching.fitter import Fitter, Tell, silent
+from wrist_stiffness.campaign.searching.place import Place
 from wrist_stiffness.campaign.searching.refit import (
     refit,
     rejudged,
@@ -25,7 +26,7 @@ from wrist_stiffness.campaign.searching.refit import (
     valued,
     withdrawn,
 )
-from wrist_stiffness.campaign.searching.seeking import PRESSING, Place, Search
+from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
 from wrist_stiffness.errors import InputError

@@ -7,7 +7,7 @@ After each the earlier ones must still pay, and at the end each must be the best
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -16,16 +16,12 @@ from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.searching.fitter import Fitter
-from wrist_stiffness.campaign.searching.screening import Fitted, Screen
+from wrist_stiffness.campaign.searching.place import WORTH, Candidates, Place, Reached, point_of
+from wrist_stiffness.campaign.searching.screening import Fitted
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
-Candidates = tuple[WristCandidate, ...]
 Sessions = tuple[UnitSession, ...]
-
-WORTH = 30.0
-"""Fall of the sum of squares, in units of the noise and beyond the price of the freedom, that is
-worth moving the point for."""
 
 LEADING = 0.3
 """Candidates that explain this share of what the best explains are fitted too."""
@@ -36,14 +32,6 @@ MOST_FITTED = 6
 CLOSE, MOST_REFITTED = 0.6, 2
 """So many candidates that gain nearly as much as the best are fitted with the whole base: what the
 base took up of one of them shows only then."""
-
-EXACT = 0.1
-"""Share of its size within which a law is taken to be exact here: a gain that what is left of a
-large effect within this share could make draws no further effect in."""
-
-ROUGH = 10.0
-"""Variance of what is left, in units of the noise, from which a fit is also begun from the drawing:
-a base that gave way to a large effect does not find back."""
 
 INEXACT = 1.5
 """Variance of what is left, in units of the noise, from which a law is not taken as exact."""
@@ -63,71 +51,6 @@ CLOSING = frozenset(("bushing_stiffness", "bushing_hardening"))
 
 MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A base and the catalogue about it, for the statistics.
-
-    Parameters
-    ----------
-    base : BaseFit
-        Fitted.
-    candidates : tuple of WristCandidate
-        The catalogue.
-    fits : dict of str to BaseFit
-        Where candidates stand for whole fits: these, by name.
-    known : bool
-        Whether what is fitted along with the base is known, and asked is what there is beside it.
-    """
-
-    base: BaseFit
-    candidates: Candidates
-    fits: Mapping[str, BaseFit] = field(default_factory=dict)
-    known: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Reached:
-    """Where the search has arrived.
-
-    Parameters
-    ----------
-    base : BaseFit
-        Fitted along with the effects found.
-    prices : dict of str to float
-        What the freedom of each of them costs, by its name.
-    first : float
-        Sum of squares that the base alone left.
-    """
-
-    base: BaseFit
-    prices: Mapping[str, float]
-    first: float
-
-    @property
-    def least(self) -> float:
-        """What a further effect must explain beyond its price: more than inexact laws leave."""
-        return max(WORTH, EXACT**2 * (self.first - self.base.cost))
-
-    @property
-    def total(self) -> float:
-        """Sum of squares and what all effects must be worth; every step of the search lowers it."""
-        return self.base.cost + sum(WORTH + price for price in self.prices.values())
-
-    @property
-    def rough(self) -> bool:
-        """Whether so much is left that a fit is begun from the drawing as well."""
-        return self.base.cost > ROUGH * float(self.base.problem.table.measured.sum())
-
-    @property
-    def effects(self) -> dict[str, Effect]:
-        """Effects found, at their values; on top of what the base has of them."""
-        return self.base.beyond()
-
-    def screen(self, without: str | None = None) -> Screen:
-        """Return what it leaves, without one of the effects if asked so."""
-        return Screen(self.base, point_of(self.base), without)
 
 
 class Search:
@@ -313,13 +236,6 @@ def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached
         for each in known
     )
     return Place(alone, catalogue, fits)
-
-
-def point_of(base: BaseFit, with_extras: bool = False) -> Point:
-    """Return the fitted base, as a rule without the effects fitted along."""
-    sessions = base.problem.sessions
-    used = tuple(each.measured for each in sessions)
-    return Point(tuple(base.model(n, with_extras) for n in range(len(sessions))), used)
 
 
 def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[str, float]]:
