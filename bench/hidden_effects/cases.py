@@ -13,6 +13,10 @@ from wrist_stiffness.simulation.instrument import instrument
 ABSORBED = ("measurement_frame", "target_mounting", "encoder_offset", "load_bias")
 """Refitted in every session before any search: to find them is no diagnosis."""
 
+REGISTRATIONS = ("measurement_frame", "target_mounting")
+"""Of these, where the instrument and its target stand: another day they stand elsewhere.  Zeros and
+tare are the machine's, and its nodes use them until somebody fits them anew."""
+
 SIZES = (0.5, 1.0, 3.0, 30.0, 100.0)
 TINY = 0.05
 EXACT_SIZES = (TINY, 0.5, 3.0, 30.0)

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from bench_wrist import OWN, TRUTH, Array, code_version, wrist
-from cases import ABSORBED
+from cases import REGISTRATIONS
 from dictionary import Dictionary
 from observe import Day, Riddle, noise_seed, settings_of
 from solvers import Answer
@@ -55,7 +55,7 @@ def diagnosed(riddle: Riddle, session: MeasuredSession) -> Answer:
     result = found.diagnosis
     extended = model.with_effects(*refitted(found.base, found.effects), *found.effects)
     one, two = (predicted(extended, day) for day in riddle.days)
-    suspected = [e for e in found.suspected.effects(0) if e.law.id not in ABSORBED]
+    suspected = [e for e in found.suspected.effects(0) if e.law.id not in REGISTRATIONS]
     with_suspects = model.with_effects(*suspected)
     return Answer(
         result.verdict,
@@ -76,7 +76,7 @@ def refitted(base: BaseFit, named: Sequence[Effect] = ()) -> list[Effect]:
     return [
         each
         for each in base.effects(0, with_extras=False)
-        if each.law.id not in ABSORBED and each.name not in names
+        if each.law.id not in REGISTRATIONS and each.name not in names
     ]
 
 

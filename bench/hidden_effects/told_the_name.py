@@ -7,7 +7,7 @@ fit or two minutes of data are what is missing.
 from __future__ import annotations
 
 from bench_wrist import wrist
-from cases import ABSORBED
+from cases import REGISTRATIONS
 from dictionary import Dictionary
 from observe import Riddle
 from own_diagnosis import predicted
@@ -35,6 +35,6 @@ def told_the_name(riddle: Riddle, words: Dictionary | None = None) -> Answer:
         # A recording is no knowledge twice.
         known = model.with_effects(*(each for each in model.effects if each.name in names))
     # Where the sensors stood on the first day is not of the wrist.
-    lasting = model.with_effects(*(e for e in model.effects if e.law.id not in ABSORBED))
+    lasting = model.with_effects(*(e for e in model.effects if e.law.id not in REGISTRATIONS))
     one, two = (predicted(lasting, day) for day in riddle.days)
     return Answer("effect", tuple((name,) for name in names), (one, two))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.observing import as_units
-from wrist_stiffness.campaign.searching.base_fit import fit_base, free_base
+from wrist_stiffness.campaign.searching.base_fit import SILENT, fit_base, free_base
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
 from wrist_stiffness.simulation.cell import CellSettings
 
@@ -19,6 +19,19 @@ def test_no_wrong_flange_catches_the_fit(model, in_the_cell):
     found = fit_base(model, (units,))
     assert found.cost < 1.3 * 6 * units.measured.sum()
     assert np.abs(found.z * found.problem.weights).max() < 4.0
+
+
+def test_what_changes_nothing_has_no_column(model, in_the_cell):
+    """Differences of equal predictions are rounding; a basis would take it for a direction."""
+    settings = CellSettings(rate_hz=10.0, program_seconds=30.0, program_seed=101)
+    found = fit_base(model, (as_units(model, in_the_cell(model.table, settings, 1)),))
+    length = np.linalg.norm(found.whiten(found.columns), axis=0)
+    unknowns = found.problem.unknowns
+    names = [f"{found.problem.free[u.free].effect.name} {u.key}" for u in unknowns]
+    # This shift of joint 3 moves nothing, to first order.
+    assert length[names.index("axis_misalignment@joint_3 shift_v_um")] == 0.0
+    assert ((length == 0.0) | (length > SILENT)).all()
+    assert np.count_nonzero(length) > 0.9 * len(length)
 
 
 def test_tolerances_are_limits_within_which_parts_are_evenly_spread(model):

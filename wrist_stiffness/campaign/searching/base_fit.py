@@ -48,6 +48,10 @@ LOOSE = frozenset(("joint_clearance",))
 """Laws with gaps of their own: slopes about no play say next to nothing, and beside play each slope
 of the base is a search for where the pins rest."""
 
+SILENT = 1e-6
+"""Length, in standard deviations of the noise, of a column that is rounding: bases of columns are
+blind to scales, and what rounding says differs from machine to machine."""
+
 MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
 
 
@@ -72,7 +76,9 @@ class BaseProblem(FitProblem):
         if key not in self._known:
             if len(self._known) == MOST_POINTS:
                 self._known.pop(next(iter(self._known)))
-            self._known[key] = self.columns(z, places)
+            found = self.columns(z, places)
+            found[..., np.linalg.norm(self.whiten(found), axis=0) < SILENT] = 0.0
+            self._known[key] = found
         return self._known[key]
 
     @cached_property
