@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
-from wrist_stiffness.campaign.fitting.extend import _widened
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, unfitted
+from wrist_stiffness.campaign.fitting.extend import _require_new, _widened
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -103,6 +103,17 @@ def test_a_tolerance_that_was_only_calibrated_may_still_be_added(recorded, tmp_p
     (flexibility,) = extended(mine, SOFT, path, soft).own
     assert abs(flexibility.value - SOFTER_PERCENT) < 3.5 * flexibility.sigma
     assert [each.name for each in load_model(soft).effects].count(SOFT) == 1
+
+
+def test_a_finding_that_was_taken_out_again_may_be_added_again():
+    """Its step stays in the lineage."""
+    step = Step("extend", "2026-01-01", "ab" * 32, {}, SOFT)
+    model = replace(load_model(SHIPPED), lineage=(step,))
+    soft = effect(SOFT).with_values({"flexibility_percent": SOFTER_PERCENT})
+    free, _ = commissioning(model)
+    _require_new(model, effect(SOFT), free)
+    with pytest.raises(InputError, match=f"{SOFT}: the model has it already"):
+        _require_new(model.with_effects(soft), effect(SOFT), free)
 
 
 @pytest.mark.parametrize("name", ["encoder_offset@motor_1", "load_bias@load_sensor"])

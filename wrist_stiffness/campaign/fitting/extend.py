@@ -280,9 +280,9 @@ def _with_effect(wide: FitProblem, base: Fit, values: dict[str, float]) -> tuple
 
 def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:
     tolerances = {each.effect.name for each in free if each.effect.law.id in TOLERATED}
-    added = {step.added for step in model.lineage}
-    there = any(own.name == effect.name for own in model.effects)
-    if effect.name in added if effect.name in tolerances else there:
+    # A tolerance of the model was calibrated only, or was found.
+    found = {step.added for step in model.lineage} | ({effect.name} - tolerances)
+    if effect.name in found and any(own.name == effect.name for own in model.effects):
         raise InputError(f"{effect.name}: the model has it already; 'calibrate' fits it again")
     if any(each.effect.name == effect.name and each.per_session for each in free):
         raise InputError(
