@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.atomic_file import replacing, require_room
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.shipped import shipped_file
@@ -34,6 +34,18 @@ def test_a_link_stays_a_link_to_the_new_file(tmp_path):
         written.write_text("new")
     assert link.is_symlink()
     assert target.read_text() == "new"
+
+
+def test_room_is_asked_for_where_the_file_will_be_and_of_no_device(tmp_path):
+    link = tmp_path / "latest"
+    link.symlink_to("/proc/old")
+    with pytest.raises(OSError, match="No such file"):
+        require_room(link)
+    require_room(tmp_path / "model.yaml")
+    assert list(tmp_path.iterdir()) == [link]
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    require_room(pipe)
 
 
 def test_what_stops_half_way_leaves_the_old_file_alone(tmp_path):

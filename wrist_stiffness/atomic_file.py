@@ -6,6 +6,27 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
+
+
+def require_room(path: str | Path) -> None:
+    """Refuse a path beside which no file can be written, before the work for it.
+
+    Parameters
+    ----------
+    path : path
+        File that `replacing` will write later; a device or a pipe needs no room.
+
+    Raises
+    ------
+    OSError
+        If its folder takes no file: permissions alone do not tell, of a disk that is read-only.
+    """
+    target = Path(path)
+    if target.exists() and not target.is_file():
+        return
+    with TemporaryFile(dir=target.resolve().parent):
+        pass
 
 
 @contextmanager

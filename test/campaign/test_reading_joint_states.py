@@ -117,6 +117,20 @@ def test_between_rare_joint_states_at_rest_nothing_is_lost(tmp_path, campaign, t
     assert len(session) == 700
 
 
+def test_far_from_any_joint_state_a_wrist_that_seems_at_rest_is_not_known(
+    tmp_path, campaign, table, monkeypatch
+):
+    """It may have gone and come back: a second and a half is told to half a second off its ends."""
+    monkeypatch.setattr(
+        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
+    )
+    paused(campaign.with_joints(), 300, 450).with_loads().with_poses()
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    (why,) = session.remarks
+    assert why.startswith(f"{799 - len(session)} measured poses are not used: no joint state")
+    assert 48 <= 799 - len(session) <= 51
+
+
 def test_a_wild_joint_state_costs_no_pose_and_no_speed(tmp_path, campaign, table):
     true = campaign.theta
     right = true(campaign.joint_ns)

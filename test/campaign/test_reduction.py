@@ -102,3 +102,18 @@ def test_what_has_no_past_needs_no_path(model, session, monkeypatch):
         (found,) = SessionModel(model, units, ()).along([(*model.effects, added)])
         assert asked == [moments]
         assert found == pytest.approx(units.mean(whole.measured), rel=1e-9, abs=1e-18)
+
+
+@pytest.mark.parametrize(
+    ("name", "on_the_path"),
+    [
+        ("platform_compliance@platform", False),
+        ("creep@joint_3", True),
+        ("transmission_error@motor_1", True),
+    ],
+)
+def test_what_has_a_past_or_many_waves_is_not_told_by_mean_moments(
+    model, session, name, on_the_path
+):
+    at = SessionModel(model, as_units(model, session), ())
+    assert at.remembers((effect(name),)) == on_the_path

@@ -151,6 +151,12 @@ def test_an_extra_on_its_bound_stays_an_effect(both):
     assert found.estimates["width_mdeg"].value == bound
 
 
+def test_of_the_catalogue_those_laws_are_tried_that_are_asked_for(alone, candidates):
+    asked = ("backlash", "time_delay")
+    found = [each.name for each in wrist_candidates(point_of(alone), (), {}, asked)]
+    assert found == [each.name for each in candidates if each.law.id in asked] != []
+
+
 def test_motors_can_turn_back_what_points_the_platform_elsewhere():
     normal = np.tile([0.0, 0.6, 0.8], (3, 1))
     shift = np.zeros((3, 6, 1))

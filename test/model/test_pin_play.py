@@ -1,9 +1,11 @@
 """A pin rests in one place, wherever its search begins."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from wrist_stiffness.model.pin_play import Play
+from wrist_stiffness.model.pin_play import WALLS, Play
 
 RADIAL = 1e-5
 ROUNDING = 1e-12 * RADIAL
@@ -60,6 +62,36 @@ def test_a_rest_told_by_many_samples_is_sought_once(monkeypatch):
     assert sought == [3]
     alone = np.concatenate([hindered(seed).resting() for seed in range(2)])
     assert np.abs(found - alone[rows]).max() < ROUNDING
+
+
+@pytest.mark.parametrize("changed", ["force", "gap", "opening", "approach"])
+def test_samples_are_one_rest_only_if_they_are_alike_in_everything(changed):
+    play, other = hindered(0), hindered(1)
+    also = replace(play, **{changed: getattr(other, changed)})
+    names = ("force", "gap", "opening", "approach")
+    both = (np.concatenate([getattr(play, name), getattr(also, name)]) for name in names)
+    first, second = Play(RADIAL, *both).resting()
+    assert np.abs(first - play.resting()[0]).max() < ROUNDING
+    assert np.abs(second - also.resting()[0]).max() < ROUNDING
+    assert np.abs(second - first).max() > 1e-3 * RADIAL
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_softer_walls_lead_to_the_same_rest(monkeypatch, seed):
+    """They are asked where hard ones find none, as in plays of half a millimetre and more."""
+    play, sought = hindered(seed), []
+    wanted, own = play.resting(), Play._newton
+
+    def lost_at_first(self, x, wall, tolerance):
+        sought.append(wall)
+        if len(sought) > 1:
+            return own(self, x, wall, tolerance)
+        _, gradient, active = self._state(x, wall, None)
+        return x.copy(), gradient, active, np.zeros(len(x), dtype=bool)
+
+    monkeypatch.setattr(Play, "_newton", lost_at_first)
+    assert np.abs(play.resting() - wanted).max() < ROUNDING
+    assert sought == [WALLS[-1], *WALLS]
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import rclpy
 from sensor_msgs.msg import JointState
 
 from wrist_stiffness.ros import cell_simulator
-from wrist_stiffness.ros.cell_simulator import CellSimulator
+from wrist_stiffness.ros.cell_simulator import NAMELESS, CellSimulator
 from wrist_stiffness.workflows import cell
 
 GREETED = "/silent/get_parameters"
@@ -45,6 +45,26 @@ def test_a_listener_that_hangs_holds_the_motion_up_for_a_while_only(graph, silen
     asked_s = time.monotonic()
     graph.until(lambda: graph.heard["/joint_states"], "first sample")
     assert time.monotonic() - asked_s > 0.4
+
+
+def test_a_listener_whose_name_comes_late_is_greeted_by_it(graph, monkeypatch):
+    """Its subscription and its name are announced apart."""
+    graph.listen(JointState, "/joint_states")
+    simulator = graph.add(CellSimulator, program_s=1.0, rate_hz=50.0)
+    nameless, known = [], simulator.get_subscriptions_info_by_topic
+
+    def named_late(topic):
+        found = known(topic)
+        if len(nameless) < 3:
+            nameless.append(topic)
+            for each in found:
+                each.node_name = each.node_namespace = NAMELESS
+        return found
+
+    monkeypatch.setattr(simulator, "get_subscriptions_info_by_topic", named_late)
+    graph.until(lambda: graph.heard["/joint_states"], "first sample")
+    assert len(nameless) == 3
+    assert simulator.count_clients("/probe/get_parameters") == 1
 
 
 def test_the_recorder_waits_for_all_that_the_virtual_cell_says(graph):

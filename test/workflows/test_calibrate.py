@@ -70,6 +70,15 @@ def test_the_output_folder_is_looked_for_before_the_work(tmp_path, capsys):
     assert "there is no folder" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("places", [("/proc/m.yaml", "x.json"), ("m.yaml", "/proc/x.json")])
+def test_a_folder_that_takes_no_file_is_told_before_the_work(tmp_path, monkeypatch, capsys, places):
+    monkeypatch.chdir(tmp_path)
+    output, result = places
+    assert main(["calibrate", "--fit", "none.mcap", "-o", output, "--json", result]) == 2
+    assert ": cannot be written: No such file" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("output", "why"), [("", "it is a folder"), ("monday.mcap", "a model is no recording")]
 )

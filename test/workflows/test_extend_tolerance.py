@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.fitting import extend as fitting
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
-from wrist_stiffness.campaign.fitting.extend import _widened
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, unfitted
+from wrist_stiffness.campaign.fitting.extend import _judged_at_size, _require_new, _widened
+from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -105,6 +107,17 @@ def test_a_tolerance_that_was_only_calibrated_may_still_be_added(recorded, tmp_p
     assert [each.name for each in load_model(soft).effects].count(SOFT) == 1
 
 
+def test_a_finding_that_was_taken_out_again_may_be_added_again():
+    """Its step stays in the lineage."""
+    step = Step("extend", "2026-01-01", "ab" * 32, {}, SOFT)
+    model = replace(load_model(SHIPPED), lineage=(step,))
+    soft = effect(SOFT).with_values({"flexibility_percent": SOFTER_PERCENT})
+    free, _ = commissioning(model)
+    _require_new(model, effect(SOFT), free)
+    with pytest.raises(InputError, match=f"{SOFT}: the model has it already"):
+        _require_new(model.with_effects(soft), effect(SOFT), free)
+
+
 @pytest.mark.parametrize("name", ["encoder_offset@motor_1", "load_bias@load_sensor"])
 def test_what_is_set_up_anew_is_no_finding(recorded, tmp_path, name):
     with pytest.raises(InputError, match=f"{name}: 'calibrate' fits it anew to every recording"):
@@ -136,6 +149,48 @@ def test_with_an_axis_that_was_added_the_gaps_stay_that_it_left():
         step = Step("extend", "2026-01-01", "ab" * 32, {}, added)
         child = replace(model.with_effects(*fitted), lineage=(step,))
         assert tuple(each.name for each in unfitted(child).effects) == stay
+
+
+LOST = np.where(np.arange(6)[:, None] < 2, np.nan, 1.2)
+
+
+@pytest.mark.parametrize(
+    ("from_base", "from_drawing", "better"),
+    [
+        ((1.0, 0.1), (0.9, 0.1), 1),
+        ((0.9, 0.1), (1.0, 0.1), 0),
+        # What it takes for lost beams is no merit of a fit.
+        ((1.0, 0.1), (LOST, 0.1), 0),
+        ((LOST, 0.1), (1.0, 0.1), 1),
+        # To leave as much with less is.
+        ((1.0, 0.9), (1.0, 0.1), 1),
+        ((1.0, 0.1), (1.0, 0.9), 0),
+    ],
+)
+def test_of_two_starts_the_one_that_leaves_less_is_kept(
+    monkeypatch, from_base, from_drawing, better
+):
+    own = FreeEffect(effect(SOFT))
+    unknown = SimpleNamespace(free=0, key="flexibility_percent")
+    problem = SimpleNamespace(free=(own,), unknowns=(unknown,), weights=np.ones(1))
+    noise = SimpleNamespace(whiten=lambda seen, columns: columns)
+    begun = [
+        SimpleNamespace(
+            fit=SimpleNamespace(
+                problem=problem,
+                residual=np.ones((6, 6)) * residual,
+                z=np.array([z]),
+                covariance=np.zeros((1, 1)),
+                noise=noise,
+                seen=None,
+            )
+        )
+        for residual, z in (from_base, from_drawing)
+    ]
+    monkeypatch.setattr(
+        fitting, "judged", lambda wide, start=None, progress=None: begun[start is None]
+    )
+    assert _judged_at_size(problem, ("base", 0), None)[1] is begun[better]
 
 
 def test_priors_widen_to_the_size_that_a_parameter_has():

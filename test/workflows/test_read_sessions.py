@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.recording import RecordingWriter, open_recording, topics
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
+from wrist_stiffness.workflows.read_sessions import Recordings, _what_was_measured, read_sessions
 from wrist_stiffness.workflows.replay import replay
 
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
@@ -43,6 +44,14 @@ def test_a_replay_and_an_import_of_a_recording_are_no_further_sessions(tmp_path,
     assert [text for text in session.remarks if "used once" in text] == [
         f"{path} holds the same measurements: used once" for path in (tmp_path / "again", replayed)
     ]
+
+
+def test_other_poses_and_the_same_poses_at_another_time_are_other_measurements(table):
+    """Of an exact instrument a second day may show the poses of the first."""
+    (day,) = read([THURSDAY], table).values()
+    later = replace(day, block=replace(day.block, time=day.block.time + 1.0))
+    moved, turned = replace(day, shift=day.shift + 1e-9), replace(day, rotation=-day.rotation)
+    assert len(set(map(_what_was_measured, (day, replace(day), later, moved, turned)))) == 4
 
 
 def test_a_note_that_calls_calibrated_what_no_fit_refits_is_said(tmp_path, table):

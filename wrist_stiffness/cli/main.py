@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from wrist_stiffness import __version__
+from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.cli import (
     calibrate,
     cell,
@@ -187,6 +188,10 @@ def _require_place(path: str | None, option: str, begins: bytes) -> None:
         raise InputError(f"{path}: cannot be written: it is a folder")
     if not Path(path).absolute().parent.is_dir():
         raise InputError(f"{path}: folder {Path(path).parent} does not exist")
+    try:
+        require_room(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
     if Path(path).is_file():
         try:
             with open(path, "rb") as old:

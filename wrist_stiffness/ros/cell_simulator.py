@@ -90,6 +90,9 @@ SILENCE_S = 1.0
 LONGEST_GREETING_S = 5.0
 """So long the motion waits for its listeners to answer; one that hangs is named at the end."""
 
+NAMELESS = "_NODE_NAME_UNKNOWN_"
+"""What the middleware calls a node whose name comes later than its subscription."""
+
 LONGEST_SWITCHING_S = 10.0
 """So long the motion waits for the angle corrector to be switched on."""
 
@@ -186,9 +189,11 @@ class CellSimulator(Node):
         after about a second, and best-effort listeners miss the samples until then.  Who answers a
         request has read what was announced before it.
         """
+        self._found_s = self._found_s or time.monotonic()
         if not self._listeners:
-            self._found_s = time.monotonic()
-            for each in self.get_subscriptions_info_by_topic("/joint_states"):
+            found = self.get_subscriptions_info_by_topic("/joint_states")
+            named = all(each.node_name != NAMELESS for each in found)
+            for each in found if named else ():
                 name = f"{each.node_namespace.rstrip('/')}/{each.node_name}/get_parameters"
                 self._listeners.append(self.create_client(GetParameters, name))
         if not self._greetings and all(each.service_is_ready() for each in self._listeners):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
@@ -160,7 +161,8 @@ def writable(output: str | Path) -> Path:
     Raises
     ------
     InputError
-        If its folder does not exist, it is a folder, or its name is that of a recording.
+        If its folder does not exist or takes no file, it is a folder, or its name is that of a
+        recording.
     """
     output = Path(output)
     if not output.parent.is_dir():
@@ -169,4 +171,8 @@ def writable(output: str | Path) -> Path:
         raise InputError(f"{output}: cannot be written: it is a folder")
     if output.suffix == ".mcap":
         raise InputError(f"{output}: a model is no recording; choose another name")
+    try:
+        require_room(output)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written: {error.strerror}") from error
     return output

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -204,7 +204,7 @@ def _judged_at_size(
     """
     # Flanges and play let a base that took up a part of the effect not find back: from the drawing.
     starts = judged(wide, start, progress), judged(wide, progress=progress)
-    after = min(starts, key=lambda each: _left(each.fit, by=starts[0].fit))
+    after = min(starts, key=_left_beside(*starts))
     for _ in range(MOST_WIDENINGS):
         own = wide.free[-1]
         widening = _widened(own, _sizes(after.fit))
@@ -215,10 +215,20 @@ def _judged_at_size(
     return wide, after
 
 
-def _left(found: Fit, by: Fit) -> float:
-    """Return the sum of squares that a fit leaves, priors included, by the noise of a like one."""
-    white = by.noise.whiten(by.seen, np.nan_to_num(found.residual)[:, :, None])
-    return float((white**2).sum() + ((found.problem.weights * found.z) ** 2).sum())
+def _left_beside(one: Judged, other: Judged) -> Callable[[Judged], float]:
+    """Return the sum of squares that each of two leaves, priors included, by the noise of one.
+
+    Of the units that both kept: else the one that takes more for lost beams would leave less.
+    """
+    noise, seen = one.fit.noise, one.fit.seen
+    kept = np.isfinite(one.fit.residual) & np.isfinite(other.fit.residual)
+
+    def left(each: Judged) -> float:
+        found = each.fit
+        white = noise.whiten(seen, np.where(kept, found.residual, 0.0)[:, :, None])
+        return float((white**2).sum() + ((found.problem.weights * found.z) ** 2).sum())
+
+    return left
 
 
 def _widened(own: FreeEffect, sizes: Mapping[str, float]) -> dict[str, float]:
@@ -280,9 +290,9 @@ def _with_effect(wide: FitProblem, base: Fit, values: dict[str, float]) -> tuple
 
 def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:
     tolerances = {each.effect.name for each in free if each.effect.law.id in TOLERATED}
-    added = {step.added for step in model.lineage}
-    there = any(own.name == effect.name for own in model.effects)
-    if effect.name in added if effect.name in tolerances else there:
+    # A tolerance of the model was calibrated only, or was found.
+    found = {step.added for step in model.lineage} | ({effect.name} - tolerances)
+    if effect.name in found and any(own.name == effect.name for own in model.effects):
         raise InputError(f"{effect.name}: the model has it already; 'calibrate' fits it again")
     if any(each.effect.name == effect.name and each.per_session for each in free):
         raise InputError(
