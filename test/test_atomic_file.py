@@ -39,7 +39,7 @@ def test_a_link_stays_a_link_to_the_new_file(tmp_path):
 def test_room_is_asked_for_where_the_file_will_be_and_of_no_device(tmp_path):
     link = tmp_path / "latest"
     link.symlink_to("/proc/old")
-    with pytest.raises(OSError, match="No such file"):
+    with pytest.raises(InputError, match="latest: cannot be written: No such file"):
         require_room(link)
     require_room(tmp_path / "model.yaml")
     assert list(tmp_path.iterdir()) == [link]

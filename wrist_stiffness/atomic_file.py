@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 
+from wrist_stiffness.errors import InputError
+
 
 def require_room(path: str | Path) -> None:
     """Refuse a path beside which no file can be written, before the work for it.
@@ -19,14 +21,17 @@ def require_room(path: str | Path) -> None:
 
     Raises
     ------
-    OSError
+    InputError
         If its folder takes no file: permissions alone do not tell, of a disk that is read-only.
     """
     target = Path(path)
     if target.exists() and not target.is_file():
         return
-    with TemporaryFile(dir=target.resolve().parent):
-        pass
+    try:
+        with TemporaryFile(dir=target.resolve().parent):
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 @contextmanager

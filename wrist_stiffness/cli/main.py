@@ -188,10 +188,7 @@ def _require_place(path: str | None, option: str, begins: bytes) -> None:
         raise InputError(f"{path}: cannot be written: it is a folder")
     if not Path(path).absolute().parent.is_dir():
         raise InputError(f"{path}: folder {Path(path).parent} does not exist")
-    try:
-        require_room(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    require_room(path)
     if Path(path).is_file():
         try:
             with open(path, "rb") as old:

@@ -171,8 +171,5 @@ def writable(output: str | Path) -> Path:
         raise InputError(f"{output}: cannot be written: it is a folder")
     if output.suffix == ".mcap":
         raise InputError(f"{output}: a model is no recording; choose another name")
-    try:
-        require_room(output)
-    except OSError as error:
-        raise InputError(f"{output}: cannot be written: {error.strerror}") from error
+    require_room(output)
     return output
