@@ -9,6 +9,7 @@ from wrist_stiffness.campaign.searching.diagnose import (
     MUCH,
     _answered,
     _confirmed,
+    _judged,
     _says_more,
     _settled,
     _table,
@@ -250,3 +251,34 @@ def test_statistics_see_tolerances_about_their_means(known):
     own = built * columns[:, :, 1] + (0.0 if known else moved * columns[:, :, 2])
     np.testing.assert_allclose(_table(Place(base, (), known=known)), left - own)
     assert asked == [known]
+
+
+class TestWhatDoesNotHold:
+    """Slopes between four poses named a bracket and a gear: with their laws worse than nothing."""
+
+    def judged(self, search, *held):
+        """Return the answer where only effects that are listed hold with their own laws."""
+
+        def judge(place, result):
+            kept = [name for name in names(result) if name in held]
+            return SimpleNamespace(base=SimpleNamespace(extras=tuple(kept)))
+
+        return _judged(search, search.ask, judge)
+
+    def test_whole_fits_are_asked_where_findings_do_not_hold(self):
+        search = Asked(answer("effect", DELAY), answer("effect", AXIS), beside=answer("none"))
+        where, result, judged = self.judged(search, AXIS)
+        assert where is search.places["thorough"]
+        assert names(result) == list(judged.base.extras) == [AXIS]
+
+    def test_they_are_not_asked_where_all_findings_hold(self):
+        search = Asked(answer("effect", DELAY), answer("effect", AXIS))
+        where, result, judged = self.judged(search, DELAY, AXIS)
+        assert where is search.places["quick"]
+        assert names(result) == list(judged.base.extras) == [DELAY]
+
+    def test_where_whole_fits_say_no_more_the_first_answer_stands(self):
+        search = Asked(answer("effect", DELAY), answer("none"))
+        where, result, judged = self.judged(search)
+        assert where is search.places["quick"]
+        assert judged.base.extras == ()

@@ -184,6 +184,12 @@ class BaseFit:
         """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
         return bool(chi2.sf(self.strain, np.count_nonzero(self.tolerances)) < 0.05)
 
+    @property
+    def variance(self) -> float:
+        """Mean square of what is left, in units of the noise."""
+        white = self.whiten(self.residual)
+        return float(white @ white) / np.count_nonzero(self.problem.table.measured)
+
     def covariance(self) -> Array:
         """Return the covariance of all unknowns in steps, to first order, (p, p)."""
         white = self.whiten(self.columns)

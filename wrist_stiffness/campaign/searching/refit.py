@@ -49,12 +49,13 @@ def refit(
     base: BaseFit,
     named: Sequence[Effect],
     sealed_share: float,
+    first_cost: float,
     saw_all: bool = False,
 ) -> Refitted:
     """Fit the base along with as much of what was named as holds.
 
-    Where the laws leave much more than noise, what entered last is taken out for as long as the
-    units put aside come out worse with the effects than without.
+    Where the laws leave much more than noise, or more than the base alone, what entered last is
+    taken out for as long as the units put aside come out worse with the effects than without.
 
     Parameters
     ----------
@@ -66,12 +67,15 @@ def refit(
         In the order of entry, with the values from which they begin.
     sealed_share : float
         Part of a single session that is put aside; of several it is the last one.
+    first_cost : float
+        Weighted sum of squares that the base alone leaves.
     saw_all : bool
         Whether fits to all units chose what was named: then it is judged however little it leaves.
     """
     kept = list(named)
     fitted = _along(fitter, base, kept)
-    if not kept or (_variance(fitted) < INEXACT and not saw_all):
+    exact = _variance(fitted) < INEXACT and fitted.cost < first_cost
+    if not kept or (exact and not saw_all):
         return Refitted(fitted)
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
