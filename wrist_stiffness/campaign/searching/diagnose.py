@@ -140,7 +140,7 @@ def diagnose_sessions(
     suspected = _with_all(fitter, base, named)
     ranked = contributions(suspected, {each.name for each in kept})
     observed = base.left(with_extras=False)
-    result = sized(valued(result, final), kept)
+    result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
     if kept and len(kept) == len(named) and result.verdict == "unknown":
         limit = (settings or Settings()).unexplained_share
         result = _settled(result, search, final, ask, limit)
@@ -156,6 +156,9 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     found = search.found != {each.name for each in result.findings}
     otherwise = found and result.verdict != "effect"
     doubted = _leaves_much(result) or strained or otherwise
+    if doubted and search.explained and not (strained or found):
+        # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
+        return replace(place, fits=dict.fromkeys(search.found, place.base)), result
     if doubted or result.verdict == "none":
         # What presses the base takes up whole, within its tolerances: then nothing seems missing.
         other = search.thorough() if doubted else search.thorough(PRESSING)
