@@ -50,6 +50,7 @@ class Asked:
         self.found = set(found)
         self.strained = strains.get("strained", False)
         self.doubtful = strains.get("doubtful", False)
+        self.explained = strains.get("explained", False)
         self.places = {
             "quick": place(*found),
             "thorough": place(fits=[AXIS]) if thorough else None,
@@ -96,6 +97,13 @@ class Asked:
         (answer("unknown", share=LITTLE), {}, "thorough"),
         (answer("unknown", DELAY, share=MORE), {"found": [DELAY]}, "thorough"),
         (answer("unknown", DELAY, share=LITTLE), {"found": [DELAY]}, None),
+        # The law itself leaves nothing of what is not named.
+        (answer("unknown", DELAY, share=MORE), {"found": [PLAY], "explained": True}, "thorough"),
+        (
+            answer("unknown", DELAY, share=MORE),
+            {"found": [DELAY], "explained": True, "doubtful": True},
+            "thorough",
+        ),
         # The base had to go far: alone where nothing is named, and beside what is.
         (answer("none"), {"strained": True}, "thorough"),
         (answer("none"), {"doubtful": True}, PRESSING),
@@ -115,6 +123,20 @@ def test_whole_fits_are_made_where_the_quick_answer_may_be_wrong(quick, search, 
     assert [each for each in search.begun if each != "further"] == ([begun] if begun else [])
     assert where == "quick"
     assert result is quick
+
+
+@pytest.mark.parametrize("much", [True, False])
+def test_slopes_that_leave_much_of_what_a_fit_explains_ask_for_no_other_fit(much):
+    """Twenty were made beside backlash; nothing could explain more than noise.
+
+    Its fit then stands for what is named; where slopes hold, they do.
+    """
+    quick = answer("unknown", DELAY, share=MORE if much else LITTLE)
+    search = Asked(quick, answer("effect", AXIS), found=[DELAY], explained=True)
+    place, result = _answered(search, search.ask)
+    assert result is quick
+    assert place.fits == ({DELAY: place.base} if much else {})
+    assert "thorough" not in search.begun
 
 
 def test_what_presses_is_found_where_nothing_seemed_missing():

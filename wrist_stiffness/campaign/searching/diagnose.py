@@ -151,7 +151,7 @@ def diagnose_sessions(
     parts = contributions(suspected, {each.name for each in kept})
     parts = ranked([*parts, *possible(suspected, search.catalogue)])
     observed = base.left(with_extras=False)
-    result = sized(valued(result, final), kept)
+    result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
     if kept and len(kept) == len(named) and result.verdict == "unknown":
         limit = (settings or Settings()).unexplained_share
         result = _settled(result, search, final, ask, limit)
@@ -185,6 +185,9 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     found = search.found != {each.name for each in result.findings}
     otherwise = found and result.verdict != "effect"
     doubted = _leaves_much(result) or strained or otherwise
+    if doubted and search.explained and not (strained or found):
+        # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
+        return replace(place, fits=dict.fromkeys(search.found, place.base)), result
     if doubted or result.verdict == "none":
         # What presses the base takes up whole, within its tolerances: then nothing seems missing.
         whole = search.thorough() if doubted else search.thorough(PRESSING)

@@ -7,7 +7,7 @@ the units put aside worse than the base alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -149,7 +149,7 @@ def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
 
 
-def valued(result: Diagnosis, fitted: BaseFit) -> Diagnosis:
+def valued(result: Diagnosis, fitted: BaseFit, whole: Collection[str] = ()) -> Diagnosis:
     """Return an answer with the parameters of whole fits where slopes do not say them.
 
     Where a finding stands for a whole fit, and where its own law ends so far from what the slopes
@@ -161,16 +161,19 @@ def valued(result: Diagnosis, fitted: BaseFit) -> Diagnosis:
         With its findings.
     fitted : BaseFit
         The base along with all of them.
+    whole : collection of str, optional
+        Names of findings of which slopes leave much that their fits explain.
     """
     found = []
     for each in result.findings:
-        whole = fitted.values_on_top(each.name)
-        slopes_hold = SHARE not in each.parameters and all(
-            abs(whole[key][0] - value) < FAR * sigma
+        values = fitted.values_on_top(each.name)
+        stands_for_a_fit = SHARE in each.parameters or each.name in whole
+        slopes_hold = not stands_for_a_fit and all(
+            abs(values[key][0] - value) < FAR * sigma
             for key, (value, sigma) in each.parameters.items()
-            if key in whole
+            if key in values
         )
-        found.append(each if slopes_hold else replace(each, parameters=whole))
+        found.append(each if slopes_hold else replace(each, parameters=values))
     return replace(result, findings=tuple(found))
 
 

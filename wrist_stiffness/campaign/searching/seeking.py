@@ -111,6 +111,12 @@ class Search:
         """
         return self._reached.base.strained and not self._first.rough
 
+    @property
+    def explained(self) -> bool:
+        """Whether one effect, to which tangents led, leaves no more than the noise as it is."""
+        base = self._reached.base
+        return len(self.found) == 1 and base.cost <= float(base.problem.table.measured.sum())
+
     def quick(self) -> Place:
         """Return where tangents led, and the catalogue there."""
         if self._reached is self._first:
