@@ -13,7 +13,8 @@ Registrations, encoder zeros, load tare and the wrist's tolerances are fitted fi
 effect of the catalogue is tried at every place.  Effects that the recordings cannot tell apart are
 named together.  The answer may be 'nothing' or 'none of these'.
 A finding is proven one by one.  Where a little of everything is wrong, suspects that explain more
-than chance but are not proven stand below, by how much each adds to the error.
+than chance but are not proven stand below, by how much each adds to the error, and what else is
+likeliest where something is left that nothing explains.
 Several recordings are sessions of one wrist: the last one judges what the others show, so record
 on two days.  Of a single recording the end is put aside."""
 
