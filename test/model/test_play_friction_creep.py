@@ -7,13 +7,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
-from wrist_stiffness.model.at_point import cross_axes
+from wrist_stiffness.model.at_point import cross_axes, end_screws
 from wrist_stiffness.model.block import Block, Load, Sample
-from wrist_stiffness.model.effects.joint_clearance import end_screws
-from wrist_stiffness.model.effects.joint_friction import pressing, slip
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.memory import lag, play
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
+from wrist_stiffness.model.rubbing import Bristles, pressing, slip
 
 RADIAL = 1e-5
 
@@ -155,10 +154,11 @@ def test_friction_never_creates_energy(moved, budget):
     foot = moved[0]
     compliance = np.array([[0.3, 1.7]])
     for position in moved:
-        force, later = slip(position[None], compliance, np.array([budget]), foot)
-        assert force[0] @ (later - foot) >= -1e-15
+        force, later = slip(Bristles(position[None], compliance, np.array([budget])), foot)
+        assert np.array_equal(later[0], foot)
+        assert force[0] @ (later[1] - foot) >= -1e-15
         assert np.linalg.norm(force[0]) <= budget * (1.0 + 1e-12)
-        foot = later
+        foot = later[1]
 
 
 @pytest.mark.parametrize("joint", PASSIVE_JOINTS)
@@ -179,8 +179,10 @@ def test_turning_frees_the_slide():
     """One budget: a joint that turns far has nothing left against its slide."""
     steps = np.linspace(0.0, 1.0, 200)
     budget, compliance = np.full(200, 1.0), np.full((200, 2), 0.01)
-    at_rest = slip(np.stack([0 * steps, 0.005 * steps], 1), compliance, budget, np.zeros(2))[0]
-    turning = slip(np.stack([steps, 0.005 * steps], 1), compliance, budget, np.zeros(2))[0]
+    at_rest, turning = (
+        slip(Bristles(np.stack([turn, 0.005 * steps], 1), compliance, budget), np.zeros(2))[0]
+        for turn in (0 * steps, steps)
+    )
     assert at_rest[-1, 1] == pytest.approx(0.5)
     assert abs(turning[-1, 1]) < 0.02
     assert turning[-1, 0] == pytest.approx(1.0, rel=1e-3)

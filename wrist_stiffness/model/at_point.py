@@ -41,3 +41,25 @@ def cross_axes(geometry: Geometry, joint: str) -> Array:
     w = geometry.axes[joint]
     u = unit(cross(w, geometry.axes[NEIGHBOUR[joint]]))
     return np.stack([u, cross(w, u), w])
+
+
+def end_screws(geometry: Geometry, joint: str) -> Array:
+    """Return the screws for unit displacements of a sleeve's ends across its axis.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Of the wrist.
+    joint : str
+        The joint.
+
+    Returns
+    -------
+    (4, 6) float
+        Upper end along u and v, lower end along u and v; at O in the joint's home frame.
+    """
+    axis, length = geometry.axes[joint], geometry.bushings[joint].length
+    across = cross_axes(geometry, joint)[:2]
+    turn = cross(axis, across) / length
+    local = np.concatenate([np.tile(0.5 * across, (2, 1)), np.concatenate([turn, -turn])], axis=1)
+    return screw_from(bushing_centre(geometry, joint), local)

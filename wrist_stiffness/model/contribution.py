@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,8 @@ class Contribution:
         Opening of the flange sectors [m].
     sensor_left, sensor_right : (n, 6) float, optional
         Twists X and Y of the pose sensor, T_measured = exp(X) T_err exp(Y) T_nominal [m, rad].
+    rubbing : tuple of Rubbing, optional
+        Joints whose friction is in `through`: they may hold a pin in its play.
     """
 
     limb_1: Array | None = None
@@ -38,6 +41,8 @@ class Contribution:
     gap: Array | None = None
     sensor_left: Array | None = None
     sensor_right: Array | None = None
+    # Not by its name: what rubs follows a situation, which is made of contributions.
+    rubbing: Any = None
 
     def __add__(self, other: Contribution) -> Contribution:
         """Return both together; to first order they do not know of each other."""
@@ -54,7 +59,7 @@ class Contribution:
             The message names the field.
         """
         shapes = {"through": (samples, 8, 6), "gap": (samples, sectors)}
-        for name in (f.name for f in fields(self)):
+        for name in (f.name for f in fields(self) if f.name != "rubbing"):
             value, shape = getattr(self, name), shapes.get(name, (samples, 6))
             if value is not None and np.shape(value) != shape:
                 raise InputError(f"{name} has shape {np.shape(value)}, not {shape}")

@@ -10,7 +10,8 @@ with Armijo's rule:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,10 @@ class Play:
             # A rest is told by many samples.
             once = self.take(new).resting(None if near is None else near[new])
             return np.asarray(once[np.cumsum(new) - 1])
+        return self._resting(near)
+
+    def _resting(self, near: Array | None) -> Array:
+        """Return the same, every sample on its own."""
         x = self._unhindered()
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
         held = np.flatnonzero((gap < 0.0).any(axis=1))
@@ -82,11 +87,16 @@ class Play:
             x[held] = self.take(held)._hindered(x[held], None if near is None else near[held])
         return x
 
+    def softness(self, x: Array) -> Array:
+        """Return how pins at x (n, 4) give way to further forces on their ends, (n, 4, 4) [m/N]."""
+        active = self._state(x, WALLS[-1], None)[2]
+        return np.asarray(np.linalg.inv(Play._hessian(self, x, WALLS[-1], active)))
+
     def _unlike_the_one_before(self) -> NDArray[np.bool_]:
         """Tell which samples differ from the one before in anything, (n,)."""
         new = np.zeros(len(self.force), dtype=bool)
         new[:1] = True
-        for each in (self.force, self.gap, self.opening, self.approach):
+        for each in self._of_samples.values():
             flat = each.reshape(len(new), -1)
             new[1:] |= (flat[1:] != flat[:-1]).any(axis=1)
         return new
@@ -161,11 +171,14 @@ class Play:
         share = np.divide(most, length, out=np.ones_like(length), where=length > most)
         return (share[..., None] * ends).reshape(-1, 4)
 
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Play:
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
         """Return some of the samples."""
-        return Play(
-            self.radial, self.force[rows], self.gap[rows], self.opening[rows], self.approach[rows]
-        )
+        chosen: dict[str, Any] = {name: each[rows] for name, each in self._of_samples.items()}
+        return replace(self, **chosen)
+
+    @property
+    def _of_samples(self) -> dict[str, Array]:
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "radial"}
 
     @property
     def _centring(self) -> float:

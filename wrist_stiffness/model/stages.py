@@ -115,7 +115,7 @@ class Advanced:
     def left(self) -> Any:
         """What the next block gets of the state."""
         guesses = self.effect.law.state_is_a_guess and self.after is not None
-        return self.after[-1:] if guesses else self.after
+        return self.after.last if guesses else self.after
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +210,8 @@ def _advanced(
         return known
     guess = near.get(effect.name)
     try:
-        added, after = _advanced_by(effect, at, state if guess is None else guess)
+        before = state if guess is None else guess.after(state)
+        added, after = _advanced_by(effect, at, before)
     except MissingSignalError as missing:
         lacking = f"{effect.name}: {missing.signal} is missing, left out"
         return Advanced(effect, at, state, NOTHING, state, (lacking,))

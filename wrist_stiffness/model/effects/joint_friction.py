@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
-from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.effects.joint_clearance import end_screws
+from wrist_stiffness.mechanism.components import PASSIVE_JOINTS
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.situation import Situation, lengths
-
-LEAST_BUDGET = 1e-9
-"""[N]; keeps the stiffness of a joint without bearing force finite."""
+from wrist_stiffness.model.rubbing import Rubbing, slip
+from wrist_stiffness.model.situation import Situation
 
 
 class JointFriction(Law):
@@ -50,71 +44,11 @@ class JointFriction(Law):
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the friction force and torque; the state is the bristle's foot."""
-        geometry = at.table.geometry
-        radius = 0.5 * geometry.bushings[place].pin_diameter
-        pressed = pressing(geometry, place, at.at_home(place, at.through_place(place)))
-        budget = values["coefficient"] * (pressed + values["preload_N"]) + LEAST_BUDGET
-        bristle = values["presliding_um"] / budget + values["bristle_um_per_N"]
-        slide, turn = at.slide_flexibility(place)
-        moved = np.stack(
-            [radius * at.turn(place), at.slides[:, PASSIVE_JOINTS.index(place)]], axis=1
+        coefficient, preload, presliding, bristle = (
+            values[key] for key in ("coefficient", "preload_N", "presliding_um", "bristle_um_per_N")
         )
-        compliance = np.stack([bristle + radius**2 * turn, bristle + slide], axis=1)
-        start = moved[0] if state is None else state
-        force, foot = slip(moved, compliance, budget, start)
-        return at.joint_push(place, -force[:, 1], -radius * force[:, 0]), foot
-
-
-def pressing(geometry: Geometry, joint: str, wrench: Array) -> Array:
-    """Return the sum of the radial forces at both ends of a sleeve; a moment presses both.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Of the wrist.
-    joint : str
-        The joint.
-    wrench : (n, 6) float
-        Carried by the joint, at O in its home frame [N, N m].
-
-    Returns
-    -------
-    (n,) float
-        [N].
-    """
-    ends = wrench @ end_screws(geometry, joint).T
-    return np.asarray(lengths(ends[:, :2]) + lengths(ends[:, 2:]))
-
-
-def slip(moved: Array, compliance: Array, budget: Array, foot: Array) -> tuple[Array, Array]:
-    """Follow a bristle that slips when its force exceeds a budget.
-
-    Parameters
-    ----------
-    moved : (n, 2) float
-        Where the surface goes [m].
-    compliance : (n, 2) float
-        Of the bristle along both directions [m/N].
-    budget : (n,) float
-        Largest force [N].
-    foot : (2,) float
-        Where the bristle stands at first [m].
-
-    Returns
-    -------
-    force : (n, 2) float
-        With which the bristle is dragged along [N].
-    foot : (2,) float
-        Where it stands at last [m].
-    """
-    force = np.empty_like(moved)
-    x, y = float(foot[0]), float(foot[1])
-    rows = zip(moved.tolist(), compliance.tolist(), budget.tolist(), strict=True)
-    for row, ((u, v), (cu, cv), limit) in enumerate(rows):
-        fu, fv = (u - x) / cu, (v - y) / cv
-        size = math.hypot(fu, fv)
-        if size > limit:
-            fu, fv = fu * limit / size, fv * limit / size
-            x, y = u - cu * fu, v - cv * fv
-        force[row] = fu, fv
-    return force, np.array([x, y])
+        rubbing = Rubbing(place, coefficient, preload, presliding, bristle)
+        bristles = rubbing.bristles(at)
+        force, feet = slip(bristles, bristles.moved[0] if state is None else state)
+        push = rubbing.push(at, force)
+        return replace(push, rubbing=(replace(rubbing, force=force),)), feet[-1]

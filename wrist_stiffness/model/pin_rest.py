@@ -1,0 +1,216 @@
+"""Where the pin of a joint rests in its play: among flanges, and held by other joints that rub.
+
+A joint that sticks holds a pin off its wall, for the pin cannot move without the joint's slide and
+turn.  What the bristles of that joint hold, slip included, has a convex energy, so the pin rests
+where it and the energy of walls and flanges are least together.  Budget and feet of the bristles
+depend on where the pin rests in turn; they follow in passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
+from wrist_stiffness.model.at_point import end_screws
+from wrist_stiffness.model.contribution import NOTHING, Contribution
+from wrist_stiffness.model.pin_play import WALLS, Play
+from wrist_stiffness.model.rubbing import Rubbing, dragged, slip
+from wrist_stiffness.model.situation import Situation
+
+PASSES = 4
+"""In which a pin and the joints that rub find each other.  Each pass has a history of its own, so
+any blocks give the same."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where a pin rested at n samples.
+
+    Parameters
+    ----------
+    ends : (n, 4) float
+        Of the pin with nothing that rubs, in units of the play; where a search may begin.
+    feet : (PASSES, j, 2) float, optional
+        Where the bristles of j joints that rub stand after the last sample, in each pass [m].
+    """
+
+    ends: Array
+    feet: Array | None = None
+
+    @property
+    def last(self) -> Rest:
+        """What the next block gets."""
+        return replace(self, ends=self.ends[-1:])
+
+    def after(self, before: Rest | None) -> Rest:
+        """Return where to begin to look, with the past of another one."""
+        return replace(self, feet=None if before is None else before.feet)
+
+
+@dataclass(frozen=True)
+class HeldPlay(Play):
+    """Pins that cannot move without j joints that rub.
+
+    Parameters
+    ----------
+    bent : (n, j, 2) float
+        From the bristles' feet to the surface, with the pin in the middle [m].
+    drag : (n, j, 2, 4) float
+        What the ends' displacements add to it.
+    compliance : (n, j, 2) float
+        Of the bristles [m/N].
+    budget : (n, j) float
+        Their largest force [N].
+    """
+
+    bent: Array
+    drag: Array
+    compliance: Array
+    budget: Array
+
+    def held(self, x: Array) -> tuple[Array, Array, Array]:
+        """Return energy (n, j), forces (n, j, 2), stiffness (n, j, 2, 2) of the bristles."""
+        return dragged(self.bent + _dragged_by(self.drag, x), self.compliance, self.budget)
+
+    def _resting(self, near: Array | None) -> Array:
+        x = self._hindered(self._unhindered(), near)
+        # Bristles that slip are less straight than flanges: a step more leaves no trace of the way.
+        return x + self._step(x, WALLS[-1], *self._state(x, WALLS[-1], None)[1:])
+
+    def _state(
+        self, x: Array, stiffness: float, guess: NDArray[np.bool_] | None
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        energy, gradient, active = super()._state(x, stiffness, guess)
+        own, force, _ = self.held(x)
+        return energy + own.sum(axis=1), gradient + _on_ends(self.drag, force), active
+
+    def _hessian(self, x: Array, stiffness: float, active: NDArray[np.bool_]) -> Array:
+        bristles = np.swapaxes(self.drag, -1, -2) @ self.held(x)[2] @ self.drag
+        whole: Array = super()._hessian(x, stiffness, active) + bristles.sum(axis=1)
+        return whole
+
+
+@dataclass(frozen=True, eq=False)
+class Pin:
+    """A pin with play in a situation.
+
+    Parameters
+    ----------
+    at : Situation
+        n samples.
+    place : str
+        Its joint.
+    radial : float
+        How far an end may move from the middle [m], above 0.
+    """
+
+    at: Situation
+    place: str
+    radial: float
+
+    def rest(self, before: Rest | None) -> tuple[Contribution, Rest]:
+        """Return what the play adds, and where the pin rests.
+
+        Parameters
+        ----------
+        before : Rest or None
+            Of the block before, with a place for the search to begin.
+        """
+        near, feet = None, None
+        if before is not None:
+            feet = before.feet
+            if len(before.ends) == len(self.at.block):
+                # In units of the play: with a little more of it the pin rests at its wall still.
+                near = self.radial * before.ends
+        x = self._free.resting(near)
+        if self.at.given.rubbing is None:
+            return self._screw(x), Rest(x / self.radial)
+        added, feet = self._held(x, feet)
+        return added, Rest(x / self.radial, feet)
+
+    def _held(self, x: Array, before: Array | None) -> tuple[Contribution, Array]:
+        """Return what the held pin adds and the bristles' feet after it.
+
+        Parameters
+        ----------
+        x : (n, 4) float
+            Where it would rest if nothing rubbed [m].
+        before : (PASSES, j, 2) float or None
+            Feet before the first sample [m].
+        """
+        at, rubbing = self.at, self.at.given.rubbing
+        drag = np.stack([self._drag(each) for each in rubbing], axis=1)
+        force = known = np.stack([np.asarray(each.force) for each in rubbing], axis=1)
+        more, feet = NOTHING, []
+        for number in range(PASSES):
+            rubbed = at.with_more(at.given + more)
+            loose = rubbed.with_more(rubbed.given + self._screw(x))
+            surface = _dragged_by(drag, x)
+            bristles = [
+                replace(each, force=force[:, j]).bristles(loose) for j, each in enumerate(rubbing)
+            ]
+            moved = np.stack([each.moved for each in bristles], axis=1)
+            # The pin's tilt; slides are told with it.
+            moved[..., 0] += surface[..., 0]
+            if before is None:
+                # Settled under the first sample.
+                before = np.tile(moved[0], (PASSES, 1, 1))
+            free = replace(self, at=rubbed)._free
+            give = drag @ free.softness(x)[:, None] @ np.swapaxes(drag, -1, -2)
+            yielding = moved + (give @ force[..., None])[..., 0]
+            stood = [
+                slip(replace(each, moved=yielding[:, j]), before[number, j], give[:, j])[1]
+                for j, each in enumerate(bristles)
+            ]
+            feet.append([each[-1] for each in stood])
+            held = HeldPlay(
+                self.radial,
+                free.force + _on_ends(drag, force),
+                free.gap,
+                free.opening,
+                free.approach,
+                moved - surface - np.stack([each[:-1] for each in stood], axis=1),
+                drag,
+                np.stack([each.compliance for each in bristles], axis=1),
+                np.stack([each.budget for each in bristles], axis=1),
+            )
+            x = held.resting(x)
+            force = held.held(x)[1]
+            pushes = (each.push(at, force[:, j] - known[:, j]) for j, each in enumerate(rubbing))
+            more = sum(pushes, NOTHING)
+        return more + self._screw(x), np.array(feet)
+
+    def _screw(self, x: Array) -> Contribution:
+        return self.at.screw(self.place, x @ end_screws(self.at.table.geometry, self.place))
+
+    @property
+    def _free(self) -> Play:
+        """The play with what is in the situation, and nothing that holds it but flanges."""
+        at, ends = self.at, end_screws(self.at.table.geometry, self.place)
+        opening = np.stack([at.carried(at.screw(self.place, end))[1] for end in ends], axis=-1)
+        carried = at.at_home(self.place, at.through_place(self.place)) @ ends.T
+        flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
+        return Play(self.radial, carried - flanges, at.free[1], opening, at.operators.approach)
+
+    def _drag(self, rubbing: Rubbing) -> Array:
+        """Return how a joint turns (radius times angle) and slides with the pin's ends."""
+        at, joint = self.at, PASSIVE_JOINTS.index(rubbing.joint)
+        row = at.influence.slides()[:, ELASTIC.index(self.place), joint]
+        ends = [at.in_base(self.place, end) for end in end_screws(at.table.geometry, self.place)]
+        slide = [(row * end[:, :3]).sum(axis=1) for end in ends]
+        turn = [(row * end[:, 3:]).sum(axis=1) for end in ends]
+        radius = rubbing.radius(at.table.geometry)
+        return np.stack([radius * np.stack(turn, axis=1), np.stack(slide, axis=1)], axis=1)
+
+
+def _dragged_by(drag: Array, x: Array) -> Array:
+    """Return how far surfaces go (n, j, 2) with the ends of a pin (n, 4)."""
+    return np.asarray((drag @ x[:, None, :, None])[..., 0])
+
+
+def _on_ends(drag: Array, force: Array) -> Array:
+    """Return what forces (n, j, 2) on bristles are at the ends of a pin, (n, 4)."""
+    return np.asarray((np.swapaxes(drag, -1, -2) @ force[..., None])[..., 0].sum(axis=1))
