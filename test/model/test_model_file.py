@@ -92,7 +92,8 @@ def test_a_users_own_laws_work(tmp_path):
 
 def test_round_trip_is_exact_and_stable(tmp_path):
     model = load_model(write(tmp_path))
-    step = Step("extend", "2026-01-02T03:04:05Z", "ab" * 32, {"run_1": "cd" * 32}, "creep@joint_1")
+    hashes = {"run_1": "cd" * 32}, {"run_1": "ef" * 32}
+    step = Step("extend", "2026-01-02T03:04:05Z", "ab" * 32, *hashes, "creep@joint_1")
     saved = tmp_path / "saved.yaml"
     save_model(replace(model, lineage=(step,)), saved)
     again = load_model(saved)

@@ -218,7 +218,6 @@ def _joint(block: Block) -> JointUncertainty:
 
 
 def _step(block: Block, effects: tuple[Effect, ...]) -> Step:
-    recordings = block.block("recordings")
     added = block.text("added") if "added" in block.values else ""
     # An effect of the catalogue may have been taken out of the file since.
     if added and added not in [effect.name for effect in effects]:
@@ -234,11 +233,16 @@ def _step(block: Block, effects: tuple[Effect, ...]) -> Step:
         block.text("command"),
         block.text("date"),
         block.text("parent_sha256"),
-        {str(name): recordings.text(name) for name in recordings.values},
+        _texts(block.block("recordings")),
+        _texts(block.block("measured")) if "measured" in block.values else {},
         added,
     )
     block.no_more_keys()
     return step
+
+
+def _texts(block: Block) -> dict[str, str]:
+    return {str(name): block.text(name) for name in block.values}
 
 
 def _relative(target: Path, folder: Path) -> str:
