@@ -194,6 +194,22 @@ def smallest_files(grown_files):
 
 
 @FORMS
+def test_a_disk_that_is_read_only_is_one_error(tmp_path, name, monkeypatch):
+    """It refuses to remove, too: also what is not there."""
+
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    for each in ("mkdir", "open", "unlink"):
+        monkeypatch.setattr(Path, each, refused)
+    with (
+        pytest.raises(RecordingError, match=f"{name} cannot be written: Read-only file system"),
+        RecordingWriter(tmp_path / name),
+    ):
+        pass
+
+
+@FORMS
 def test_a_disk_that_refuses_the_end_leaves_one_line_and_nothing_else(
     tmp_path, name, smallest_files
 ):

@@ -202,7 +202,9 @@ class RecordingWriter:
                 self._stream = None
             if self._refused is not None and self._keep_partial:
                 kept = self._keep()
-            _remove(self._partial)
+            # A disk that is read-only refuses to remove even what is not there.
+            with suppress(OSError):
+                _remove(self._partial)
         told = exception is None or exception.__cause__ is self._refused
         if self._refused is not None and told:
             raise RecordingError(
