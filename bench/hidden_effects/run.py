@@ -51,6 +51,7 @@ from solvers import (
     told_the_answer,
 )
 from told_the_name import told_the_name
+from usual_sizes import usual_sizes
 
 from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
@@ -67,10 +68,14 @@ SOLVERS: dict[str, Solver] = {
     "own_diagnosis": own_diagnosis,
     "own_diagnosis_mcap": own_diagnosis_mcap,
     "told_the_name": told_the_name,
+    "usual_sizes": usual_sizes,
     "knows_the_laws": knows_the_laws,
 }
-SAMPLED = ("own_diagnosis_mcap", "diagnosis_core", "spans_of_the_laws", "knows_the_laws")
-"""Are slow and asked a sample of the cases only."""
+SAMPLED = (
+    *("own_diagnosis_mcap", "diagnosis_core", "spans_of_the_laws", "knows_the_laws"),
+    "usual_sizes",
+)
+"""Are slow, or made for some cases, and asked those only."""
 
 TRUTH_FILES = (
     *("cases.py", "observe.py", "units.py", "registered.py", "dictionary.py"),
@@ -82,6 +87,7 @@ FILES = {
     "own_diagnosis": ("own_diagnosis.py",),
     "own_diagnosis_mcap": ("own_diagnosis.py",),
     "told_the_name": ("solvers.py", "told_the_name.py"),
+    "usual_sizes": ("solvers.py", "usual_sizes.py"),
     "knows_the_laws": ("solvers.py", "ceiling.py"),
 }
 
@@ -106,6 +112,7 @@ def version_of(solver: str) -> str:
             "wrist_stiffness.campaign.fitting.calibrate",
             "wrist_stiffness.campaign.fitting.extend",
         ),
+        "usual_sizes": OWN,
     }.get(solver, ())
     # The project's calibration of what is read is in the floor of every score.
     modules = (*modules, "wrist_stiffness.campaign.searching.base_fit", READING)

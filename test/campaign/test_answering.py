@@ -10,6 +10,7 @@ from wrist_stiffness.campaign.searching.diagnose import (
     MUCH,
     _answered,
     _confirmed,
+    _judged,
     _says_more,
     _settled,
     _table,
@@ -50,6 +51,7 @@ class Asked:
         self.found = set(found)
         self.strained = strains.get("strained", False)
         self.doubtful = strains.get("doubtful", False)
+        self.explained = strains.get("explained", False)
         self.places = {
             "quick": place(*found),
             "thorough": place(fits=[AXIS]) if thorough else None,
@@ -96,6 +98,13 @@ class Asked:
         (answer("unknown", share=LITTLE), {}, "thorough"),
         (answer("unknown", DELAY, share=MORE), {"found": [DELAY]}, "thorough"),
         (answer("unknown", DELAY, share=LITTLE), {"found": [DELAY]}, None),
+        # The law itself leaves nothing of what is not named.
+        (answer("unknown", DELAY, share=MORE), {"found": [PLAY], "explained": True}, "thorough"),
+        (
+            answer("unknown", DELAY, share=MORE),
+            {"found": [DELAY], "explained": True, "doubtful": True},
+            "thorough",
+        ),
         # The base had to go far: alone where nothing is named, and beside what is.
         (answer("none"), {"strained": True}, "thorough"),
         (answer("none"), {"doubtful": True}, PRESSING),
@@ -115,6 +124,20 @@ def test_whole_fits_are_made_where_the_quick_answer_may_be_wrong(quick, search, 
     assert [each for each in search.begun if each != "further"] == ([begun] if begun else [])
     assert where == "quick"
     assert result is quick
+
+
+@pytest.mark.parametrize("much", [True, False])
+def test_slopes_that_leave_much_of_what_a_fit_explains_ask_for_no_other_fit(much):
+    """Twenty were made beside backlash; nothing could explain more than noise.
+
+    Its fit then stands for what is named; where slopes hold, they do.
+    """
+    quick = answer("unknown", DELAY, share=MORE if much else LITTLE)
+    search = Asked(quick, answer("effect", AXIS), found=[DELAY], explained=True)
+    place, result = _answered(search, search.ask)
+    assert result is quick
+    assert place.fits == ({DELAY: place.base} if much else {})
+    assert "thorough" not in search.begun
 
 
 def test_what_presses_is_found_where_nothing_seemed_missing():
@@ -258,3 +281,34 @@ def test_statistics_see_tolerances_about_their_means(known):
     own = built * columns[:, :, 1] + (0.0 if known else moved * columns[:, :, 2])
     np.testing.assert_allclose(_table(Place(base, (), known=known)), left - own)
     assert asked == [known]
+
+
+class TestWhatDoesNotHold:
+    """Slopes between four poses named a bracket and a gear: with their laws worse than nothing."""
+
+    def judged(self, search, *held):
+        """Return the answer where only effects that are listed hold with their own laws."""
+
+        def judge(place, result):
+            kept = [name for name in names(result) if name in held]
+            return SimpleNamespace(base=SimpleNamespace(extras=tuple(kept)))
+
+        return _judged(search, search.ask, judge)
+
+    def test_whole_fits_are_asked_where_findings_do_not_hold(self):
+        search = Asked(answer("effect", DELAY), answer("effect", AXIS), beside=answer("none"))
+        where, result, judged = self.judged(search, AXIS)
+        assert where is search.places["thorough"]
+        assert names(result) == list(judged.base.extras) == [AXIS]
+
+    def test_they_are_not_asked_where_all_findings_hold(self):
+        search = Asked(answer("effect", DELAY), answer("effect", AXIS))
+        where, result, judged = self.judged(search, DELAY, AXIS)
+        assert where is search.places["quick"]
+        assert names(result) == list(judged.base.extras) == [DELAY]
+
+    def test_where_whole_fits_say_no_more_the_first_answer_stands(self):
+        search = Asked(answer("effect", DELAY), answer("none"))
+        where, result, judged = self.judged(search)
+        assert where is search.places["quick"]
+        assert judged.base.extras == ()

@@ -56,3 +56,12 @@ def test_where_slopes_do_not_hold_the_law_says_the_value(whole, told):
     fitted = SimpleNamespace(values_on_top=lambda name: {KEY: (whole, 5.0)})
     (finding,) = valued(diagnosed(500.0), fitted).findings
     assert finding.parameters == {KEY: (told, 10.0 if told == 500.0 else 5.0)}
+
+
+@pytest.mark.parametrize("stands_for_a_fit", [True, False])
+def test_a_finding_that_stands_for_its_fit_tells_what_that_found(stands_for_a_fit):
+    """Slopes said 66.4 +- 8.7 mdeg of a backlash that its own law knows to 0.4 mdeg."""
+    fitted = SimpleNamespace(values_on_top=lambda name: {KEY: (505.0, 0.4)})
+    whole = {"drive_compliance@motor_1"} if stands_for_a_fit else ()
+    (finding,) = valued(diagnosed(500.0), fitted, whole).findings
+    assert finding.parameters == {KEY: (505.0, 0.4) if stands_for_a_fit else (500.0, 10.0)}

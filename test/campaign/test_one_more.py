@@ -273,6 +273,20 @@ def test_what_was_not_measured_is_changed_by_nothing(wrist):
     assert_equal([np.flatnonzero(each == 0) for each in changes], [[0, 4]] * 2)
 
 
+@pytest.mark.parametrize(
+    ("left", "explained"),
+    [
+        ({"alone": 1000, "b": NUMBERS}, True),
+        ({"alone": 1000, "b": NUMBERS + 1}, False),
+        ({"alone": NUMBERS, "b": NUMBERS}, False),
+        ({"alone": 1000, "b": 500, "d": 600, "bd": NUMBERS}, False),
+    ],
+)
+def test_one_effect_that_leaves_no_more_than_the_noise_explains_it(wrist, left, explained):
+    wrist.left = leaves(**left)
+    assert Search(wrist, ()).explained == explained
+
+
 @pytest.mark.parametrize(("laws", "fitted"), [({"cable_wrench"}, {CABLE}), ((), {BACKLASH})])
 def test_only_laws_that_are_asked_for_are_fitted_whole(wrist, laws, fitted):
     """Beside what tangents led to, where they led anywhere."""

@@ -63,7 +63,9 @@ def width(fitted):
 def test_a_named_effect_gets_the_value_of_its_own_law(model, lost_motion):
     base = fit_base(model, (as_units(model, lost_motion),))
     # A tangent may be half as long again as the law.
-    fitted = refit(Fitter(model), base, [backlash(1.5e3 * np.degrees(WIDTH_RAD))], SHARE).base
+    fitted = refit(
+        Fitter(model), base, [backlash(1.5e3 * np.degrees(WIDTH_RAD))], SHARE, np.inf
+    ).base
     assert fitted.extras == ("backlash@motor_1",)
     assert width(fitted) == pytest.approx(1e3 * np.degrees(WIDTH_RAD), rel=0.1)
     assert fitted.cost < 0.5 * base.cost
@@ -78,7 +80,7 @@ def test_an_effect_that_fails_on_unseen_units_is_withdrawn(model, in_the_cell, l
         rotation=np.where(late[:, None, None], mended.rotation, lost_motion.rotation),
     )
     base = fit_base(model, (as_units(model, both),))
-    fitted = refit(Fitter(model), base, [backlash(1e3 * np.degrees(WIDTH_RAD))], SHARE).base
+    fitted = refit(Fitter(model), base, [backlash(1e3 * np.degrees(WIDTH_RAD))], SHARE, np.inf).base
     assert fitted.extras == ()
 
 
@@ -89,7 +91,7 @@ def test_what_fits_to_all_units_chose_is_judged_however_little_it_leaves(
     """The part put aside was in those fits: that nothing is left is no proof."""
     base = fit_base(model, (as_units(model, lost_motion),))
     named = [backlash(1e3 * np.degrees(WIDTH_RAD))]
-    fitted = refit(Fitter(model), base, named, SHARE).base
+    fitted = refit(Fitter(model), base, named, SHARE, np.inf).base
     assert fitted.cost < refitting.INEXACT * 6 * base.problem.table.n_units
     asked = []
     judge = refitting.unseen
@@ -99,7 +101,7 @@ def test_what_fits_to_all_units_chose_is_judged_however_little_it_leaves(
         return asked[-1]
 
     monkeypatch.setattr(refitting, "unseen", counted)
-    again = refit(Fitter(model), base, named, SHARE, saw_all)
+    again = refit(Fitter(model), base, named, SHARE, np.inf, saw_all)
     assert again.base.extras == ("backlash@motor_1",)
     assert again.stages == tuple(asked)
     assert len(asked) == (2 if saw_all else 0)
@@ -114,7 +116,7 @@ def test_errors_that_are_told_are_of_fits_that_had_not_seen_the_part(model, lost
     named, told = [backlash(1e3 * np.degrees(WIDTH_RAD))], []
     for session in (lost_motion, moved):
         base = fit_base(model, (as_units(model, session),))
-        told.append(refit(Fitter(model), base, named, SHARE, saw_all=True).stages)
+        told.append(refit(Fitter(model), base, named, SHARE, np.inf, saw_all=True).stages)
     for before, after in zip(*told, strict=True):
         change = np.median(after.residual - before.residual, axis=0)
         np.testing.assert_allclose(change[:3], more, atol=2e-7)
@@ -139,7 +141,7 @@ def test_an_answer_is_told_with_the_errors_of_the_refits():
 def test_what_was_not_judged_may_be_told_by_the_same_stages(model, lost_motion):
     base = fit_base(model, (as_units(model, lost_motion),))
     named = [backlash(1e3 * np.degrees(WIDTH_RAD))]
-    judged = refit(Fitter(model), base, named, SHARE, saw_all=True)
+    judged = refit(Fitter(model), base, named, SHARE, base.cost, saw_all=True)
     told = foretold(Fitter(model), judged.base, judged.base.effects(0)[-1:], SHARE)
     assert len(told) == len(judged.stages) == 2
     for one, other in zip(told, judged.stages, strict=True):
@@ -167,7 +169,7 @@ def test_a_base_beside_play_is_fitted_as_it_is(model, in_the_cell):
     base = fit_base(model, (as_units(model, loose),))
     play = Effect(find_law("joint_clearance"), "joint_3", {"clearance_um": Estimate(12.0)})
     quick = fit_base(model, base.problem.sessions, [play])
-    found = refit(Fitter(model), base, [play], SHARE).base
+    found = refit(Fitter(model), base, [play], SHARE, np.inf).base
     assert found.extras == ("joint_clearance@joint_3",)
     assert found.cost < 0.8 * quick.cost
 
@@ -280,29 +282,38 @@ TWO = "backlash@motor_1", "creep@joint_1"
 def test_what_entered_last_is_withdrawn_first(laws):
     """The first explained most, and the last was named beside it."""
     laws.energy = {TWO: 200.0}
-    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE).base
+    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf).base
     assert kept.extras == TWO[:1]
 
 
+def test_what_leaves_more_than_the_base_alone_is_judged_by_unseen_units(laws, monkeypatch):
+    """Slopes named it; its own law ends elsewhere, though that is hardly more than noise."""
+    monkeypatch.setattr(refitting, "_variance", lambda fitted: 1.0)
+    laws.cost = laws.anew = {(): 100.0, TWO: 120.0}
+    laws.energy = {TWO: 200.0, TWO[:1]: 200.0}
+    assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 100.0).base.extras == ()
+    assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 130.0).base.extras == TWO
+
+
 def test_nothing_is_withdrawn_that_foretells_unseen_units(laws):
-    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE).base
+    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf).base
     assert kept.extras == TWO
 
 
 def test_each_stage_has_one_effect_more(laws):
     """From these the technician is told what each of them buys."""
     three = (*TWO, "drift@pose_sensor")
-    told = refit(laws.fit, laws.fit(()), entered(*three), SHARE, saw_all=True)
+    told = refit(laws.fit, laws.fit(()), entered(*three), SHARE, np.inf, saw_all=True)
     assert told.base.extras == three
     assert [each.energy for each in told.stages] == pytest.approx([100.0, 50.0, 100.0 / 3, 25.0])
 
 
 def test_stages_end_with_what_was_kept(laws):
     laws.energy = {TWO: 200.0}
-    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, saw_all=True)
+    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf, saw_all=True)
     assert [each.energy for each in told.stages] == pytest.approx([100.0, 50.0])
     laws.energy[TWO[:1]] = 200.0
-    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, saw_all=True)
+    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf, saw_all=True)
     assert (told.base.extras, told.stages) == ((), ())
 
 
@@ -311,7 +322,7 @@ def test_a_base_that_nothing_was_named_of_is_fitted_from_both_its_starts(laws, c
     """What is not named may have drawn it along, or out of a wrong flange's hold."""
     laws.cost, laws.anew = {(): cost}, {(): anew}
     found = laws.fit((), entered(*TWO))
-    again = refit(laws.fit, found, [], SHARE).base
+    again = refit(laws.fit, found, [], SHARE, np.inf).base
     assert again.extras == ()
     assert again.cost == 300.0
 

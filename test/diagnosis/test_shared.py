@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.diagnosis.observations import Observations
-from wrist_stiffness.diagnosis.shared import apart, own_covariance
+from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors
 
 STAND = np.array([0, 0, -1, 1, 1, 1, -1])
@@ -23,7 +23,7 @@ def table():
 def whitened(table, columns):
     own = own_covariance(table, table.covariance)
     factors = component_factors(own, table.measured)
-    return apart(table, factors, np.where(table.measured[:, :, None], columns, 0.0))
+    return Apart(table, factors)(np.where(table.measured[:, :, None], columns, 0.0))
 
 
 def dense(table):

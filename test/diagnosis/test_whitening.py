@@ -3,7 +3,7 @@ import pytest
 from scipy.linalg import toeplitz
 
 from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.whitening import NoiseModel, component_factors, innovations
+from wrist_stiffness.diagnosis.whitening import NoiseModel, Wander, Whitener, component_factors
 
 TIME = 4.0
 
@@ -24,11 +24,11 @@ def test_the_filter_is_the_inverse_cholesky_factor(rng):
     times = np.cumsum(rng.uniform(0.2, 3, 12))
     sessions = np.repeat([0, 1], [7, 5])
     columns, shares = rng.normal(size=(12, 1, 3)), some_shares(rng, 12)
-    white, log_sum = innovations(columns, np.ones((12, 1), bool), times, sessions, shares, TIME)
+    wander = Wander.of(np.ones((12, 1), bool), times, sessions, shares, TIME)
     factor = np.linalg.cholesky(covariance_in_time(times, sessions, shares))
     expected = np.linalg.solve(factor, columns[:, 0])
-    np.testing.assert_allclose(white[:, 0], expected, atol=1e-12)
-    assert log_sum == pytest.approx(2 * np.log(np.diag(factor)).sum())
+    np.testing.assert_allclose(wander(columns)[:, 0], expected, atol=1e-12)
+    assert wander.log_sum == pytest.approx(2 * np.log(np.diag(factor)).sum())
 
 
 def test_a_lost_unit_does_not_disturb_the_filter(rng):
@@ -36,7 +36,7 @@ def test_a_lost_unit_does_not_disturb_the_filter(rng):
     columns, shares = rng.normal(size=(10, 1, 1)), some_shares(rng, 10)
     measured = np.ones((10, 1), bool)
     measured[4] = False
-    white, _ = innovations(columns, measured, times, sessions, shares, TIME)
+    white = Wander.of(measured, times, sessions, shares, TIME)(columns)
     kept = measured[:, 0]
     factor = np.linalg.cholesky(covariance_in_time(times, sessions, shares)[np.ix_(kept, kept)])
     np.testing.assert_allclose(
@@ -100,3 +100,10 @@ def test_features_are_filtered_in_time_like_the_residual(rng, two_sessions):
     )
     expected = np.linalg.solve(factor, features)
     np.testing.assert_allclose(noise.filtered(two_sessions, features), expected, atol=1e-12)
+
+
+def test_columns_are_whitened_alike_one_after_the_other_and_together(rng, two_sessions):
+    whiten = Whitener(NoiseModel(np.array([[1.5]]), 0.6, TIME, np.inf, "given"), two_sessions)
+    columns = rng.normal(size=(12, 1, 3))
+    each = np.hstack([whiten(columns[:, :, [k]]) for k in range(3)])
+    np.testing.assert_allclose(whiten(columns), each, rtol=1e-13)

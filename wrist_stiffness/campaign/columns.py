@@ -12,6 +12,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.batch import Recent
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
@@ -69,13 +70,13 @@ class SessionModel:
         return self._has_state(effect) and not effect.law.state_is_a_guess
 
     def _has_state(self, effect: Effect) -> bool:
-        known, asked = self.session.with_a_state, (effect.law, effect.component)
+        known, asked = self.session.known, (effect.law, effect.component)
         if asked not in known:
             first = self.session.block.take(slice(0, 1))
             usual = Effect(*asked)
             memory = evaluate(self.model.with_effects(usual), first, None).memory
             known[asked] = memory.states[0] is not None
-        return known[asked]
+        return bool(known[asked])
 
     def along(self, trials: Sequence[Effects]) -> list[Array]:
         """Return what the sensor would say of each unit, from all its moments, (u, 6).
@@ -90,7 +91,8 @@ class SessionModel:
         session = self.session if moments is Moments.PATH else self._without_path
         block = self.session.still if moments is Moments.MEAN else session.block
         rests = self._rests.get(moments, ())
-        found = self.model.with_effects().batch_with(block, trials, rests)
+        recent = self.session.known.setdefault(moments, Recent())
+        found = self.model.with_effects().batch_with(block, trials, rests, recent)
         self._rests[moments] = found[0].guesses
         if moments is Moments.MEAN:
             return [each.measured for each in found]

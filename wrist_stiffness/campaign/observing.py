@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,7 +22,6 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.law import Law
 
 QUANTITIES = (
     Quantity("s", "um", (0, 1, 2), 1e6),
@@ -98,8 +98,8 @@ class UnitSession:
         )
 
     @cached_property
-    def with_a_state(self) -> dict[tuple[Law, str], bool]:
-        """Whether laws at places carry a state from moment to moment, as far as was asked."""
+    def known(self) -> dict[Any, Any]:
+        """What models on it found out: which laws have a state, what the last one did."""
         return {}
 
     def mean(self, values: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from wrist_stiffness.diagnosis.observations import Array, Observations
-from wrist_stiffness.diagnosis.whitening import innovations
+from wrist_stiffness.diagnosis.whitening import Wander
 
 SHARES = (0.1, 0.25, 0.5, 0.75, 0.95)
 TIMES_IN_STEPS = (1.5, 4.0, 10.0, 30.0)
@@ -69,15 +69,14 @@ def _restricted_likelihood(
     reduced: Array, observations: Observations, share: Array, time_constant: float
 ) -> float:
     measured = observations.measured
-    white, log_sum = innovations(
-        reduced, measured, observations.times, observations.sessions, share, time_constant
-    )
+    times, sessions = observations.times, observations.sessions
+    wander = Wander.of(measured, times, sessions, share, time_constant)
     p = reduced.shape[2] - 1
-    flat = white.reshape(-1, p + 1)
+    flat = wander(reduced).reshape(-1, p + 1)
     # The columns are independent and far from parallel, so their Gram matrix is safe.
     factor = np.linalg.cholesky(flat.T @ flat + np.diag(np.full(p + 1, ROUNDING)))
     size = np.diagonal(factor)
     freedom = int(measured.sum()) - p
     log_information = 2 * np.log(size[:p]).sum()
     variance = size[p] ** 2 / freedom
-    return -0.5 * float(log_sum + log_information + freedom * np.log(variance))
+    return -0.5 * float(wander.log_sum + log_information + freedom * np.log(variance))

@@ -16,7 +16,7 @@ from wrist_stiffness.diagnosis.projection import (
     make_base,
     orthonormal,
 )
-from wrist_stiffness.diagnosis.whitening import NoiseModel
+from wrist_stiffness.diagnosis.whitening import NoiseModel, Whitener
 from wrist_stiffness.diagnosis.worth import directions_of
 
 
@@ -62,9 +62,13 @@ class Evidence:
 
     def whiten(self, columns: Array) -> Array:
         """Whitened columns above the (empty) rows of the priors, (N, k)."""
-        white = self.noise.whiten(self.observations, columns)
+        white = self._whitener(columns)
         n_priors = self.base.residual.size - white.shape[0]
         return np.vstack([white, np.zeros((n_priors, white.shape[1]))])
+
+    @cached_property
+    def _whitener(self) -> Whitener:
+        return Whitener(self.noise, self.observations)
 
     def hypothesis(self, candidate: Candidate, shape: tuple[float, ...]) -> Hypothesis:
         """Evaluate and whiten one candidate at one shape."""

@@ -12,7 +12,7 @@ import numpy as np
 from wrist_stiffness.diagnosis.colour import find_colour
 from wrist_stiffness.diagnosis.observations import Array, Observations
 from wrist_stiffness.diagnosis.projection import ABSORBED, leading_directions, orthonormal
-from wrist_stiffness.diagnosis.shared import apart, own_covariance
+from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 from wrist_stiffness.diagnosis.whitening import (
     NoiseModel,
     component_factors,
@@ -215,11 +215,11 @@ def _rich(
         What they leave of the weighted values.
     """
     measured = observations.measured
-    factors = component_factors(own_covariance(observations, covariance), measured)
+    own = own_covariance(observations, covariance)
+    apart = Apart(observations, component_factors(own, measured))
 
     def weighted(columns: Array) -> Array:
-        filled = np.where(measured[:, :, None], columns, 0.0)
-        return apart(observations, factors, filled).reshape(measured.size, -1)
+        return apart(np.where(measured[:, :, None], columns, 0.0)).reshape(measured.size, -1)
 
     basis = rich_basis(weighted(base), weighted(structure), int(measured.sum()))
     target = weighted(observations.values[:, :, None])[:, 0]

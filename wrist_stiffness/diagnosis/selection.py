@@ -105,7 +105,8 @@ def rivals_of(
     others = entered[:which] + entered[which + 1 :]
     base = base_with(evidence.base, others)
     free = [*_others(hypotheses, others), entered[which].hypothesis]
-    return _sharpened(evidence, base, free, dimension)
+    ranked = rank(base, free, dimension, evidence.noise.dof)
+    return _sharpened(evidence, base, free, ranked, dimension)
 
 
 def _contest(
@@ -115,14 +116,17 @@ def _contest(
     ranked = rank(base, hypotheses, dimension, evidence.noise.dof)
     if ranked and ranked[0].remaining == 0 and not ranked[0].hypothesis.candidate.shape:
         return ranked
-    return _sharpened(evidence, base, hypotheses, dimension)
+    return _sharpened(evidence, base, hypotheses, ranked, dimension)
 
 
 def _sharpened(
-    evidence: Evidence, base: Base, hypotheses: list[Hypothesis], dimension: float
+    evidence: Evidence,
+    base: Base,
+    hypotheses: list[Hypothesis],
+    ranked: list[Ranked],
+    dimension: float,
 ) -> list[Ranked]:
-    """Rank after the best contenders with a shape have had it refined."""
-    ranked = rank(base, hypotheses, dimension, evidence.noise.dof)
+    """Rank again after the best contenders with a shape have had it refined."""
     contenders: dict[str, Hypothesis] = {}
     for each in ranked:
         near = each.gain > CONTENDING_SHARE * ranked[0].gain

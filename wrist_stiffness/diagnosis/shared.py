@@ -72,8 +72,3 @@ class Apart:
             flat = white.reshape(len(white) * white.shape[1], white.shape[2])
             flat -= self._directions @ (self._shrink * (self._directions.T @ flat))
         return white
-
-
-def apart(observations: Observations, factors: Array, columns: Array) -> Array:
-    """Bring columns (n, m, k) to unit scatter once: see `Apart`."""
-    return Apart(observations, factors)(columns)

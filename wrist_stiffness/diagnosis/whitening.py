@@ -6,11 +6,12 @@ number of units (Brockwell and Davis, Time Series, chapter 12: innovations).
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from wrist_stiffness.diagnosis.observations import Array, Labels, Mask, Observations
-from wrist_stiffness.diagnosis.shared import apart, own_covariance
+from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,32 +70,52 @@ class NoiseModel:
         columns : (n, m, k) array
             Columns to whiten; NaN counts as not measured.
         """
-        measured = observations.measured
-        filled = np.where(measured[:, :, None], columns, 0.0)
-        own = own_covariance(observations, stated_covariance(observations)) + self.beyond
-        weighted = apart(observations, component_factors(own, measured), filled)
-        weighted /= np.sqrt(self.scale)
-        white = self._filter(observations, weighted, measured, self.wandering(observations))
-        return white.reshape(measured.size, columns.shape[2])
+        return Whitener(self, observations)(columns)
 
     def filtered(self, observations: Observations, columns: Array) -> Array:
         """Columns (n, q) filtered in time only, like a component that was always measured."""
         always = np.ones((len(columns), 1), dtype=bool)
         share = self.wandering(observations).mean(axis=1, keepdims=True)
-        return self._filter(observations, columns[:, None, :], always, share)[:, 0]
+        return self.wander(observations, always, share)(columns[:, None, :])[:, 0]
 
-    def _filter(
-        self, observations: Observations, columns: Array, measured: Mask, share: Array
-    ) -> Array:
-        white, _ = innovations(
-            columns,
-            measured,
-            observations.times,
-            observations.sessions,
-            share,
-            self.colour_time,
-        )
-        return white
+    def wander(self, observations: Observations, measured: Mask, share: Array) -> "Wander":
+        """Return the filter of the wander: a `share` (n, m) of each unit's variance."""
+        times, sessions = observations.times, observations.sessions
+        return Wander.of(measured, times, sessions, share, self.colour_time)
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """Whitens columns of one table again and again: all but the columns is worked out once.
+
+    Parameters
+    ----------
+    noise : NoiseModel
+        Scatter of its units.
+    observations : Observations
+        Tells which entries were measured, and when.
+    """
+
+    noise: NoiseModel
+    observations: Observations
+
+    def __call__(self, columns: Array) -> Array:
+        """Return `NoiseModel.whiten` of columns (n, m, k), (n m, k)."""
+        measured = self.observations.measured
+        weighted = self._apart(np.where(measured[:, :, None], columns, 0.0))
+        weighted /= np.sqrt(self.noise.scale)
+        return self._wander(weighted).reshape(measured.size, columns.shape[2])
+
+    @cached_property
+    def _apart(self) -> Apart:
+        stated = stated_covariance(self.observations)
+        own = own_covariance(self.observations, stated) + self.noise.beyond
+        return Apart(self.observations, component_factors(own, self.observations.measured))
+
+    @cached_property
+    def _wander(self) -> "Wander":
+        share = self.noise.wandering(self.observations)
+        return self.noise.wander(self.observations, self.observations.measured, share)
 
 
 def stated_covariance(observations: Observations) -> Array:
@@ -126,56 +147,81 @@ def component_factors(covariance: Array, measured: Mask) -> Array:
     return np.linalg.inv(np.linalg.cholesky(safe)).astype(np.float64)
 
 
-def innovations(
-    columns: Array,
-    measured: Mask,
-    times: Array,
-    sessions: Labels,
-    share: Array,
-    time_constant: float,
-) -> tuple[Array, float]:
-    """Standardised innovations of white noise plus slow wander of unit variance together.
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """Filter that leaves standardised innovations of white noise plus slow wander.
+
+    Its gains follow from when was measured what, not from what is filtered.
 
     Parameters
     ----------
-    columns : (n, m, k) array
-        Series of unit scatter; every component and column is filtered by itself.
     measured : (n, m) array of bool
         Entries that take part.
-    times, sessions : (n,) arrays
-        The wander starts afresh in every session.
-    share : (n, m) array
-        Of the wander in the variance of each unit.
-    time_constant : float
-        Correlation time of the wander.
-
-    Returns
-    -------
-    (n, m, k) array
-        Innovations divided by their standard deviation; zero where not measured.
-    float
-        Sum of the logarithms of the innovation variances.
+    memory : (n,) array
+        Share of the wander that is left from one unit to the next.
+    slow : (n, m) array
+        Size of the wander in each unit; zero where not measured.
+    gain : (n, m) array
+        Part of each innovation that moves the wander.
+    variance : (n, m) array
+        Of the innovations.
     """
-    if not share.any():
-        return np.where(measured[:, :, None], columns, 0.0), 0.0
-    gap = np.diff(times, prepend=times[0])
-    fresh = np.diff(sessions, prepend=sessions[0] - 1) != 0
-    memory = np.where(fresh, 0.0, np.exp(-gap / time_constant))
-    slow = np.where(measured, np.sqrt(share), 0.0)
-    total, gain = np.empty_like(slow), np.empty_like(slow)
-    variance = np.zeros(columns.shape[1])
-    for i, a in enumerate(memory):
-        variance = a**2 * variance + (1 - a**2)
-        total[i] = slow[i] ** 2 * variance + (1 - share[i])
-        gain[i] = slow[i] * variance / total[i]
-        variance = variance * (1 - gain[i] * slow[i])
-    # The gains do not depend on what is filtered: the long rows are left with three sums.
-    result = np.where(measured[:, :, None], columns, 0.0)
-    state = np.zeros(columns.shape[1:])
-    for i, a in enumerate(memory):
-        state *= a
-        surprise = result[i]
-        surprise -= slow[i, :, None] * state
-        state += gain[i, :, None] * surprise
-    result /= np.sqrt(total)[:, :, None]
-    return result, float(np.sum(np.log(total), where=measured))
+
+    measured: Mask
+    memory: Array
+    slow: Array
+    gain: Array
+    variance: Array
+
+    @classmethod
+    def of(
+        cls, measured: Mask, times: Array, sessions: Labels, share: Array, time_constant: float
+    ) -> "Wander":
+        """Work the gains out, for white noise and wander of unit variance together.
+
+        Parameters
+        ----------
+        measured : (n, m) array of bool
+            Entries that take part.
+        times, sessions : (n,) arrays
+            The wander starts afresh in every session.
+        share : (n, m) array
+            Of the wander in the variance of each unit.
+        time_constant : float
+            Correlation time of the wander.
+        """
+        gap = np.diff(times, prepend=times[0])
+        fresh = np.diff(sessions, prepend=sessions[0] - 1) != 0
+        memory = np.where(fresh, 0.0, np.exp(-gap / time_constant))
+        slow = np.where(measured, np.sqrt(share), 0.0)
+        total, gain = np.ones_like(slow), np.zeros_like(slow)
+        if slow.any():
+            variance = np.zeros(slow.shape[1])
+            for i, a in enumerate(memory):
+                variance = a**2 * variance + (1 - a**2)
+                total[i] = slow[i] ** 2 * variance + (1 - share[i])
+                gain[i] = slow[i] * variance / total[i]
+                variance = variance * (1 - gain[i] * slow[i])
+        return cls(measured, memory, slow, gain, total)
+
+    @property
+    def log_sum(self) -> float:
+        """Sum of the logarithms of the innovation variances."""
+        return float(np.sum(np.log(self.variance), where=self.measured))
+
+    def __call__(self, columns: Array) -> Array:
+        """Return the innovations of columns (n, m, k), divided by their standard deviation.
+
+        Every component and column is filtered by itself; zero where not measured.
+        """
+        result = np.where(self.measured[:, :, None], columns, 0.0)
+        if not self.gain.any():
+            return result
+        state = np.zeros(columns.shape[1:])
+        for i, a in enumerate(self.memory):
+            state *= a
+            surprise = result[i]
+            surprise -= self.slow[i, :, None] * state
+            state += self.gain[i, :, None] * surprise
+        result /= np.sqrt(self.variance)[:, :, None]
+        return result

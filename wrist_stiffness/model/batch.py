@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import chain, repeat
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.evaluation import evaluate, evaluate_beside, seen_by
+from wrist_stiffness.model.evaluation import Evaluated, evaluate, evaluate_beside, seen_by
 from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
 from wrist_stiffness.model.stages import NO_GUESSES, Evaluable, Guesses, Memory
@@ -21,12 +22,49 @@ CHUNK = 2048
 STACK = 8192
 """Samples, counted once for each model, whose contacts are solved together."""
 
+MOST_KEPT = 4
+"""So many chunks of a block are kept for the next models; of a longer one the rest is done anew."""
+
+
+class Recent:
+    """What the first of the last models did at a block: the next ones often begin with it again."""
+
+    def __init__(self) -> None:
+        self._model: Evaluable | None = None
+        self._chunks: list[Evaluated] = []
+
+    def like(self, model: Evaluable) -> Evaluable:
+        """Return the known model if it is the same as one; else this one, from now on known."""
+        if self._model is None or not _same(self._model, model):
+            self._model, self._chunks = model, []
+        return self._model
+
+    def chunk(self, number: int, evaluated: Callable[[], Evaluated]) -> Evaluated:
+        """Return what the known model did at a chunk, evaluated now if need be."""
+        if number < len(self._chunks):
+            return self._chunks[number]
+        found = evaluated()
+        if number < MOST_KEPT:
+            self._chunks.append(found)
+        return found
+
+
+def _same(one: Evaluable, other: Evaluable) -> bool:
+    """Tell whether two models have the very same effects on the same table."""
+    return (
+        one.table is other.table
+        and one.evaluation == other.evaluation
+        and len(one.effects) == len(other.effects)
+        and all(own is its for own, its in zip(one.effects, other.effects, strict=True))
+    )
+
 
 def predicted(
     models: Sequence[Evaluable],
     block: Block,
     accepted: NDArray[np.bool_],
     near: Sequence[Guesses] = (),
+    recent: Recent | None = None,
 ) -> list[BlockPrediction]:
     """Predict a recording with models that share their table.
 
@@ -40,6 +78,8 @@ def predicted(
         Samples inside the table's domain and load range; the effects' memory passes over the rest.
     near : sequence of dict, optional
         `guesses` of an earlier prediction of this block.
+    recent : Recent, optional
+        Of this block; then `models` begin with what it says is like the first.
 
     Returns
     -------
@@ -52,7 +92,7 @@ def predicted(
         If a user's formula has no finite value; the message says how long after the first sample.
     """
     try:
-        return _predicted(models, block, accepted, near)
+        return _predicted(models, block, accepted, near, recent or Recent())
     except UndefinedFormulaError as error:
         after = error.time_s - float(block.time[0])
         raise InputError(f"{error}, {after:.3f} s after the start") from error
@@ -63,18 +103,19 @@ def _predicted(
     block: Block,
     accepted: NDArray[np.bool_],
     near: Sequence[Guesses],
+    recent: Recent,
 ) -> list[BlockPrediction]:
     usable, rows = block.take(accepted), np.flatnonzero(accepted)
     twists, measured = np.full((2, len(models), len(block), 6), np.nan)
     memories: list[Memory | None] = [None] * len(models)
     warnings: list[dict[str, None]] = [{} for _ in models]
     guesses: list[Guesses] = []
-    for start, guess in zip(
-        range(0, len(usable), CHUNK), chain(near, repeat(NO_GUESSES)), strict=False
+    for number, guess in zip(
+        range(-(-len(usable) // CHUNK)), chain(near, repeat(NO_GUESSES)), strict=False
     ):
-        part = usable.take(slice(start, start + CHUNK))
-        own = rows[start : start + CHUNK]
-        first = evaluate(models[0], part, memories[0], near=guess)
+        chosen = slice(number * CHUNK, (number + 1) * CHUNK)
+        part, own = usable.take(chosen), rows[chosen]
+        first = recent.chunk(number, partial(evaluate, models[0], part, memories[0], near=guess))
         guesses.append(first.staged.guesses)
         beside = max(1, STACK // len(part))
         groups = [slice(begin, begin + beside) for begin in range(1, len(models), beside)]

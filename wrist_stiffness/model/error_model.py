@@ -17,7 +17,7 @@ from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
-from wrist_stiffness.model.batch import predicted
+from wrist_stiffness.model.batch import Recent, predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.effect import Effect
@@ -26,7 +26,7 @@ from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.session import Session
 from wrist_stiffness.model.situation import lengths
-from wrist_stiffness.model.stages import AtHome, constants_of, share
+from wrist_stiffness.model.stages import AtHome, Evaluable, constants_of, share
 
 
 @dataclass(frozen=True)
@@ -255,6 +255,7 @@ class ErrorModel:
         block: Block,
         additions: Sequence[Sequence[Effect]],
         near: Sequence[Mapping[str, Any]] = (),
+        recent: Recent | None = None,
     ) -> list[BlockPrediction]:
         """Predict a whole recording once for each of several additions to the model's effects.
 
@@ -269,15 +270,19 @@ class ErrorModel:
             Further effects of each model; an empty one for the model as it is.
         near : sequence of dict, optional
             `guesses` of an earlier prediction of this block: it changes the cost alone.
+        recent : Recent, optional
+            What was done at this block the last time: likewise.
 
         Returns
         -------
         list of BlockPrediction
             One for each addition.
         """
-        models = [self.with_effects(*self.effects, *extra) for extra in additions]
+        models: list[Evaluable] = [self.with_effects(*self.effects, *e) for e in additions]
+        if recent is not None:
+            models[0] = recent.like(models[0])
         share(models)
-        return predicted(models, block, self.accepts(block), near)
+        return predicted(models, block, self.accepts(block), near, recent)
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
         """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.free_effects import unfitted
-from wrist_stiffness.campaign.searching.contributions import Contribution
+from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
@@ -26,6 +26,7 @@ from wrist_stiffness.workflows.read_sessions import (
     was_fitted_to,
 )
 from wrist_stiffness.workflows.verdict import (
+    PROVEN,
     class_of,
     correction_of,
     unexplained_share,
@@ -76,7 +77,7 @@ class Diagnosed:
         out = [*verdict_lines(result), "", *_table(result)]
         for place, finding in enumerate(result.findings, 1):
             out += ["", *_finding_lines(place, finding)]
-        out += suspect_lines(self.answer.contributions)
+        out += adding_lines(worth_hearing(self.answer.contributions, result.verdict == "unknown"))
         if result.unexplained.evidence:
             out += ["", f"not explained: {unexplained_share(result)}"]
             out.append(f"  {result.unexplained.evidence}")
@@ -202,25 +203,23 @@ def _finding_lines(place: int, finding: Finding) -> list[str]:
     return out
 
 
-def suspect_lines(contributions: Sequence[Contribution]) -> list[str]:
-    """Return what findings and suspects add to the error, largest first; nothing without suspects.
+def adding_lines(parts: Sequence[Contribution]) -> list[str]:
+    """Return how much parts of a wrist add to its error, a line each; nothing without any.
 
     Parameters
     ----------
-    contributions : sequence of Contribution
-        Largest first, tolerances among them.
+    parts : sequence of Contribution
+        Findings, suspects and what is possible, largest first.
     """
-    if all(each.kind != "suspect" for each in contributions):
+    if not parts:
         return []
     out = ["", "what adds most to the error, RMS beyond what a new set-up would take up:"]
-    for each in contributions:
-        if each.kind != "tolerance":
-            sizes = ", ".join(
-                f"{key.rpartition('_')[0]} {size:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
-                for key, (size, error) in each.sizes.items()
-            )
-            proven = "found" if each.kind == "finding" else "suspect, not proven"
-            out.append(f"  {each.name}: {sizes} ({proven})")
+    for each in parts:
+        sizes = ", ".join(
+            f"{key.rpartition('_')[0]} {size:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
+            for key, (size, error) in each.sizes.items()
+        )
+        out.append(f"  {each.name}: {sizes} ({PROVEN[each.kind]})")
     return out
 
 

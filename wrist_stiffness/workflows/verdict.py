@@ -6,6 +6,13 @@ from wrist_stiffness.campaign.noise_floor import WITH_WANDER, over_floor
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.registry import find_law
 
+PROVEN = {
+    "finding": "found",
+    "suspect": "suspect, not proven",
+    "possible": "possible, a guess from usual sizes",
+}
+"""What is said of parts of a wrist that are no tolerances, by their kind."""
+
 
 def verdict_lines(result: Diagnosis) -> list[str]:
     """Return the verdict in one or two sentences."""

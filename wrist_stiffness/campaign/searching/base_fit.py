@@ -115,23 +115,28 @@ class BaseFit:
         Steps from the prior means.
     residual : (u, 6) float
         What is left, log(T_measured T_predicted^-1) at O in F [m, rad].
-    columns : (u, 6, p) float
-        Change of what is left by a step of each unknown, about `z` [m, rad].
     extras : tuple of str
         Names of the further effects.
     cost : float
         Weighted sum of squares with the priors' part, in units of the noise.
     bare : BaseProblem
-        The base alone, which knows its columns here.
+        The base alone.
+    firm : BaseProblem
+        The base with those extras beside which its columns are taken.
     """
 
     problem: BaseProblem
     z: Array
     residual: Array
-    columns: Array
     extras: tuple[str, ...]
     cost: float
     bare: BaseProblem
+    firm: BaseProblem
+
+    @cached_property
+    def columns(self) -> Array:
+        """Change of what is left by a step of each unknown, about `z`, (u, 6, p) [m, rad]."""
+        return _columns(self.problem, self.firm, self.z)
 
     @property
     def prior_std(self) -> Array:
@@ -183,6 +188,12 @@ class BaseFit:
     def strained(self) -> bool:
         """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
         return bool(chi2.sf(self.strain, np.count_nonzero(self.tolerances)) < 0.05)
+
+    @property
+    def variance(self) -> float:
+        """Mean square of what is left, in units of the noise."""
+        white = self.whiten(self.residual)
+        return float(white @ white) / np.count_nonzero(self.problem.table.measured)
 
     def covariance(self) -> Array:
         """Return the covariance of all unknowns in steps, to first order, (p, p)."""
@@ -297,8 +308,7 @@ def fit_base(
         if cooled and before - after < ENOUGH * before:
             break
     cost = _cost(problem.whiten(residual), z, weights, 1.0)
-    columns = _columns(problem, bare, z)
-    return BaseFit(problem, z, residual, columns, tuple(added), cost, alone)
+    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare)
 
 
 def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:

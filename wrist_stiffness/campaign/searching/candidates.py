@@ -126,6 +126,12 @@ class WristCandidate:
             total = total + float(np.prod(weight)) * self.known[corner]
         return total
 
+    @property
+    def usual(self) -> Array:
+        """Usual size of the factor of each column, (k,)."""
+        first = self.recipe.columns(self.shapes[0])
+        return np.array([column.factor.plausible for column in first], dtype=float)
+
     def changed_by(self, change: Array, strain: float) -> WristCandidate:
         """Return it with what a whole fit changes, (u, 6), in place of its columns."""
         return replace(self, change=change, strain=strain)

@@ -7,7 +7,7 @@ is ranked by what it adds beyond what a new set-up would take up.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +16,9 @@ import numpy as np
 from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.mechanism.components import Array
+
+MOST_POSSIBLE = 5
+"""So many of what is possible are worth a look."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,8 @@ class Contribution:
         Which.
     kind : str
         `finding` is proven; `suspect` explains more than its freedom costs but is not proven;
-        `tolerance` lies within what wrists differ by.
+        `tolerance` lies within what wrists differ by; `possible` is the likeliest share of an
+        effect in what nothing else explains.
     sizes : dict of str to (float, float)
         Root mean square over the units of what it adds, beyond what registrations, zeros and tare
         would take up, and its standard uncertainty, by the key of the quantity.
@@ -63,29 +67,70 @@ def contributions(fitted: BaseFit, named: Collection[str]) -> tuple[Contribution
     tuple of Contribution
         Of every effect that is the wrist's own, not the set-up's.
     """
-    whole = _Decomposed(fitted)
+    whole = Decomposed(fitted)
     found = []
     for name in dict.fromkeys(whole.names):
-        effect, component = name.split("@")
         kind = "tolerance"
         if name in fitted.extras:
             kind = "finding" if name in named else "suspect"
-        change, places = whole.beyond(whole.change(name)), whole.places(name)
-        if not places:
-            continue
-        scatter = whole.scatter(places)
-        sizes = {}
-        for quantity in QUANTITIES:
-            own = list(quantity.components)
-            size = np.sqrt(np.mean(np.sum(change[:, own] ** 2, axis=1)))
-            error = np.sqrt(np.mean(np.sum(scatter[:, own], axis=1)))
-            sizes[quantity.key] = float(size) * quantity.per_si, float(error) * quantity.per_si
-        signal = float(np.linalg.norm(fitted.whiten(change)))
-        found.append(Contribution(effect, component, kind, sizes, signal))
+        if places := whole.places(name):
+            spread = whole.beyond(fitted.columns[:, :, places]) @ root_of(whole.covariance(places))
+            found.append(contribution(fitted, name, kind, whole.beyond(whole.change(name)), spread))
+    return ranked(found)
+
+
+def ranked(found: Iterable[Contribution]) -> tuple[Contribution, ...]:
+    """Return contributions, the largest first."""
     return tuple(sorted(found, key=lambda each: -each.signal))
 
 
-class _Decomposed:
+def worth_hearing(parts: Sequence[Contribution], something_left: bool) -> list[Contribution]:
+    """Return what people should hear of: findings and suspects, and what else is likeliest.
+
+    Nothing where findings say it all.
+
+    Parameters
+    ----------
+    parts : sequence of Contribution
+        Largest first.
+    something_left : bool
+        Whether something is left that no finding explains.
+    """
+    kinds = ("finding", "suspect", "possible") if something_left else ("finding", "suspect")
+    heard = [each for each in parts if each.kind in kinds]
+    likeliest = [each for each in heard if each.kind == "possible"][:MOST_POSSIBLE]
+    heard = [each for each in heard if each.kind != "possible" or each in likeliest]
+    return [] if all(each.kind == "finding" for each in heard) else heard
+
+
+def contribution(
+    fitted: BaseFit, name: str, kind: str, change: Array, spread: Array
+) -> Contribution:
+    """Return what an effect adds.
+
+    Parameters
+    ----------
+    fitted : BaseFit
+        Knows the noise.
+    name, kind : str
+        Which effect, and how sure.
+    change : (u, 6) float
+        What it adds most likely, beyond the set-up [m, rad].
+    spread : (u, 6, k) float
+        The same by a standard deviation along each of k independent directions.
+    """
+    effect, component = name.split("@")
+    sizes = {}
+    for quantity in QUANTITIES:
+        own = list(quantity.components)
+        size = np.sqrt(np.mean(np.sum(change[:, own] ** 2, axis=1)))
+        error = np.sqrt(np.mean(np.sum(spread[:, own] ** 2, axis=(1, 2))))
+        sizes[quantity.key] = float(size) * quantity.per_si, float(error) * quantity.per_si
+    signal = float(np.linalg.norm(fitted.whiten(change)))
+    return Contribution(effect, component, kind, sizes, signal)
+
+
+class Decomposed:
     """A fitted wrist, taken apart.
 
     Parameters
@@ -127,11 +172,16 @@ class _Decomposed:
         taken = self._inverse @ self._fitted.whiten(change)
         return change - self._columns @ taken
 
-    def scatter(self, places: list[int]) -> Array:
-        """Return the variance of what unknowns add, (u, 6)."""
-        own = self.beyond(self._fitted.columns[:, :, places])
-        return np.einsum("uik,kl,uil->ui", own, self._covariance[np.ix_(places, places)], own)
+    def covariance(self, places: list[int]) -> Array:
+        """Return the covariance of unknowns in steps, (k, k)."""
+        return self._covariance[np.ix_(places, places)]
 
     @cached_property
     def _covariance(self) -> Array:
         return self._fitted.covariance()
+
+
+def root_of(covariance: Array) -> Array:
+    """Return a root of a covariance that may be singular, (k, k): its columns are independent."""
+    variances, directions = np.linalg.eigh(covariance)
+    return np.asarray(directions * np.sqrt(np.maximum(variances, 0.0)))

@@ -16,10 +16,16 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, as_units
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
-from wrist_stiffness.campaign.searching.contributions import Contribution, contributions
+from wrist_stiffness.campaign.searching.contributions import (
+    Contribution,
+    contributions,
+    ranked,
+)
 from wrist_stiffness.campaign.searching.fitter import Fitter, Tell, silent
 from wrist_stiffness.campaign.searching.place import Place
+from wrist_stiffness.campaign.searching.possible import possible
 from wrist_stiffness.campaign.searching.refit import (
+    Refitted,
     explained,
     foretold,
     refit,
@@ -129,10 +135,14 @@ def diagnose_sessions(
         tell("asking chance and resamples")
         return _asked(place, rng, settings)
 
-    place, result = _answered(search, ask)
-    base, named = _begun(place, result)
     share = (settings or Settings()).sealed_share
-    judged = refit(fitter, base, named, share, saw_all=bool(place.fits))
+
+    def judge(place: Place, result: Diagnosis) -> Refitted:
+        base, named = _begun(place, result)
+        return refit(fitter, base, named, share, search.first_cost, saw_all=bool(place.fits))
+
+    place, result, judged = _judged(search, ask, judge)
+    base, named = _begun(place, result)
     final = judged.base
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
     result = rejudged(withdrawn(result, len(effects)), judged.stages)
@@ -140,7 +150,8 @@ def diagnose_sessions(
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
     suspected = _with_all(fitter, base, named)
-    ranked = contributions(suspected, {each.name for each in kept})
+    parts = contributions(suspected, {each.name for each in kept})
+    parts = ranked([*parts, *possible(suspected, search.catalogue)])
     observed = base.left(with_extras=False)
     if kept and len(kept) == len(named) and result.verdict == "unknown":
         limit = (settings or Settings()).unexplained_share
@@ -151,8 +162,26 @@ def diagnose_sessions(
             return explained(rejudged(found, foretold(fitter, final, kept, share)), kept)
 
         result = _settled(result, search, final, ask, limit, by_laws)
-    result = sized(valued(result, final), kept)
-    return WristDiagnosis(result, observed, kept, final, suspected, ranked, absorbed)
+    result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
+    return WristDiagnosis(result, observed, kept, final, suspected, parts, absorbed)
+
+
+def _judged(
+    search: Search, ask: Ask, judge: Callable[[Place, Diagnosis], Refitted]
+) -> tuple[Place, Diagnosis, Refitted]:
+    """Return the answer of a search, where it was found, and what of it holds with its own laws.
+
+    Slopes that mislead name what does not hold: then whole fits are asked.
+    """
+    place, result = _answered(search, ask)
+    judged = judge(place, result)
+    held = len(judged.base.extras)
+    if held == len(result.findings) or place.fits:
+        return place, result, judged
+    other = _whole(search.thorough(), search, ask)
+    if other is None or not _says_more(other[1], withdrawn(result, held)):
+        return place, result, judged
+    return *other, judge(*other)
 
 
 def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
@@ -164,20 +193,27 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     found = search.found != {each.name for each in result.findings}
     otherwise = found and result.verdict != "effect"
     doubted = _leaves_much(result) or strained or otherwise
+    if doubted and search.explained and not (strained or found):
+        # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
+        return replace(place, fits=dict.fromkeys(search.found, place.base)), result
     if doubted or result.verdict == "none":
         # What presses the base takes up whole, within its tolerances: then nothing seems missing.
-        other = search.thorough() if doubted else search.thorough(PRESSING)
-        if other is not None:
-            again = _with_the_first(search, other, ask)
-            if _says_more(again, result):
-                return other, again
-    other = search.further([each.name for each in result.findings])
-    if other is not None:
-        more = _with_the_first(search, other, ask)
-        if any(each.name in other.fits for each in more.findings):
-            fitted = [each for each in result.findings if each.name in other.base.extras]
-            return other, _together(replace(result, findings=tuple(fitted)), more)
+        whole = search.thorough() if doubted else search.thorough(PRESSING)
+        other = _whole(whole, search, ask)
+        if other is not None and _says_more(other[1], result):
+            return other
+    beside = search.further([each.name for each in result.findings])
+    if beside is not None:
+        more = _with_the_first(search, beside, ask)
+        if any(each.name in beside.fits for each in more.findings):
+            fitted = [each for each in result.findings if each.name in beside.base.extras]
+            return beside, _together(replace(result, findings=tuple(fitted)), more)
     return place, result
+
+
+def _whole(place: Place | None, search: Search, ask: Ask) -> tuple[Place, Diagnosis] | None:
+    """Return a place of whole fits and what it says; None without one."""
+    return None if place is None else (place, _with_the_first(search, place, ask))
 
 
 def _with_the_first(search: Search, place: Place, ask: Ask) -> Diagnosis:

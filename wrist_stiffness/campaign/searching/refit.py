@@ -7,7 +7,7 @@ the units put aside worse than the base alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,12 +49,13 @@ def refit(
     base: BaseFit,
     named: Sequence[Effect],
     sealed_share: float,
+    first_cost: float,
     saw_all: bool = False,
 ) -> Refitted:
     """Fit the base along with as much of what was named as holds.
 
-    Where the laws leave much more than noise, what entered last is taken out for as long as the
-    units put aside come out worse with the effects than without.
+    Where the laws leave much more than noise, or more than the base alone, what entered last is
+    taken out for as long as the units put aside come out worse with the effects than without.
 
     Parameters
     ----------
@@ -66,12 +67,15 @@ def refit(
         In the order of entry, with the values from which they begin.
     sealed_share : float
         Part of a single session that is put aside; of several it is the last one.
+    first_cost : float
+        Weighted sum of squares that the base alone leaves.
     saw_all : bool
         Whether fits to all units chose what was named: then it is judged however little it leaves.
     """
     kept = list(named)
     fitted = _along(fitter, base, kept)
-    if not kept or (_variance(fitted) < INEXACT and not saw_all):
+    exact = _variance(fitted) < INEXACT and fitted.cost < first_cost
+    if not kept or (exact and not saw_all):
         return Refitted(fitted)
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
@@ -168,7 +172,7 @@ def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
 
 
-def valued(result: Diagnosis, fitted: BaseFit) -> Diagnosis:
+def valued(result: Diagnosis, fitted: BaseFit, whole: Collection[str] = ()) -> Diagnosis:
     """Return an answer with the parameters of whole fits where slopes do not say them.
 
     Where a finding stands for a whole fit, and where its own law ends so far from what the slopes
@@ -180,16 +184,19 @@ def valued(result: Diagnosis, fitted: BaseFit) -> Diagnosis:
         With its findings.
     fitted : BaseFit
         The base along with all of them.
+    whole : collection of str, optional
+        Names of findings of which slopes leave much that their fits explain.
     """
     found = []
     for each in result.findings:
-        whole = fitted.values_on_top(each.name)
-        slopes_hold = SHARE not in each.parameters and all(
-            abs(whole[key][0] - value) < FAR * sigma
+        values = fitted.values_on_top(each.name)
+        stands_for_a_fit = SHARE in each.parameters or each.name in whole
+        slopes_hold = not stands_for_a_fit and all(
+            abs(values[key][0] - value) < FAR * sigma
             for key, (value, sigma) in each.parameters.items()
-            if key in whole
+            if key in values
         )
-        found.append(each if slopes_hold else replace(each, parameters=whole))
+        found.append(each if slopes_hold else replace(each, parameters=values))
     return replace(result, findings=tuple(found))
 
 

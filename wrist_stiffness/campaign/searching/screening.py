@@ -61,15 +61,19 @@ class Screen:
         The same base, for trials.
     without : str, optional
         Name of an effect fitted along that is taken out, to first order.
+    variance : float
+        Of what is left, in units of the noise: priors hold against a part that is not noise.
     """
 
-    def __init__(self, base: BaseFit, point: Point, without: str | None = None) -> None:
-        self._base, self._point = base, point
+    def __init__(
+        self, base: BaseFit, point: Point, without: str | None = None, variance: float = 1.0
+    ) -> None:
+        self._base, self._point, self._root = base, point, np.sqrt(variance)
         free, weights = base.problem.free, base.problem.weights
         names = np.array([free[u.free].effect.name for u in base.problem.unknowns])
         stays = (names != without) | base.of_base
-        rows = np.vstack([base.whiten(base.columns), np.diag(weights)])
-        target = np.concatenate([base.whiten(base.residual), weights * base.z])
+        rows = np.vstack([self._whiten(base.columns), np.diag(weights)])
+        target = np.concatenate([self._whiten(base.residual), weights * base.z])
         target = target - rows[:, ~stays] @ base.z[~stays]
         # NO_PRIOR weights are tiny: QR keeps them apart from rounding.
         self._basis = np.linalg.qr(rows[:, stays])[0]
@@ -86,9 +90,12 @@ class Screen:
 
     def white(self, changes: Array) -> Array:
         """Whiten changes (u, 6, k) of the predictions and take the base out, (N, k)."""
-        white = self._base.whiten(changes)
+        white = self._whiten(changes)
         priors = np.zeros((len(self.left) - len(white), white.shape[1]))
         return self.beyond(np.vstack([white, priors]))
+
+    def _whiten(self, values: Array) -> Array:
+        return self._base.whiten(values) / self._root
 
     @property
     def _unit_price(self) -> float:
@@ -101,10 +108,9 @@ class Screen:
         """Return what each candidate gains by its columns, at its best shape, largest first."""
         found = []
         for candidate in candidates:
-            scales = np.array([p.scale for p in candidate.candidate().parameters], dtype=float)
             best = max(
                 (
-                    (worth(self.white(candidate.at(shape)), self.left, scales), shape)
+                    (worth(self.white(candidate.at(shape)), self.left, candidate.usual), shape)
                     for shape in candidate.shapes
                 ),
                 key=lambda pair: pair[0],

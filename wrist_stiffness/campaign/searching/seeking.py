@@ -49,6 +49,9 @@ RUBBING = frozenset(("joint_friction", "cable_wrench"))
 CLOSING = frozenset(("bushing_stiffness", "bushing_hardening"))
 """Laws of a bushing: 0.5 um of play of another shape looked like one of 0.2 of its stiffness."""
 
+UNSEEN = PRESSING | RUBBING | LOOSE
+"""Laws that no slope shows as they are."""
+
 MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
 
@@ -81,6 +84,11 @@ class Search:
         return Reached(again, {}, again.cost)
 
     @property
+    def catalogue(self) -> Candidates:
+        """The catalogue about the base alone."""
+        return self._catalogue
+
+    @property
     def found(self) -> Collection[str]:
         """Names of the effects to which tangents led, each fitted whole."""
         return self._reached.prices.keys()
@@ -103,13 +111,19 @@ class Search:
         """
         return self._reached.base.strained and not self._first.rough
 
+    @property
+    def explained(self) -> bool:
+        """Whether one effect, to which tangents led, leaves no more than the noise as it is."""
+        base = self._reached.base
+        return len(self.found) == 1 and base.cost <= float(base.problem.table.measured.sum())
+
     def quick(self) -> Place:
         """Return where tangents led, and the catalogue there."""
         if self._reached is self._first:
             return Place(self._first.base, self._catalogue)
         return Place(self._reached.base, self._at(self._reached))
 
-    def thorough(self, laws: Collection[str] = PRESSING | RUBBING | LOOSE) -> Place | None:
+    def thorough(self, laws: Collection[str] = UNSEEN) -> Place | None:
         """Fit what no tangent shows one by one with the whole base; return all side by side.
 
         Each with what it changes, base and all, in place of its tangents.  None where nothing comes

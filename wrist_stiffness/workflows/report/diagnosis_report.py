@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.sentences import Statement, Told, tell
 from wrist_stiffness.campaign.noise_floor import noise_floor
-from wrist_stiffness.campaign.searching.contributions import Contribution
+from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.dependence import draw_against
@@ -32,6 +32,7 @@ from wrist_stiffness.workflows.report.parts import (
     unit_of,
 )
 from wrist_stiffness.workflows.verdict import (
+    PROVEN,
     class_of,
     correction_of,
     unexplained_share,
@@ -41,7 +42,6 @@ from wrist_stiffness.workflows.verdict import (
 MOST_PICTURED = 4
 """Conditions that are drawn."""
 
-PROVEN = {"finding": "found", "suspect": "suspect, not proven"}
 
 HOW = (
     "Registrations, encoder zeros, load tare and the tolerances of the wrist were fitted first; an "
@@ -121,7 +121,7 @@ def report_of_diagnosis(
     sections = [
         Section("Findings", tuple(_findings(result, quantities))),
         Section("How much it brings", _fall(result, quantities)),
-        *_suspects(contributions, quantities),
+        *_adding(worth_hearing(contributions, result.verdict == "unknown"), quantities),
         Section("Where it shows", _depends(shown)),
         Section("What remains", _remains(result)),
         Section("What these recordings cannot show", _not_excited(result)),
@@ -207,18 +207,15 @@ def _fall(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[Part, ..
     return (drawn(draw_bars(bars), caption),)
 
 
-def _suspects(
-    contributions: Sequence[Contribution], quantities: tuple[Quantity, ...]
-) -> list[Section]:
-    """Return what findings and suspects add to the error; nothing without suspects."""
-    if all(each.kind != "suspect" for each in contributions):
+def _adding(parts: Sequence[Contribution], quantities: tuple[Quantity, ...]) -> list[Section]:
+    """Return how much parts of a wrist add to its error; nothing without any."""
+    if not parts:
         return []
     rows = []
-    for each in contributions:
-        if each.kind in PROVEN:
-            sizes = [each.sizes[q.key] for q in quantities]
-            cells = [f"{size:.3g} ± {error:.2g}" for size, error in sizes]
-            rows.append((each.name, *cells, PROVEN[each.kind]))
+    for each in parts:
+        sizes = [each.sizes[q.key] for q in quantities]
+        cells = [f"{size:.3g} ± {error:.2g}" for size, error in sizes]
+        rows.append((each.name, *cells, PROVEN[each.kind]))
     titles = ("effect", *(f"{q.name} [{unit_of(q.unit)}]" for q in quantities), "")
     caption = "RMS of what each adds, beyond what a new set-up would take up. Look at the first."
     return [Section("What adds most to the error", (Table(caption, titles, tuple(rows)),))]

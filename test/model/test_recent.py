@@ -1,0 +1,60 @@
+"""What the first of the last models did at a block, taken over by the next ones at it."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.model import batch
+from wrist_stiffness.model.batch import MOST_KEPT, Recent
+
+CHUNK = 8
+
+
+@pytest.fixture
+def evaluated(monkeypatch):
+    """Number of the chunks that a first model was evaluated at, each time."""
+    monkeypatch.setattr(batch, "CHUNK", CHUNK)
+    found, own = [], batch.evaluate
+    monkeypatch.setattr(batch, "evaluate", lambda *a, **k: found.append(1) or own(*a, **k))
+    return found
+
+
+def alike(one, other):
+    scale = np.abs(other.measured).max(axis=0)
+    return bool(np.all(np.abs(one.measured - other.measured) <= 1e-12 * scale))
+
+
+def test_a_model_is_evaluated_once_at_a_block_and_others_beside_it(model, make, evaluated):
+    rubbing = make.effect("joint_friction@joint_3", coefficient=0.2, bristle_um_per_N=0.5)
+    bent = make.effect("link_stiffness@link_1", flexibility_percent=5.0)
+    block, recent = make.block(3 * CHUNK), Recent()
+    model.batch_with(block, [(rubbing,)], recent=recent)
+    assert len(evaluated) == 3
+    again, beside = model.batch_with(block, [(rubbing,), (rubbing, bent)], recent=recent)
+    assert len(evaluated) == 3
+    apart = [model.batch_with(block, [each])[0] for each in ((rubbing,), (rubbing, bent))]
+    assert alike(again, apart[0])
+    assert alike(beside, apart[1])
+    assert not alike(apart[1], apart[0])
+
+
+def test_a_model_with_another_effect_or_one_more_is_another_one(model, make, evaluated):
+    block, recent = make.block(CHUNK), Recent()
+    soft, softer = (
+        make.effect("link_stiffness@link_1", flexibility_percent=size) for size in (5.0, 50.0)
+    )
+    delayed = make.effect("creep@joint_3", delayed_percent=20.0, time_constant_s=5.0)
+    models = [(soft,), (softer,), (softer, delayed)]
+    found = [model.batch_with(block, [each], recent=recent)[0] for each in models]
+    assert len(evaluated) == 3
+    assert not alike(found[1], found[0])
+    assert not alike(found[2], found[1])
+
+
+def test_of_a_long_block_only_its_first_chunks_are_kept(model, make, evaluated):
+    block, recent = make.block((MOST_KEPT + 2) * CHUNK), Recent()
+    creeping = make.effect("creep@joint_3", delayed_percent=20.0, time_constant_s=5.0)
+    (at_first,) = model.batch_with(block, [(creeping,)], recent=recent)
+    evaluated.clear()
+    (again,) = model.batch_with(block, [(creeping,)], recent=recent)
+    assert len(evaluated) == 2
+    assert alike(again, at_first)
