@@ -1,5 +1,6 @@
 """From the places of a search to an answer: which of them are asked, and which is believed."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -234,8 +235,14 @@ def test_what_laws_leave_is_a_share_of_what_the_base_alone_left(cost, share, ver
     left = answer("unknown", share=0.4)
     search = SimpleNamespace(after=lambda base: base, first_cost=1e3)
     result = _settled(
-        answer("unknown", DELAY, share=0.9), search, SimpleNamespace(cost=cost), lambda _: left, 0.2
+        answer("unknown", DELAY, share=0.9),
+        search,
+        SimpleNamespace(cost=cost),
+        lambda _: left,
+        0.2,
+        lambda told: replace(told, after={"s_um": 0.5}),
     )
+    assert result.after == {"s_um": 0.5}
     assert result.verdict == verdict
     assert result.unexplained.energy_share == pytest.approx(share)
     assert result.unexplained.evidence == left.unexplained.evidence
@@ -247,7 +254,8 @@ def test_where_more_is_named_beside_whole_laws_nothing_is_settled():
     result = answer("unknown", DELAY, share=0.9)
     search = SimpleNamespace(after=lambda base: base, first_cost=1e3)
     more = answer("effect", PLAY)
-    assert _settled(result, search, SimpleNamespace(cost=1.0), lambda _: more, 0.2) is result
+    final = SimpleNamespace(cost=1.0)
+    assert _settled(result, search, final, lambda _: more, 0.2, lambda told: None) is result
 
 
 @pytest.mark.parametrize("known", [False, True])

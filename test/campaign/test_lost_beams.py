@@ -155,6 +155,29 @@ def test_stamps_that_jitter_hide_no_lost_beam_across_the_motion(worked, table, j
     np.testing.assert_array_equal(np.flatnonzero(found), lost)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_motion_of_some_counts_a_sample_tells_its_direction(table, seed):
+    """Up to 25 deg/s at 100 Hz; what stamps do along the motion is no lost beam, and hides none."""
+    step, rng = table.geometry.limits.encoder_step, np.random.default_rng(seed)
+    time, phase = 0.01 * np.arange(1200), 2.0 * np.pi / 5.0
+
+    def theta(moment):
+        way = np.radians(20.0) * np.sin(phase * moment)
+        return np.stack([way, 0.5 * way], axis=1)
+
+    late = time + 3e-3 * rng.standard_normal(1200)
+    rigid = rigid_rotation(table, step * np.round(theta(late) / step))
+    lost = np.arange(15, 1190, 37)
+    lost = lost[np.abs(np.cos(phase * time[lost])) > 0.6]
+    way = Rotation.from_matrix(rigid[lost + 1] @ np.swapaxes(rigid[lost - 1], 1, 2)).as_rotvec()
+    across = np.cross(way, [0.0, 0.0, 1.0])
+    turn = np.radians(1e-3) * rng.standard_normal((1200, 3))
+    turn[lost] += np.radians(0.15) * across / np.linalg.norm(across, axis=1, keepdims=True)
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ rigid_rotation(table, theta(time))
+    found = lost_beams(1.7e9 + time, np.full((1200, 3), np.nan), rotation, rigid, step)
+    np.testing.assert_array_equal(np.flatnonzero(found), lost)
+
+
 @pytest.mark.parametrize("late_ms", [20, 66])
 def test_a_late_stamp_hides_no_lost_beam_of_a_rotation(worked, table, late_ms):
     """What a late stamp does in motion is as large as the lost beams; it is reckoned with first."""

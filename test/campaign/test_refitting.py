@@ -12,6 +12,8 @@ from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.refit import (
     blanked,
+    explained,
+    foretold,
     refit,
     rejudged,
     sized,
@@ -134,6 +136,28 @@ def test_an_answer_is_told_with_the_errors_of_the_refits():
         assert told.findings[1].buys[quantity.key][0] == pytest.approx(2e-6 * each)
     assert told.findings[1].heldout_rmse_ratio == pytest.approx(1.0 / 3.0)
     assert rejudged(found, ()) is found
+
+
+def test_what_was_not_judged_may_be_told_by_the_same_stages(model, lost_motion):
+    base = fit_base(model, (as_units(model, lost_motion),))
+    named = [backlash(1e3 * np.degrees(WIDTH_RAD))]
+    judged = refit(Fitter(model), base, named, SHARE, base.cost, saw_all=True)
+    told = foretold(Fitter(model), judged.base, judged.base.effects(0)[-1:], SHARE)
+    assert len(told) == len(judged.stages) == 2
+    for one, other in zip(told, judged.stages, strict=True):
+        assert one.energy == pytest.approx(other.energy, rel=1e-3)
+        np.testing.assert_allclose(one.residual, other.residual, atol=2e-8)
+
+
+def test_a_finding_says_what_its_own_law_explains():
+    """Slopes said a quarter of a bushing fifty times as soft, whose law reaches the noise."""
+    found = answer(finding("backlash@motor_1", 5.0), finding("creep@joint_1", 2.0))
+    left = [HeldOut(np.full((9, 6), size), np.full(54, size)) for size in (4e-6, 1e-6, 2e-6)]
+    creep = Effect(find_law("creep"), "joint_1")
+    first, second = explained(rejudged(found, left), [backlash(1.0), creep]).findings
+    assert "its own law explains 93.8 % of what is left without it" in first.evidence
+    assert "its own law explains 0.0 % of what is left without it" in second.evidence
+    assert creep.law.sentence.format(place="joint_1") in second.evidence
 
 
 @pytest.mark.slow

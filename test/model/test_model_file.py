@@ -92,7 +92,8 @@ def test_a_users_own_laws_work(tmp_path):
 
 def test_round_trip_is_exact_and_stable(tmp_path):
     model = load_model(write(tmp_path))
-    step = Step("extend", "2026-01-02T03:04:05Z", "ab" * 32, {"run_1": "cd" * 32}, "creep@joint_1")
+    hashes = {"run_1": "cd" * 32}, {"run_1": "ef" * 32}
+    step = Step("extend", "2026-01-02T03:04:05Z", "ab" * 32, *hashes, "creep@joint_1")
     saved = tmp_path / "saved.yaml"
     save_model(replace(model, lineage=(step,)), saved)
     again = load_model(saved)
@@ -106,6 +107,34 @@ def test_round_trip_is_exact_and_stable(tmp_path):
     assert file_sha256(twice) == file_sha256(saved)
     assert "clearance_um: [12.1, 0.4]" in saved.read_text()
     assert not list(tmp_path.glob(".*.part"))
+
+
+STEP = """lineage:
+- {command: extend, date: '2026-01-02', parent_sha256: ab, recordings: {}, added: NAME}
+"""
+
+
+@pytest.mark.parametrize("name", ["joint_clearance@joint_3", "sag@link_2", "creep@joint_1"])
+def test_a_step_has_added_an_effect_of_the_file_or_one_that_was_taken_out_since(tmp_path, name):
+    (step,) = load_model(write(tmp_path, GOOD + STEP.replace("NAME", name))).lineage
+    assert step.added == name
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("crep@joint_1", "unknown effect 'crep'"),
+        ("creep@joint_9", "creep: component 'joint_9' is not one of joint_1"),
+        ("creep", "creep: component '' is not one of joint_1"),
+        ("sagging@link_2", "unknown effect 'sagging'"),
+    ],
+)
+def test_a_step_that_has_added_no_effect_is_one_line(tmp_path, name, why):
+    """The next fit would take what was found for a tolerance, and leave it out."""
+    path = write(tmp_path, GOOD + STEP.replace("NAME", name))
+    there = rf"m.yaml.lineage\[0\].added: {name} is neither .* nor one of the catalogue: {why}"
+    with pytest.raises(InputError, match=there):
+        load_model(path)
 
 
 def test_saved_elsewhere_the_paths_still_lead_to_table_and_law(tmp_path):

@@ -1,8 +1,11 @@
 """What a writer leaves behind, whatever happens."""
 
+import errno
+import os
 import random
 import resource
 import string
+from pathlib import Path
 
 import pytest
 import yaml
@@ -178,12 +181,32 @@ def test_the_current_folder_is_no_name_for_a_recording(tmp_path, monkeypatch, ov
 
 
 @pytest.fixture
-def smallest_files():
-    """Let no file of this process grow beyond 4 KiB: as on a full disk, writing is refused."""
+def grown_files():
+    """Let no file of this process grow beyond so much: as on a full disk, writing is refused."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
-    yield
+    yield lambda limit: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def smallest_files(grown_files):
+    grown_files(4096)
+
+
+@FORMS
+def test_a_disk_that_is_read_only_is_one_error(tmp_path, name, monkeypatch):
+    """It refuses to remove, too: also what is not there."""
+
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    for each in ("mkdir", "open", "unlink"):
+        monkeypatch.setattr(Path, each, refused)
+    with (
+        pytest.raises(RecordingError, match=f"{name} cannot be written: Read-only file system"),
+        RecordingWriter(tmp_path / name),
+    ):
+        pass
 
 
 @FORMS
@@ -211,6 +234,69 @@ def test_a_recording_of_which_a_message_was_refused_is_not_finished(tmp_path, na
     assert list(tmp_path.iterdir()) == []
 
 
-def noise(characters):
+@FORMS
+@pytest.mark.parametrize("when", ["while it writes", "as it ends"])
+def test_of_a_live_recording_that_fills_the_disk_all_whole_chunks_are_kept(
+    tmp_path, name, when, grown_files
+):
+    path, kept = tmp_path / name, tmp_path / f"{name.removesuffix('.mcap')}.partial"
+    kept = kept.with_name(f"{kept.name}.mcap") if name.endswith(".mcap") else kept
+    entries = [(n, noise(1000, seed=n)) for n in range(1, 501)]
+
+    def write():
+        with RecordingWriter(path, keep_partial=True) as writer:
+            for n, message in entries:
+                writer.write("/recording_notes", message, n)
+                if n == 400 and when == "as it ends":
+                    grown_files(4096)
+                    return
+
+    if when == "while it writes":
+        grown_files(3 * CHUNK_BYTES)
+    with pytest.raises(RecordingError, match=f"{name} cannot be written: File too") as caught:
+        write()
+    assert list(tmp_path.iterdir()) == [kept]
+    recording = open_recording(kept)
+    found = [(time_ns, message) for _, time_ns, message in recording.messages()]
+    assert found == entries[: len(found)]
+    assert len(found) > 250
+    assert str(caught.value).endswith(f"; the first {len(found)} messages are kept in {kept}")
+    assert f"{len(found)} messages stand before that" in recording.damage
+    # The next one that fills the disk must not cost this one.
+    with (
+        pytest.raises(RecordingError, match=f"{kept.name} exists already, a part of an earlier"),
+        RecordingWriter(path, keep_partial=True),
+    ):
+        pass
+
+
+def test_of_a_live_recording_without_room_for_its_metadata_nothing_is_lost(tmp_path, monkeypatch):
+    def refused(path, text, encoding):
+        with path.open("w", encoding=encoding) as stream:
+            stream.write(text[:40])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_text", refused)
+    with (
+        pytest.raises(RecordingError, match="No space left on device; the first 1 messages"),
+        RecordingWriter(tmp_path / "bag", keep_partial=True) as writer,
+    ):
+        writer.write("/covariates/a", Float64(1.0), 1)
+    assert len(list(open_recording(tmp_path / "bag.partial").messages())) == 1
+
+
+@FORMS
+def test_of_a_live_recording_nothing_is_kept_where_nothing_was_written(
+    tmp_path, name, smallest_files
+):
+    with (
+        pytest.raises(RecordingError, match=f"{name} cannot be written: File too large$"),
+        RecordingWriter(tmp_path / name, keep_partial=True) as writer,
+    ):
+        writer.write("/recording_notes", noise(2 * 4096), 1)
+    assert list(tmp_path.iterdir()) == []
+
+
+def noise(characters, seed=1):
     """Return a text that no compression makes small."""
-    return String("".join(random.Random(1).choices(string.printable, k=characters)))
+    return String("".join(random.Random(seed).choices(string.printable, k=characters)))

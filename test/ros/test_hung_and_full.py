@@ -20,6 +20,7 @@ from wrist_stiffness.workflows.node_list import RECORDER_NODE
 
 DEADLINE_S = 60.0
 SMALL_FILE = 4096
+LARGE_FILE = 400_000
 
 pytestmark = pytest.mark.slow
 
@@ -74,15 +75,17 @@ NOISE = Float64MultiArray(data=np.random.default_rng(1).normal(size=SMALL_FILE).
 """That no compression makes small."""
 
 
-@pytest.mark.parametrize("when", ["while it writes", "as it ends"])
-def test_a_recorder_on_a_full_disk_says_so_in_one_line(graph, tmp_path, when):
+@pytest.mark.parametrize(
+    ("when", "room"), [("while it writes", 0), ("while it writes", LARGE_FILE), ("as it ends", 0)]
+)
+def test_a_recorder_on_a_full_disk_says_so_and_keeps_what_it_wrote(graph, tmp_path, when, room):
     output = tmp_path / "full.mcap"
     node = RECORDER_NODE.having({"output": str(output)})
     end_s = time.monotonic() + DEADLINE_S
     with subprocess.Popen(node.command(), stderr=subprocess.PIPE, text=True) as process:
         try:
             graph.until(lambda: hidden_in(tmp_path), "beginning of the recording")
-            refuse_files(process.pid, 0)
+            refuse_files(process.pid, room)
             while when == "while it writes" and process.poll() is None:
                 assert time.monotonic() < end_s
                 graph.publish("/motor_positions_corrected", NOISE)
@@ -90,11 +93,14 @@ def test_a_recorder_on_a_full_disk_says_so_in_one_line(graph, tmp_path, when):
             _, errors = process.communicate(timeout=DEADLINE_S)
         finally:
             process.kill()
+    part = tmp_path / "full.partial.mcap"
+    assert list(tmp_path.iterdir()) == ([part] if room else [])
+    count = open_recording(part).topics[0].count if room else 0
+    kept = f"; the first {count} messages are kept in {part}" if count else ""
     assert errors.splitlines() == [
-        f"wrist-stiffness node: error: {output} cannot be written: File too large"
+        f"wrist-stiffness node: error: {output} cannot be written: File too large{kept}"
     ]
     assert process.returncode == 2
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_cell_whose_recorder_fails_as_it_ends_ends_in_an_error(tmp_path, capfd):

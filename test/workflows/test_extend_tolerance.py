@@ -109,7 +109,7 @@ def test_a_tolerance_that_was_only_calibrated_may_still_be_added(recorded, tmp_p
 
 def test_a_finding_that_was_taken_out_again_may_be_added_again():
     """Its step stays in the lineage."""
-    step = Step("extend", "2026-01-01", "ab" * 32, {}, SOFT)
+    step = Step("extend", "2026-01-01", "ab" * 32, {}, added=SOFT)
     model = replace(load_model(SHIPPED), lineage=(step,))
     soft = effect(SOFT).with_values({"flexibility_percent": SOFTER_PERCENT})
     free, _ = commissioning(model)
@@ -146,7 +146,7 @@ def test_with_an_axis_that_was_added_the_gaps_stay_that_it_left():
         for each in map(effect, names)
     ]
     for added, stay in ((names[0], names[:2]), (SOFT, (SOFT,)), ("", ())):
-        step = Step("extend", "2026-01-01", "ab" * 32, {}, added)
+        step = Step("extend", "2026-01-01", "ab" * 32, {}, added=added)
         child = replace(model.with_effects(*fitted), lineage=(step,))
         assert tuple(each.name for each in unfitted(child).effects) == stay
 

@@ -55,6 +55,7 @@ def test_every_node_then_this_one_then_the_command(tmp_path):
         ("wrist_platform", "gripper", "parent 'gripper'"),
         ("ros__parameters: {contact", "parameters: {contact", "expected ros__parameters"),
         (FILE, "- a list", "not a ROS 2 parameter file"),
+        (FILE, "schema: 1\neffects: []", "no node in it has ros__parameters"),
         (FILE, "a: [", "not a YAML file"),
     ],
 )

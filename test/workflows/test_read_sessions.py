@@ -9,12 +9,20 @@ import pytest
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter, open_recording, topics
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.read_sessions import Recordings, _what_was_measured, read_sessions
+from wrist_stiffness.workflows.calibrate import Run
+from wrist_stiffness.workflows.read_sessions import (
+    Recordings,
+    measured_sha256,
+    read_sessions,
+    was_fitted_to,
+)
 from wrist_stiffness.workflows.replay import replay
 
+SHIPPED = shipped_file("config/palmieri2015_model.yaml")
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
 
 
@@ -37,7 +45,7 @@ def test_a_copy_of_a_recording_is_no_second_session(tmp_path, table):
 
 def test_a_replay_and_an_import_of_a_recording_are_no_further_sessions(tmp_path, table):
     replayed, exported = tmp_path / "replayed.mcap", tmp_path / "thursday.csv"
-    replay(THURSDAY, shipped_file("config/palmieri2015_model.yaml"), replayed)
+    replay(THURSDAY, SHIPPED, replayed)
     assert main(["export", str(THURSDAY), "-o", str(exported)]) == 0
     assert main(["import", str(exported), "-o", str(tmp_path / "again")]) == 0
     (session,) = read([THURSDAY, tmp_path], table).values()
@@ -46,12 +54,31 @@ def test_a_replay_and_an_import_of_a_recording_are_no_further_sessions(tmp_path,
     ]
 
 
+def test_a_model_is_known_to_be_fitted_to_a_replay_of_its_recording(tmp_path, table):
+    """Else what it found there would count twice: as knowledge, and as data."""
+    model = load_model(SHIPPED)
+    tuesday = THURSDAY.with_name("tuesday.mcap")
+    (day,) = read([THURSDAY], table).values()
+    fitted = replace(model, lineage=(Run("...", "2026-01-01").step(SHIPPED, {THURSDAY: day}),))
+    replayed = tmp_path / "replayed.mcap"
+    replay(THURSDAY, SHIPPED, replayed)
+    for path in (THURSDAY, replayed):
+        assert was_fitted_to(fitted, read([path], table))
+        assert not was_fitted_to(model, read([path], table))
+    assert not was_fitted_to(fitted, read([tuesday], table))
+    # Models of before say of their recordings nothing but what the files were.
+    (step,) = fitted.lineage
+    earlier = replace(fitted, lineage=(replace(step, measured={}),))
+    assert was_fitted_to(earlier, read([THURSDAY], table))
+    assert not was_fitted_to(earlier, read([replayed], table))
+
+
 def test_other_poses_and_the_same_poses_at_another_time_are_other_measurements(table):
     """Of an exact instrument a second day may show the poses of the first."""
     (day,) = read([THURSDAY], table).values()
     later = replace(day, block=replace(day.block, time=day.block.time + 1.0))
     moved, turned = replace(day, shift=day.shift + 1e-9), replace(day, rotation=-day.rotation)
-    assert len(set(map(_what_was_measured, (day, replace(day), later, moved, turned)))) == 4
+    assert len(set(map(measured_sha256, (day, replace(day), later, moved, turned)))) == 4
 
 
 def test_a_note_that_calls_calibrated_what_no_fit_refits_is_said(tmp_path, table):

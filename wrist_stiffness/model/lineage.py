@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -21,6 +21,8 @@ class Step:
         Of the parent's model file.
     recordings : dict of str to str
         SHA-256 of each recording by its name.
+    measured : dict of str to str
+        SHA-256 of what was measured in each, which a replay or another copy has as well.
     added : str
         `law@component` of the effect that the step added; empty for none.
     """
@@ -29,6 +31,7 @@ class Step:
     date: str
     parent_sha256: str
     recordings: Mapping[str, str]
+    measured: Mapping[str, str] = field(default_factory=dict)
     added: str = ""
 
     def as_values(self) -> dict[str, Any]:
@@ -39,4 +42,5 @@ class Step:
             "parent_sha256": self.parent_sha256,
             "recordings": dict(self.recordings),
         }
+        values |= {"measured": dict(self.measured)} if self.measured else {}
         return values | ({"added": self.added} if self.added else {})

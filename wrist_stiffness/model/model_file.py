@@ -45,8 +45,8 @@ def load_model(path: str | Path) -> ErrorModel:
     ------
     InputError
         If the file cannot be read, a key is missing, unknown or wrong, an effect, component or
-        parameter is unknown or out of bounds, or the table is another one than the model was made
-        for.
+        parameter is unknown or out of bounds, a step of the lineage added what is no effect, or the
+        table is another one than the model was made for.
     TableError
         If the table cannot be read.
     """
@@ -70,7 +70,7 @@ def load_model(path: str | Path) -> ErrorModel:
     if "evaluation" in root.values:
         evaluation = root.text("evaluation", EVALUATIONS)  # type: ignore[assignment]
     lineage = root.blocks("lineage") if "lineage" in root.values else []
-    steps = tuple(_step(block) for block in lineage)
+    steps = tuple(_step(block, effects) for block in lineage)
     joint = _joint(root.block("joint_uncertainty")) if "joint_uncertainty" in root.values else None
     root.no_more_keys()
     try:
@@ -217,17 +217,32 @@ def _joint(block: Block) -> JointUncertainty:
     return JointUncertainty.of_values(tuple(names), values)
 
 
-def _step(block: Block) -> Step:
-    recordings = block.block("recordings")
+def _step(block: Block, effects: tuple[Effect, ...]) -> Step:
+    added = block.text("added") if "added" in block.values else ""
+    # An effect of the catalogue may have been taken out of the file since.
+    if added and added not in [effect.name for effect in effects]:
+        law, _, component = added.partition("@")
+        try:
+            Effect(find_law(law), component)
+        except InputError as error:
+            raise InputError(
+                f"{block.place}.added: {added} is neither an effect of this file nor one of the "
+                f"catalogue: {error}"
+            ) from error
     step = Step(
         block.text("command"),
         block.text("date"),
         block.text("parent_sha256"),
-        {str(name): recordings.text(name) for name in recordings.values},
-        block.text("added") if "added" in block.values else "",
+        _texts(block.block("recordings")),
+        _texts(block.block("measured")) if "measured" in block.values else {},
+        added,
     )
     block.no_more_keys()
     return step
+
+
+def _texts(block: Block) -> dict[str, str]:
+    return {str(name): block.text(name) for name in block.values}
 
 
 def _relative(target: Path, folder: Path) -> str:

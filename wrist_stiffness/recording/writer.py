@@ -18,7 +18,7 @@ from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import Channel, channel_of
 from wrist_stiffness.recording.messages import Message
-from wrist_stiffness.recording.reader import METADATA_FILE
+from wrist_stiffness.recording.reader import METADATA_FILE, open_recording
 
 METADATA_VERSION = 9
 CHUNK_BYTES = 128 * 1024
@@ -44,9 +44,9 @@ class RecordingWriter:
     """Context manager that writes a rosbag2 folder, or one file where the path ends in ``.mcap``.
 
     Messages go to a hidden neighbour of the path, which takes the final name when the ``with``
-    block ends without an exception; otherwise it is removed and nothing is left.  Memory is bounded
-    by one chunk.  The same messages give the same bytes: nothing in the file depends on clock,
-    path or host.
+    block ends without an exception; otherwise it is removed and nothing is left, unless
+    `keep_partial` says so.  Memory is bounded by one chunk.  The same messages give the same bytes:
+    nothing in the file depends on clock, path or host.
 
     Parameters
     ----------
@@ -54,6 +54,9 @@ class RecordingWriter:
         Folder or file to make; its parent must exist.
     overwrite : bool
         Replace an existing recording.  Anything else under that name is never replaced.
+    keep_partial : bool
+        Keep what was written when the disk refuses more, as `NAME.partial` or `NAME.partial.mcap`:
+        what was live comes only once.
 
     Raises
     ------
@@ -61,9 +64,12 @@ class RecordingWriter:
         At the beginning of the ``with`` block, if the path exists or its parent does not.
     """
 
-    def __init__(self, path: str | PathLike[str], *, overwrite: bool = False):
+    def __init__(
+        self, path: str | PathLike[str], *, overwrite: bool = False, keep_partial: bool = False
+    ):
         self.path = Path(path)
         self._overwrite = overwrite
+        self._keep_partial = keep_partial
         self._is_folder = self.path.suffix != ".mcap"
         self._partial = self.path.parent / f".{self.path.name}.{os.getpid()}.partial"
         self._stream: BinaryIO | None = None
@@ -96,12 +102,17 @@ class RecordingWriter:
         Raises
         ------
         RecordingError
-            If the path exists, or its parent does not or is a recording itself.
+            If the path exists, or its parent does not or is a recording itself, or an earlier
+            part is where this one's would be kept.
         """
         if not self.path.parent.is_dir():
             raise RecordingError(f"{self.path}: folder {self.path.parent} does not exist")
         if (self.path.parent / METADATA_FILE).exists():
             raise RecordingError(f"{self.path}: folder {self.path.parent} is a recording itself")
+        if self._keep_partial and self._kept_path.exists():
+            raise RecordingError(
+                f"{self._kept_path} exists already, a part of an earlier recording: move it away"
+            )
         if not self.path.exists():
             return
         if not self._overwrite:
@@ -173,23 +184,50 @@ class RecordingWriter:
         Raises
         ------
         RecordingError
-            If the disk refuses the end, or has refused a message before.
+            If the disk refuses the end, or has refused a message before; says where the part is
+            that was kept.
         """
+        kept = ""
         try:
-            if exception_type is None and self._refused is not None:
-                # What was refused may be written in part: an end behind it makes no whole file.
-                raise self._refused
-            if exception_type is None:
+            # What was refused may be written in part: an end behind it makes no whole file.
+            if exception_type is None and self._refused is None:
                 self._finish()
         except OSError as error:
-            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+            self._refused = error
         finally:
             if self._stream is not None:
-                # Of a finished recording nothing is left to write; of another nothing is kept.
+                # Of a finished recording nothing is left to write.
                 with suppress(OSError):
                     self._stream.close()
                 self._stream = None
-            _remove(self._partial)
+            if self._refused is not None and self._keep_partial:
+                kept = self._keep()
+            # A disk that is read-only refuses to remove even what is not there.
+            with suppress(OSError):
+                _remove(self._partial)
+        told = exception is None or exception.__cause__ is self._refused
+        if self._refused is not None and told:
+            raise RecordingError(
+                f"{self.path} cannot be written: {self._refused.strerror}{kept}"
+            ) from self._refused
+
+    def _keep(self) -> str:
+        """Give what can be read of a refused recording a name that is seen, and say which."""
+        with suppress(RecordingError, OSError):
+            if self._is_folder:
+                # It is written last: if at all, then not whole.
+                (self._partial / METADATA_FILE).unlink(missing_ok=True)
+            if count := sum(topic.count for topic in open_recording(self._partial).topics):
+                self._partial.rename(self._kept_path)
+                return f"; the first {count} messages are kept in {self._kept_path}"
+        return ""
+
+    @property
+    def _kept_path(self) -> Path:
+        name = self.path.name
+        return self.path.with_name(
+            f"{name}.partial" if self._is_folder else f"{self.path.stem}.partial.mcap"
+        )
 
     @property
     def _storage_path(self) -> Path:

@@ -77,6 +77,8 @@ TOPICS: dict[str, type[Message]] = {
 class Recorder(Node):
     """Records until it is told to stop; the recording then takes its name.
 
+    When the disk is full it ends, and says under which name it kept what it had written.
+
     Raises
     ------
     InputError
@@ -95,7 +97,7 @@ class Recorder(Node):
         self._looking = self.create_timer(1.0 / LOOKS_PER_S, self._look)
         # Last, so that nothing can fail between the opening and `destroy_node`.
         self._recording = ExitStack()
-        self._writer = self._recording.enter_context(RecordingWriter(output))
+        self._writer = self._recording.enter_context(RecordingWriter(output, keep_partial=True))
 
     def _look(self) -> None:
         if not all(self.count_publishers(topic) for topic in self._begin_with):

@@ -25,6 +25,7 @@ from wrist_stiffness.workflows.fit_report import (
 )
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
+    measured_sha256,
     read_sessions,
     recording_sha256,
     was_fitted_to,
@@ -51,7 +52,8 @@ class Run:
     def step(self, parent: str | Path, recordings: Mapping[Path, MeasuredSession]) -> Step:
         """Return the step from a parent's file to its child."""
         hashes = {session.name: recording_sha256(path) for path, session in recordings.items()}
-        return Step(self.command, self.date, file_sha256(parent), hashes)
+        measured = {session.name: measured_sha256(session) for session in recordings.values()}
+        return Step(self.command, self.date, file_sha256(parent), hashes, measured)
 
 
 @dataclass(frozen=True, eq=False)

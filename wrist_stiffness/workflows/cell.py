@@ -116,7 +116,7 @@ def run_cell(
         chosen["model_file"] = str(Path(model).resolve())
     nodes = [node.having({**chosen, **CELL_PARAMETERS.get(node.name, {})}) for node in WRIST_NODES]
     if record is not None:
-        RecordingWriter(record).check_target()
+        RecordingWriter(record, keep_partial=True).check_target()
         output = {"output": str(Path(record).resolve()), "begin_with": " ".join(SPOKEN)}
         nodes.append(RECORDER_NODE.having(output))
     moves: dict[str, ParameterValue] = {"rate_hz": float(rate_hz), "seed": seed}

@@ -110,8 +110,8 @@ class CellMessages:
 
 
 def _known(part: Array) -> Mask:
-    """Tell of which samples a part (n, ...) of the pose was measured, (n,)."""
-    return np.asarray(np.isfinite(part).reshape(len(part), -1).all(axis=1))
+    """Tell of which samples a part (n, ...) of the pose was measured, (n,): whole or not."""
+    return np.isfinite(part.reshape(len(part), -1)[:, 0])
 
 
 class _Stream:

@@ -21,7 +21,12 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.provenance import Provenance
-from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, recording_sha256
+from wrist_stiffness.workflows.read_sessions import (
+    Recordings,
+    read_sessions,
+    recording_sha256,
+    was_fitted_to,
+)
 
 Progress = Callable[[int, int], None]
 
@@ -184,11 +189,7 @@ def compare(
         loaded, list(sessions.values()), np.random.default_rng(SEED), progress("comparing")
     )
     hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
-    fitted_here = tuple(
-        name
-        for name, model in loaded
-        if any(set(step.recordings.values()) & set(hashes.values()) for step in model.lineage)
-    )
+    fitted_here = tuple(name for name, model in loaded if was_fitted_to(model, sessions))
     files = {name: file_sha256(path) for name, path in zip(names, models, strict=True)}
     return Compared(
         comparison,

@@ -55,6 +55,10 @@ def node_settings(
     content = {} if path is None else read_yaml(path, InputError)
     if not isinstance(content, Mapping):
         raise InputError(f"{path}: not a ROS 2 parameter file, expected nodes by name")
+    if path is not None and not any(
+        isinstance(block, Mapping) and KEY in block for block in content.values()
+    ):
+        raise InputError(f"{path}: not a ROS 2 parameter file, no node in it has {KEY}")
     names = dict(zip(("motor_1_joint", "motor_2_joint"), joints, strict=False))
     predictor = _values(path, content, PREDICTOR, (*COMMON, *PREDICTION))
     corrector = _values(path, content, CORRECTOR, (*COMMON, *CORRECTION))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -67,7 +67,7 @@ def read_sessions(
     """
     paths, motors = recordings_in(recordings.paths), recordings.settings.motors
     found: dict[Path, MeasuredSession] = {}
-    first: dict[bytes, Path] = {}
+    first: dict[str, Path] = {}
     for done, path in enumerate(paths):
         progress(done, len(paths))
         session = read_session(
@@ -78,7 +78,7 @@ def read_sessions(
             frames=recordings.settings.frames,
             load_age_limit_s=recordings.settings.load_age_limit_s,
         )
-        same = first.setdefault(_what_was_measured(session), path)
+        same = first.setdefault(measured_sha256(session), path)
         if same == path:
             found[path] = _with_remarks(session, _without_meaning(session))
         else:
@@ -91,14 +91,6 @@ def read_sessions(
         for path, session in found.items()
     }
     return dict(sorted(named.items(), key=lambda item: float(item[1].block.time[0])))
-
-
-def _what_was_measured(session: MeasuredSession) -> bytes:
-    """Return what no other session can have: when which pose was measured, to the bit."""
-    rows = session.measured.any(axis=1)
-    poses = np.hstack([session.shift[rows], session.rotation[rows].reshape(-1, 9)])
-    said = np.column_stack([session.block.time[rows], np.nan_to_num(poses)])
-    return hashlib.sha256(said.tobytes()).digest()
 
 
 def _with_remarks(session: MeasuredSession, remarks: Sequence[str]) -> MeasuredSession:
@@ -118,10 +110,25 @@ def _without_meaning(session: MeasuredSession) -> list[str]:
     ]
 
 
-def was_fitted_to(model: ErrorModel, recordings: Iterable[Path]) -> bool:
-    """Tell whether a model was fitted to one of these recordings, whatever they are called now."""
-    known = {sha256 for step in model.lineage for sha256 in step.recordings.values()}
-    return any(recording_sha256(path) in known for path in recordings)
+def was_fitted_to(model: ErrorModel, sessions: Mapping[Path, MeasuredSession]) -> bool:
+    """Tell whether a model was fitted to one of these sessions, or to a copy or replay of one."""
+    known = {
+        sha256
+        for step in model.lineage
+        for sha256 in (*step.recordings.values(), *step.measured.values())
+    }
+    return bool(known) and any(
+        measured_sha256(session) in known or recording_sha256(path) in known
+        for path, session in sessions.items()
+    )
+
+
+def measured_sha256(session: MeasuredSession) -> str:
+    """Return the SHA-256 of what no other session has: when which pose was measured, to the bit."""
+    rows = session.measured.any(axis=1)
+    poses = np.hstack([session.shift[rows], session.rotation[rows].reshape(-1, 9)])
+    said = np.column_stack([session.block.time[rows], np.nan_to_num(poses)])
+    return hashlib.sha256(said.tobytes()).hexdigest()
 
 
 def recording_sha256(path: Path) -> str:

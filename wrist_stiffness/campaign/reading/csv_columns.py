@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
+from math import inf
 
 from wrist_stiffness.errors import InputError
 
@@ -28,6 +29,12 @@ SIGNIFICANT = (15, 16, 17)
 """Digits tried; seventeen tell any double, and what somebody typed mostly has fewer."""
 
 NANOSECONDS = Decimal(1_000_000_000)
+
+TURN_DEG = 360.0
+LARGEST_LOAD = 10_000.0
+"""No wrist carries a tonne [N, N m]."""
+
+TEMPERATURES_DEGC = (-273.15, 1000.0)
 
 STEM = re.compile(r"(motor_[12]|[fm][xyz]|[xyz]|q[xyzw]|p\d+[xyz])(_.*)?", re.IGNORECASE)
 """What a column of the load or of the pose begins with: never that of a covariate."""
@@ -159,9 +166,11 @@ def _markers(header: Sequence[str]) -> int:
 def reader_of(column: str) -> Callable[[str], float]:
     """Return the function from the text of a column to its number in SI, rounded once.
 
-    It raises ValueError where the text is no finite number.
+    It raises ValueError where the text is no finite number, or one that cannot be.
     """
-    factor = FACTORS.get(column.rpartition("_")[2])
+    unit = column.rpartition("_")[2]
+    factor = FACTORS.get(unit)
+    lower, upper = _possible(column)
 
     def read(text: str) -> float:
         try:
@@ -170,9 +179,23 @@ def reader_of(column: str) -> Callable[[str], float]:
             raise ValueError(f"{text!r} is no number") from error
         if not exact.is_finite():
             raise ValueError(f"{text!r} is not finite")
+        if not lower <= exact <= upper:
+            raise ValueError(f"{text} is outside {lower:g} to {upper:g} {unit}")
         return float(exact if factor is None else EXACT.multiply(exact, factor))
 
     return read
+
+
+def _possible(column: str) -> tuple[float, float]:
+    """Return the limits, in the column's unit, beyond which no wrist is: a wrong unit or a slip.
+
+    Those of a certain wrist are its table's, and looked at where recordings are read.
+    """
+    if column in MOTORS:
+        return -TURN_DEG, TURN_DEG
+    if column in LOAD:
+        return -LARGEST_LOAD, LARGEST_LOAD
+    return TEMPERATURES_DEGC if TEMPERATURE.fullmatch(column) else (-inf, inf)
 
 
 def writer_of(column: str) -> Callable[[float], str]:

@@ -26,6 +26,8 @@ from wrist_stiffness.campaign.searching.place import Place
 from wrist_stiffness.campaign.searching.possible import possible
 from wrist_stiffness.campaign.searching.refit import (
     Refitted,
+    explained,
+    foretold,
     refit,
     rejudged,
     sized,
@@ -151,10 +153,16 @@ def diagnose_sessions(
     parts = contributions(suspected, {each.name for each in kept})
     parts = ranked([*parts, *possible(suspected, search.catalogue)])
     observed = base.left(with_extras=False)
-    result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
     if kept and len(kept) == len(named) and result.verdict == "unknown":
         limit = (settings or Settings()).unexplained_share
-        result = _settled(result, search, final, ask, limit)
+
+        def by_laws(found: Diagnosis) -> Diagnosis:
+            if judged.stages:
+                return found
+            return explained(rejudged(found, foretold(fitter, final, kept, share)), kept)
+
+        result = _settled(result, search, final, ask, limit, by_laws)
+    result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
     return WristDiagnosis(result, observed, kept, final, suspected, parts, absorbed)
 
 
@@ -236,16 +244,24 @@ def _confirmed(found: Diagnosis, name: str, beside: Diagnosis) -> Diagnosis:
 
 
 def _settled(
-    result: Diagnosis, search: Search, final: BaseFit, ask: Ask, limit: float
+    result: Diagnosis,
+    search: Search,
+    final: BaseFit,
+    ask: Ask,
+    limit: float,
+    by_laws: Callable[[Diagnosis], Diagnosis],
 ) -> Diagnosis:
-    """Return an answer that says what the laws leave, fitted whole, instead of their slopes."""
+    """Return an answer that says what the laws leave, fitted whole, instead of their slopes.
+
+    Then its errors are told `by_laws` too: a bushing fifty times as soft has other slopes.
+    """
     left = ask(search.after(final))
     if left.findings:
         return result
     share = left.unexplained.energy_share * min(final.cost / search.first_cost, 1.0)
     verdict = "unknown" if share >= limit else "effect"
     unexplained = replace(left.unexplained, energy_share=share)
-    return replace(result, verdict=verdict, unexplained=unexplained)
+    return by_laws(replace(result, verdict=verdict, unexplained=unexplained))
 
 
 def _together(found: Diagnosis, beside: Diagnosis) -> Diagnosis:

@@ -96,6 +96,29 @@ def refit(
     return Refitted(fitted, (*stages, trial) if kept else ())
 
 
+def foretold(
+    fitter: Fitter, fitted: BaseFit, named: Sequence[Effect], sealed_share: float
+) -> tuple[HeldOut, ...]:
+    """Return the stages of a fit that was not judged by them, as `Refitted` has them.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        As fitted it.
+    fitted : BaseFit
+        To all units along with all that was named.
+    named : sequence of Effect
+        In the order of entry.
+    sealed_share : float
+        Part of a single session that is put aside.
+    """
+    sessions = fitted.problem.sessions
+    aside = sealed_units(fitted.problem.table, sealed_share)
+    seen = blanked(sessions, aside)
+    fits = [fitter(seen), *(fitter(seen, named[: n + 1], fitted) for n in range(len(named)))]
+    return tuple(unseen(each, sessions, aside, fitted) for each in fits)
+
+
 def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
     sessions = base.problem.sessions
     if not named:
@@ -277,6 +300,28 @@ def rejudged(result: Diagnosis, stages: Sequence[HeldOut]) -> Diagnosis:
         after={q.key: stages[-1].rmse(q) for q in reported},
         findings=findings,
     )
+
+
+def explained(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
+    """Return a rejudged answer whose findings say what their laws explain, not their slopes.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        Rejudged by stages.
+    effects : sequence of Effect
+        What was fitted for each of its findings.
+    """
+    told = [
+        replace(
+            each,
+            evidence=f"{effect.law.sentence.format(place=effect.component)}: its own law explains "
+            f"{100.0 * max(1.0 - each.heldout_rmse_ratio**2, 0.0):.1f} % of what is left without "
+            "it of the part put aside",
+        )
+        for each, effect in zip(result.findings, effects, strict=True)
+    ]
+    return replace(result, findings=tuple(told))
 
 
 def _key(fitted: BaseFit, number: int) -> tuple[str, str, int | None]:
