@@ -112,6 +112,7 @@ class Wrist:
             residual=residual,
             strain=cost,
             strained=cost in self.strained,
+            variance=cost / NUMBERS,
         )
 
     def reached(self, *names, first=0.0):
@@ -236,6 +237,35 @@ def test_the_base_alone_is_fitted_again_from_where_the_search_led(wrist, again, 
     search = Search(wrist, ())
     assert search.strained == (cost == 1000)
     assert search.thorough().base.cost == cost
+
+
+@pytest.mark.parametrize(("again", "begun"), [(640, 640), (660, 1000)])
+def test_the_search_begins_again_where_a_wrong_flange_had_caught_the_base(wrist, again, begun):
+    """Out of its hold the base alone explains half of what an effect had seemed to explain."""
+    wrist.left, wrist.afresh = leaves(alone=again, b=300), leaves(alone=1000)
+    assert Search(wrist, ()).first_cost == begun
+
+
+def test_a_base_that_leaves_very_much_did_not_give_way(wrist):
+    """It does not pass for what it leaves: then only the best play is begun from the drawing."""
+    wrist.left, wrist.strained = (
+        leaves(alone=ROUGH * NUMBERS),
+        {ROUGH * NUMBERS, 1 + ROUGH * NUMBERS},
+    )
+    assert wrist.reached().gave_way
+    wrist.left = leaves(alone=1 + ROUGH * NUMBERS)
+    assert not wrist.reached().gave_way
+
+
+@pytest.mark.parametrize(
+    ("alone", "strained", "cost"),
+    [(500, True, 120), (500, False, 498), (140, True, 138), (1100, True, 1098)],
+)
+def test_play_is_begun_from_the_drawing_where_the_base_gave_way(wrist, alone, strained, cost):
+    """It had taken up so much of the play that no pin finds back from there."""
+    wrist.left, wrist.beside = leaves(alone=alone, p=alone - 2, w=50), leaves(p=120)
+    wrist.strained = {alone} if strained else set()
+    assert Search(wrist, ()).thorough().fits[PLAY].cost == cost
 
 
 @pytest.mark.parametrize(("cable", "much"), [(-1, True), (1, False)])

@@ -247,7 +247,7 @@ def laws(monkeypatch):
 
     Other energies of these are listed by names, and costs, `anew` of fits from the drawing.
     """
-    laws = SimpleNamespace(cost={}, anew={}, energy={})
+    laws = SimpleNamespace(cost={}, anew={}, energy={}, variance=4.0 * refitting.INEXACT)
 
     def fit(sessions, extras=(), start=None, beside=False):
         names = tuple(each.name for each in extras)
@@ -255,8 +255,7 @@ def laws(monkeypatch):
         return SimpleNamespace(
             extras=names,
             cost=costs.get(names, 0.0),
-            residual=np.full((1, 6), 2.0 * np.sqrt(refitting.INEXACT)),
-            whiten=np.ravel,
+            variance=laws.variance,
             problem=SimpleNamespace(sessions=sessions, table=None),
         )
 
@@ -286,9 +285,9 @@ def test_what_entered_last_is_withdrawn_first(laws):
     assert kept.extras == TWO[:1]
 
 
-def test_what_leaves_more_than_the_base_alone_is_judged_by_unseen_units(laws, monkeypatch):
+def test_what_leaves_more_than_the_base_alone_is_judged_by_unseen_units(laws):
     """Slopes named it; its own law ends elsewhere, though that is hardly more than noise."""
-    monkeypatch.setattr(refitting, "_variance", lambda fitted: 1.0)
+    laws.variance = 1.0
     laws.cost = laws.anew = {(): 100.0, TWO: 120.0}
     laws.energy = {TWO: 200.0, TWO[:1]: 200.0}
     assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 100.0).base.extras == ()

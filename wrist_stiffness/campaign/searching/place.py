@@ -20,6 +20,9 @@ EXACT = 0.1
 """Share of its size within which a law is taken to be exact here: a gain that what is left of a
 large effect within this share could make draws no further effect in."""
 
+INEXACT = 1.5
+"""Variance of what is left, in units of the noise, from which a law is not taken as exact."""
+
 ROUGH = 10.0
 """Variance of what is left, in units of the noise, from which a fit is also begun from the drawing:
 a base that gave way to a large effect does not find back."""
@@ -79,6 +82,11 @@ class Reached:
     def rough(self) -> bool:
         """Whether so much is left that a fit is begun from the drawing as well."""
         return self.base.cost > ROUGH * float(self.base.problem.table.measured.sum())
+
+    @property
+    def gave_way(self) -> bool:
+        """Whether the base went far to explain what it leaves all the same."""
+        return self.base.strained and self.base.variance > INEXACT and not self.rough
 
     @property
     def effects(self) -> dict[str, Effect]:

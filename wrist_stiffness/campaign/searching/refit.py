@@ -17,7 +17,7 @@ from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit
 from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.campaign.searching.fitter import Fitter
-from wrist_stiffness.campaign.searching.seeking import INEXACT
+from wrist_stiffness.campaign.searching.place import INEXACT
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units
@@ -74,7 +74,7 @@ def refit(
     """
     kept = list(named)
     fitted = _along(fitter, base, kept)
-    exact = _variance(fitted) < INEXACT and fitted.cost < first_cost
+    exact = fitted.variance < INEXACT and fitted.cost < first_cost
     if not kept or (exact and not saw_all):
         return Refitted(fitted)
     sessions = fitted.problem.sessions
@@ -129,7 +129,7 @@ def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
         return min((fitter(sessions, (), each) for each in starts), key=_cost)
     same = {each.name for each in named} == set(base.extras)
     fitted = base if same else fitter(sessions, named, base)
-    if _variance(fitted) >= INEXACT:
+    if fitted.variance >= INEXACT:
         # Flanges and play let a base that took up a large effect not find back: from the drawing.
         fitted = min(fitted, fitter(sessions, named), key=_cost)
     if any(each.law.id in LOOSE for each in named):
@@ -141,12 +141,6 @@ def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
 
 def _cost(fitted: BaseFit) -> float:
     return fitted.cost
-
-
-def _variance(fitted: BaseFit) -> float:
-    """Return the variance of what is left, in units of the noise."""
-    left = fitted.whiten(fitted.residual)
-    return float(left @ left) / max(int(np.count_nonzero(left)), 1)
 
 
 def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:

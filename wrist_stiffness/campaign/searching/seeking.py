@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -16,7 +15,14 @@ from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.searching.fitter import Fitter
-from wrist_stiffness.campaign.searching.place import WORTH, Candidates, Place, Reached, point_of
+from wrist_stiffness.campaign.searching.place import (
+    INEXACT,
+    WORTH,
+    Candidates,
+    Place,
+    Reached,
+    point_of,
+)
 from wrist_stiffness.campaign.searching.screening import Fitted
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -33,8 +39,9 @@ CLOSE, MOST_REFITTED = 0.6, 2
 """So many candidates that gain nearly as much as the best are fitted with the whole base: what the
 base took up of one of them shows only then."""
 
-INEXACT = 1.5
-"""Variance of what is left, in units of the noise, from which a law is not taken as exact."""
+CAUGHT = 0.5
+"""Share of what effects seem to explain from which on it is the base's own: a wrong flange had
+caught it at first, and what is found at such a place stands in for that."""
 
 MOST_TRIED = 3
 """So many candidates are fitted with the whole base before a step is given up."""
@@ -69,14 +76,22 @@ class Search:
 
     def __init__(self, fitter: Fitter, sessions: Sessions) -> None:
         self._fitter = fitter
-        base = self._fitter(sessions)
+        self._begin(self._fitter(sessions))
+        explained = self._first.base.cost - self._reached.base.cost
+        if self._first.base.cost - self._alone.base.cost > CAUGHT * explained > 0.0:
+            self._begin(self._alone.base)
+
+    def _begin(self, base: BaseFit) -> None:
+        """Search from a base alone."""
         self._first = Reached(base, {}, base.cost)
         self._catalogue = self._at(self._first)
         self._reached = _extended(self._fitter, self._first, self._catalogue)
+        self._alone = self._again()
 
-    @cached_property
-    def _alone(self) -> Reached:
-        """The base alone, from where the search led: a wrong flange may have caught it before."""
+    def _again(self) -> Reached:
+        """Return the base alone from where the search led: a wrong flange may have caught it."""
+        if self._reached is self._first:
+            return self._first
         sessions = self._first.base.problem.sessions
         again = self._fitter(sessions, (), self._reached.base)
         if again.cost > self._first.base.cost - WORTH:
@@ -184,11 +199,15 @@ class Search:
         """Fit play to its end where it explains most, and put it in its place.
 
         What it leaves where the base's slopes do not know of it would be taken for an effect.
-        Where very much is left these lead nowhere: then it is begun from the drawing as well.
+        Where very much is left these lead nowhere: then it is begun from the drawing as well.  So
+        is all play where the base gave way to something: from there no pin finds its play.
         """
         loose = [e for e in trials if any(f.law.id in LOOSE for f in trials[e].effects.values())]
         if not loose:
             return
+        if self._alone.gave_way:
+            for each in loose:
+                trials[each] = self._from_the_drawing(trials[each])
         name = min(loose, key=lambda each: trials[each].total)
         best = trials[name]
         if best.total > min(each.total for each in trials.values()) and not best.rough:
@@ -198,6 +217,12 @@ class Search:
         ends = [self._fitter(sessions, extras, start, beside=True) for start in starts]
         fits = [best, *(replace(best, base=base) for base in ends)]
         trials[name] = min(fits, key=lambda each: each.total)
+
+    def _from_the_drawing(self, reached: Reached) -> Reached:
+        """Return the better of a fit and of the same begun from the drawing, beside its play."""
+        sessions, extras = reached.base.problem.sessions, list(reached.effects.values())
+        afresh = replace(reached, base=self._fitter(sessions, extras, beside=True))
+        return min(reached, afresh, key=lambda each: each.total)
 
     def beside(self, base: BaseFit, laws: Collection[str] | None = None) -> Place:
         """Return the place where everything that was fitted along with a base is known.
