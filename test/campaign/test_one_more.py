@@ -259,7 +259,7 @@ def test_a_base_that_leaves_very_much_did_not_give_way(wrist):
 
 @pytest.mark.parametrize(
     ("alone", "strained", "cost"),
-    [(500, True, 120), (500, False, 498), (140, True, 138), (1100, True, 1098)],
+    [(500, True, 120), (500, False, 498), (140, True, 138)],
 )
 def test_play_is_begun_from_the_drawing_where_the_base_gave_way(wrist, alone, strained, cost):
     """It had taken up so much of the play that no pin finds back from there."""
