@@ -93,3 +93,7 @@ def test_where_laws_leave_more_than_noise_the_data_say_less(fitted, catalogue):
     rough = replace(fitted, residual=10.0 * fitted.residual)
     (sure,), (doubtful,) = possible(fitted, [play]), possible(rough, [play])
     assert doubtful.sizes["phi_mdeg"][1] > 5.0 * sure.sizes["phi_mdeg"][1]
+
+
+def test_where_a_wrist_has_every_effect_already_nothing_else_is_possible(fitted):
+    assert possible(fitted, []) == ()

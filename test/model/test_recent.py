@@ -5,6 +5,8 @@ import pytest
 
 from wrist_stiffness.model import batch
 from wrist_stiffness.model.batch import MOST_KEPT, Recent
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.law import Law
 
 CHUNK = 8
 
@@ -58,3 +60,31 @@ def test_of_a_long_block_only_its_first_chunks_are_kept(model, make, evaluated):
     (again,) = model.batch_with(block, [(creeping,)], recent=recent)
     assert len(evaluated) == 2
     assert alike(again, at_first)
+
+
+class Counting(Law):
+    """A user's own law that writes into its state: the platform turns on with every sample."""
+
+    id = "counting"
+    stage = "geometry"
+    places = ("platform",)
+    sentence = check = excited_by = ""
+
+    def parameters(self, place):
+        return ()
+
+    def advance(self, at, place, values, state):
+        state = np.zeros(1) if state is None else state
+        turned = state + 1e-6 * np.arange(1, len(at.block) + 1)
+        state[:] = turned[-1]
+        return at.screw(place, np.outer(turned, [0, 0, 0, 0, 0, 1])), state
+
+
+def test_what_a_users_own_law_did_is_not_kept_for_it_may_write_into_its_state(
+    model, make, evaluated
+):
+    """Behind the chunks that are kept its state was that of the last time's end."""
+    block, recent = make.block((MOST_KEPT + 2) * CHUNK), Recent()
+    counting = Effect(Counting(), "platform")
+    first, again = (model.batch_with(block, [(counting,)], recent=recent)[0] for _ in range(2))
+    assert alike(first, again)

@@ -55,7 +55,11 @@ def _same(one: Evaluable, other: Evaluable) -> bool:
         one.table is other.table
         and one.evaluation == other.evaluation
         and len(one.effects) == len(other.effects)
-        and all(own is its for own, its in zip(one.effects, other.effects, strict=True))
+        # A user's own law may write into its state: what it did cannot be begun from again.
+        and all(
+            own is its and not own.law.foreign
+            for own, its in zip(one.effects, other.effects, strict=True)
+        )
     )
 
 

@@ -92,7 +92,7 @@ class RecordingWriter:
             # A signal may end the program here, before the `with` block has begun.
             self.__exit__(type(error), error, error.__traceback__)
             if isinstance(error, OSError):
-                raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+                raise self._refusal(error) from error
             raise
         return self
 
@@ -155,10 +155,14 @@ class RecordingWriter:
         Raises
         ------
         RecordingError
-            If the topic has another type, the time is out of range or the disk refuses.
+            If the topic has another type, the time is out of range or the disk refuses, or has
+            refused a message before.
         """
         if self._stream is None:
             raise RecordingError(f"{self.path}: written to outside of its `with` block")
+        if self._refused is not None:
+            # Nothing behind a torn chunk can be read.
+            raise self._refusal(self._refused) from self._refused
         if not 0 <= log_time_ns <= _LAST_TIME_NS:
             raise RecordingError(
                 f"{channel.topic}: log time {log_time_ns} ns is outside 0 … {_LAST_TIME_NS}"
@@ -168,7 +172,7 @@ class RecordingWriter:
             self._mcap.add_message(channel_id, log_time_ns, payload, publish_time=log_time_ns)
         except OSError as error:
             self._refused = error
-            raise RecordingError(f"{self.path} cannot be written: {error.strerror}") from error
+            raise self._refusal(error) from error
         self._counts[channel.topic] += 1
         self._first_ns = min(self._first_ns, log_time_ns)
         self._last_ns = max(self._last_ns, log_time_ns)
@@ -207,9 +211,7 @@ class RecordingWriter:
                 _remove(self._partial)
         told = exception is None or exception.__cause__ is self._refused
         if self._refused is not None and told:
-            raise RecordingError(
-                f"{self.path} cannot be written: {self._refused.strerror}{kept}"
-            ) from self._refused
+            raise self._refusal(self._refused, kept) from self._refused
 
     def _keep(self) -> str:
         """Give what can be read of a refused recording a name that is seen, and say which."""
@@ -221,6 +223,9 @@ class RecordingWriter:
                 self._partial.rename(self._kept_path)
                 return f"; the first {count} messages are kept in {self._kept_path}"
         return ""
+
+    def _refusal(self, error: OSError, kept: str = "") -> RecordingError:
+        return RecordingError(f"{self.path} cannot be written: {error.strerror}{kept}")
 
     @property
     def _kept_path(self) -> Path:

@@ -43,6 +43,8 @@ def possible(fitted: BaseFit, catalogue: Sequence[WristCandidate]) -> tuple[Cont
     """
     whole = Decomposed(fitted)
     absent = [each for each in catalogue if each.name not in whole.names]
+    if not absent:
+        return ()
     screen = Screen(fitted, point_of(fitted), variance=max(1.0, fitted.variance))
     names, usual = [], []
     for _, each, shape in screen.leaders(absent):
