@@ -13,6 +13,7 @@ from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_ca
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import WORTH, Reached, point_of
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
@@ -155,6 +156,17 @@ def test_of_the_catalogue_those_laws_are_tried_that_are_asked_for(alone, candida
     asked = ("backlash", "time_delay")
     found = [each.name for each in wrist_candidates(point_of(alone), (), {}, asked)]
     assert found == [each.name for each in candidates if each.law.id in asked] != []
+
+
+@pytest.mark.parametrize("scale", [np.inf, 0.0])
+def test_a_law_of_another_package_must_say_how_large_it_usually_is(alone, monkeypatch, scale):
+    """What it explains would be no number, and the order of the candidates chance."""
+    law = find_law("backlash")
+    (width,) = law.parameters("motor_1")
+    monkeypatch.setattr(law, "parameters", lambda place: (replace(width, scale=scale),))
+    said = f"backlash@motor_1: width_mdeg has the scale {scale:g}; a diagnosis needs its usual"
+    with pytest.raises(InputError, match=said):
+        wrist_candidates(point_of(alone), (), {}, ("backlash",))
 
 
 def test_motors_can_turn_back_what_points_the_platform_elsewhere():

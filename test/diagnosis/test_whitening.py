@@ -107,3 +107,14 @@ def test_columns_are_whitened_alike_one_after_the_other_and_together(rng, two_se
     columns = rng.normal(size=(12, 1, 3))
     each = np.hstack([whiten(columns[:, :, [k]]) for k in range(3)])
     np.testing.assert_allclose(whiten(columns), each, rtol=1e-13)
+
+
+def test_clocks_that_begin_anew_with_each_session_are_as_good_as_one(rng):
+    """As tables have them, each from zero; the first day was a thousand wanders long."""
+    times, sessions = np.tile(1000.0 * TIME * np.arange(6.0), 2), np.repeat([0, 1], 6)
+    columns, shares = rng.normal(size=(12, 1, 3)), some_shares(rng, 12)
+    anew, on = (
+        Wander.of(np.ones((12, 1), bool), each, sessions, shares, TIME)(columns)
+        for each in (times, times + 1e5 * sessions)
+    )
+    np.testing.assert_array_equal(anew, on)

@@ -238,11 +238,15 @@ def test_a_recording_of_which_a_message_was_refused_is_not_finished(tmp_path, na
 def test_after_a_refusal_nothing_is_taken_that_could_not_be_read(tmp_path, name, grown_files):
     """A live recording takes what it has heard meanwhile, and somebody may have made room."""
     writer = RecordingWriter(tmp_path / name, keep_partial=True)
+
+    def fill():
+        for n in range(1, 501):
+            writer.write("/recording_notes", noise(1000, seed=n), n)
+
     writer.__enter__()
     grown_files(2 * CHUNK_BYTES)
     with pytest.raises(RecordingError, match="File too large"):
-        for n in range(1, 501):
-            writer.write("/recording_notes", noise(1000, seed=n), n)
+        fill()
     hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
     resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
     with pytest.raises(RecordingError, match=f"{name} cannot be written: File too large$"):

@@ -192,7 +192,8 @@ class Wander:
         """
         gap = np.diff(times, prepend=times[0])
         fresh = np.diff(sessions, prepend=sessions[0] - 1) != 0
-        memory = np.where(fresh, 0.0, np.exp(-gap / time_constant))
+        # Clocks of sessions may begin anew, long before the end of the last one.
+        memory = np.exp(-np.where(fresh, np.inf, gap) / time_constant)
         slow = np.where(measured, np.sqrt(share), 0.0)
         total, gain = np.ones_like(slow), np.zeros_like(slow)
         if slow.any():

@@ -14,6 +14,7 @@ from wrist_stiffness.campaign.refitted import SET_UP, TOLERATED
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Candidate, Observations
 from wrist_stiffness.diagnosis import Parameter as Factor
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.transmission_error import HARMONICS, RUN_OUT
@@ -280,6 +281,11 @@ def wrist_candidates(
         Values of some effects, by name, about which their columns are wanted.
     laws : collection of str, optional
         Which of the catalogue; if None, all.
+
+    Raises
+    ------
+    InputError
+        If a law of another package does not say how large it usually is.
     """
     plans = [
         (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
@@ -288,6 +294,8 @@ def wrist_candidates(
         for place in law.places
         if f"{law.id}@{place}" not in absent
     ]
+    for law, place, _ in plans:
+        _require_usual_sizes(law, place)
     trials: dict[tuple[object, ...], int] = {}
     listed: list[Trial] = []
 
@@ -324,6 +332,15 @@ def wrist_candidates(
         seen = f"{law.id}@{place}" in near
         found.append(WristCandidate(law, place, own, known, seen=seen, points=points))
     return tuple(found)
+
+
+def _require_usual_sizes(law: Law, place: str) -> None:
+    for each in law.parameters(place):
+        if not 0.0 < each.scale < np.inf:
+            raise InputError(
+                f"{law.id}@{place}: {each.key} has the scale {each.scale:g}; a diagnosis needs its "
+                "usual size, finite and above 0"
+            )
 
 
 WAVE = "transmission_error"
