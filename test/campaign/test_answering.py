@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.searching.asking import table_of
 from wrist_stiffness.campaign.searching.diagnose import (
     MUCH,
     _answered,
@@ -13,7 +14,6 @@ from wrist_stiffness.campaign.searching.diagnose import (
     _judged,
     _says_more,
     _settled,
-    _table,
 )
 from wrist_stiffness.campaign.searching.place import Place
 from wrist_stiffness.campaign.searching.seeking import PRESSING
@@ -279,7 +279,7 @@ def test_statistics_see_tolerances_about_their_means(known):
         left=table,
     )
     own = built * columns[:, :, 1] + (0.0 if known else moved * columns[:, :, 2])
-    np.testing.assert_allclose(_table(Place(base, (), known=known)), left - own)
+    np.testing.assert_allclose(table_of(Place(base, (), known=known)), left - own)
     assert asked == [known]
 
 

@@ -8,12 +8,11 @@ import pytest
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, free_all
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.campaign.searching.asking import LEAST_WANDER, wander_of
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import SHARE, wrist_candidates
 from wrist_stiffness.campaign.searching.diagnose import (
-    LEAST_WANDER,
     _confirmed,
-    _wander,
     diagnose_sessions,
 )
 from wrist_stiffness.campaign.searching.place import point_of
@@ -123,7 +122,7 @@ def test_a_candidate_stands_for_a_whole_fit(alone):
 def test_a_wander_is_never_less_than_half_the_scatter_of_a_sample(alone):
     """Rests of two minutes showed 0.05 mdeg where it was 0.3, and the rest was named a drift."""
     (session,) = alone.problem.sessions
-    columns = _wander(alone).columns(alone.problem.table)
+    columns = wander_of(alone).columns(alone.problem.table)
     size = np.sqrt(np.mean(columns[:, :, :6] ** 2, axis=0)).max(axis=1)
     assert np.all(size > 0.6 * LEAST_WANDER * session.white)
 

@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed, as_units
+from wrist_stiffness.campaign.searching.asking import asked
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.contributions import (
@@ -36,21 +36,10 @@ from wrist_stiffness.campaign.searching.refit import (
 )
 from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
-from wrist_stiffness.diagnosis import Diagnosis, Nuisance, Observations, Settings, diagnose
+from wrist_stiffness.diagnosis import Diagnosis, Settings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-
-WANDER_SHARES = (0.7, 0.5, 0.35)
-"""Root mean square of slope, curvature and third order of a wander, against its own."""
-
-LEAST_WANDER = 0.5
-"""Of the scatter of one sample: what repeated rests of a few minutes show of a wander is uncertain,
-and a drift below it is not told from one."""
-
-
-FOUND = ", found"
-"""After the name of an effect that is refitted beside the base, because it is known by now."""
 
 MUCH = 0.25
 """Share of the excess over the noise that is much to be left beside what was named."""
@@ -122,24 +111,20 @@ def diagnose_sessions(
     InputError
         If there is no session, or one without any measured pose.
     """
-    if not sessions:
-        raise InputError("no session to diagnose")
-    for session in sessions:
-        if not (np.isfinite(session.shift).any() or np.isfinite(session.rotation).any()):
-            raise InputError(f"{session.name}: no measured pose in the whole session")
+    _require_poses(sessions)
+    chosen = settings or Settings()
     units = tuple(as_units(model, session) for session in sessions)
     fitter = Fitter(model, tell)
     search = Search(fitter, units)
 
     def ask(place: Place) -> Diagnosis:
         tell("asking chance and resamples")
-        return _asked(place, rng, settings)
-
-    share = (settings or Settings()).sealed_share
+        return asked(place, rng, chosen)
 
     def judge(place: Place, result: Diagnosis) -> Refitted:
         base, named = _begun(place, result)
-        return refit(fitter, base, named, share, search.first_cost, saw_all=bool(place.fits))
+        saw_all = bool(place.fits)
+        return refit(fitter, base, named, chosen.sealed_share, search.first_cost, saw_all)
 
     place, result, judged = _judged(search, ask, judge)
     base, named = _begun(place, result)
@@ -154,16 +139,24 @@ def diagnose_sessions(
     parts = ranked([*parts, *possible(suspected, search.catalogue)])
     observed = base.left(with_extras=False)
     if kept and len(kept) == len(named) and result.verdict == "unknown":
-        limit = (settings or Settings()).unexplained_share
 
         def by_laws(found: Diagnosis) -> Diagnosis:
             if judged.stages:
                 return found
-            return explained(rejudged(found, foretold(fitter, final, kept, share)), kept)
+            stages = foretold(fitter, final, kept, chosen.sealed_share)
+            return explained(rejudged(found, stages), kept)
 
-        result = _settled(result, search, final, ask, limit, by_laws)
+        result = _settled(result, search, final, ask, chosen.unexplained_share, by_laws)
     result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
     return WristDiagnosis(result, observed, kept, final, suspected, parts, absorbed)
+
+
+def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
+    if not sessions:
+        raise InputError("no session to diagnose")
+    for session in sessions:
+        if not (np.isfinite(session.shift).any() or np.isfinite(session.rotation).any()):
+            raise InputError(f"{session.name}: no measured pose in the whole session")
 
 
 def _judged(
@@ -190,10 +183,10 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     result = ask(place)
     strained = search.doubtful if result.findings else search.strained
     # Fits found something else than slopes name, and these do not explain everything.
-    found = search.found != {each.name for each in result.findings}
-    otherwise = found and result.verdict != "effect"
+    others = search.found != {each.name for each in result.findings}
+    otherwise = others and result.verdict != "effect"
     doubted = _leaves_much(result) or strained or otherwise
-    if doubted and search.explained and not (strained or found):
+    if doubted and search.explained and not (strained or others):
         # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
         return replace(place, fits=dict.fromkeys(search.found, place.base)), result
     if doubted or result.verdict == "none":
@@ -223,13 +216,6 @@ def _with_the_first(search: Search, place: Place, ask: Ask) -> Diagnosis:
     if not whole:
         return found
     return _confirmed(found, whole[0], ask(search.beside(place.fits[whole[0]])))
-
-
-def _asked(place: Place, rng: np.random.Generator, settings: Settings | None) -> Diagnosis:
-    """Return what the statistics say at a place."""
-    known = tuple(each.candidate() for each in place.candidates)
-    nuisances = _nuisances(place.base, place.known)
-    return diagnose(_table(place), known, nuisances, rng, settings)
 
 
 def _confirmed(found: Diagnosis, name: str, beside: Diagnosis) -> Diagnosis:
@@ -314,56 +300,3 @@ def _with_all(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
     shape = tuple(parameters[each.name][0] for each in candidate.recipe.shape)
     return candidate.effect({name: value for name, (value, _) in parameters.items()}, shape)
-
-
-def _table(place: Place) -> Observations:
-    """Return what is left with the wrist's tolerances at their prior means again, to first order.
-
-    So the priors of the statistics, which lie about zero, are the priors of the wrist.
-    """
-    base = place.base
-    own = base.tolerances if place.known else base.tolerances | base.on_base
-    left = base.left(with_extras=place.known).observations
-    return left.with_values(left.values - base.columns[:, :, own] @ base.z[own])
-
-
-def _nuisances(base: BaseFit, with_extras: bool = False) -> tuple[Nuisance, ...]:
-    """Return the refitted base as columns; registrations, zeros and tare are free anew."""
-    groups: dict[tuple[str, bool], dict[str, list[int]]] = {}
-    for place, unknown in enumerate(base.problem.unknowns):
-        if base.of_base[place] or with_extras:
-            name = base.problem.free[unknown.free].effect.name
-            name += "" if base.of_base[place] else FOUND
-            group = groups.setdefault((name, unknown.session is not None), {})
-            group.setdefault(unknown.key, []).append(place)
-    found = [
-        _nuisance(base, name, per_session, list(keys.values()))
-        for (name, per_session), keys in groups.items()
-    ]
-    return (*found, _wander(base))
-
-
-def _nuisance(base: BaseFit, name: str, per_session: bool, places: list[list[int]]) -> Nuisance:
-    # What is left falls where a prediction rises.  Each session has its own rows.
-    columns = -np.stack([base.columns[:, :, each].sum(axis=2) for each in places], axis=-1)
-    prior = None if per_session else tuple(base.prior_std[[each[0] for each in places]].tolist())
-    return Nuisance(name, lambda units: columns[units.rows], prior, per_session)
-
-
-def _wander(base: BaseFit) -> Nuisance:
-    """Return the instrument's slow wander over a session: it is no drift.
-
-    Legendre polynomials of the time with the sizes that a wander of a minute or so has.
-    """
-    columns = []
-    for session in base.problem.sessions:
-        time = session.mean(session.block.time)[session.measured]
-        span = max(float(np.ptp(time)), 1e-9)
-        wave = legvander(2.0 * (time - time.min()) / span - 1.0, len(WANDER_SHARES))[:, 1:]
-        size = np.maximum(session.wander, LEAST_WANDER * np.nan_to_num(session.white))
-        rise = np.sqrt(2.0 * np.arange(1, len(WANDER_SHARES) + 1) + 1.0) * WANDER_SHARES
-        each = (wave * rise)[:, None, :, None] * np.diag(size)[None, :, None, :]
-        columns.append(each.reshape(len(time), 6, -1))
-    rows = np.concatenate(columns)
-    prior = (1.0,) * rows.shape[2]
-    return Nuisance("slow wander", lambda units: rows[units.rows], prior, per_session=True)
