@@ -52,9 +52,10 @@ class Law(ABC):
         Whether half a second of motion may go through more than one of its waves, so that no mean
         angle stands for what it did.
     state_is_a_guess : bool
-        Whether its state, (n, ...) at n samples, is only where the search for its answer begins: a
-        moment without its past gives the same answer.  It gets the state of the sample before, or
-        what another model has at the same samples.
+        Whether its state tells where the search for its answer begins, which changes the cost
+        alone: it gets the state of the sample before, or what another model has at the same
+        samples.  Such a state has `last`, what the next block gets of it, and `after(before)`, the
+        same beginning with the past of another state: see `pin_rest.Rest`.
     file : path or None
         The Python file of a user's own law.
     """
