@@ -307,6 +307,14 @@ class TestWhatDoesNotHold:
         assert where is search.places["quick"]
         assert names(result) == list(judged.base.extras) == [DELAY]
 
+    def test_they_are_not_asked_again_where_a_whole_fit_does_not_hold(self):
+        quick = answer("unknown", AXIS, share=MORE)
+        search = Asked(quick, answer("effect", DELAY), found=[AXIS], explained=True)
+        where, _, judged = self.judged(search)
+        assert list(where.fits) == [AXIS]
+        assert judged.base.extras == ()
+        assert search.begun == []
+
     def test_where_whole_fits_say_no_more_the_first_answer_stands(self):
         search = Asked(answer("effect", DELAY), answer("none"))
         where, result, judged = self.judged(search)

@@ -258,12 +258,14 @@ def test_a_base_that_leaves_very_much_did_not_give_way(wrist):
 
 
 @pytest.mark.parametrize(
-    ("alone", "strained", "cost"),
-    [(500, True, 120), (500, False, 498), (140, True, 138)],
+    ("alone", "strained", "drawing", "cost"),
+    [(500, True, 120, 120), (500, True, 600, 498), (500, False, 120, 498), (140, True, 120, 138)],
 )
-def test_play_is_begun_from_the_drawing_where_the_base_gave_way(wrist, alone, strained, cost):
+def test_play_is_begun_from_the_drawing_where_the_base_gave_way(
+    wrist, alone, strained, drawing, cost
+):
     """It had taken up so much of the play that no pin finds back from there."""
-    wrist.left, wrist.beside = leaves(alone=alone, p=alone - 2, w=50), leaves(p=120)
+    wrist.left, wrist.beside = leaves(alone=alone, p=alone - 2, w=50), leaves(p=drawing)
     wrist.strained = {alone} if strained else set()
     assert Search(wrist, ()).thorough().fits[PLAY].cost == cost
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from wrist_stiffness.model import pin_rest
+from wrist_stiffness.model import batch, pin_rest
 from wrist_stiffness.model.at_point import end_screws
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.evaluation import evaluate
@@ -95,6 +95,21 @@ def test_a_held_pin_is_in_balance(model, make, monkeypatch, loose, joint):
     centring = SMALL_FORCE / 2.5e-6
     wall = (centring + WALLS[-1] * np.maximum(1.0 - 2.5e-6 / size, 0.0)) * moved
     assert np.allclose(force, wall, atol=1e-4)
+
+
+def test_a_pin_begins_where_another_model_rested_but_has_its_own_past(model, make, monkeypatch):
+    """Bristles stand where they were dragged by this model's friction, not by the other one's."""
+    monkeypatch.setattr(batch, "CHUNK", 10)
+    play = make.effect("joint_clearance@joint_1", clearance_um=5.0)
+    little, much = (
+        (make.effect("joint_friction@joint_3", coefficient=size, preload_N=0.5), play)
+        for size in (0.02, 0.3)
+    )
+    block = make.block(40)
+    beside = model.batch_with(block, [little, much])[1]
+    (alone,) = model.batch_with(block, [much])
+    scale = np.abs(alone.twist).max(axis=0)
+    assert np.all(np.abs(beside.twist - alone.twist) <= 1e-9 * scale)
 
 
 def test_two_joints_hold_a_pin_in_a_stream_as_in_a_recording(model, make):

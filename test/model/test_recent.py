@@ -1,5 +1,7 @@
 """What the first of the last models did at a block, taken over by the next ones at it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,15 @@ def test_a_model_with_another_effect_or_one_more_is_another_one(model, make, eva
     assert len(evaluated) == 3
     assert not alike(found[1], found[0])
     assert not alike(found[2], found[1])
+
+
+@pytest.mark.parametrize("changed", ["evaluation", "table"])
+def test_the_same_effects_on_another_table_are_another_model(model, make, evaluated, changed):
+    block, recent = make.block(CHUNK), Recent()
+    other = {"evaluation": {"evaluation": "spline"}, "table": {"table": replace(model.table)}}
+    for each in (model, replace(model, **other[changed])):
+        each.batch_with(block, [()], recent=recent)
+    assert len(evaluated) == 2
 
 
 def test_of_a_long_block_only_its_first_chunks_are_kept(model, make, evaluated):
