@@ -99,7 +99,10 @@ class UnitSession:
 
     @cached_property
     def known(self) -> dict[Any, Any]:
-        """What models on it found out: which laws have a state, what the last one did."""
+        """What models on it found out, and the next ones need not again: see `SessionModel`.
+
+        Whether a law has a past, by law and place; what the last model did, by `Moments`.
+        """
         return {}
 
     def mean(self, values: Array) -> Array:
