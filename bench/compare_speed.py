@@ -23,8 +23,8 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import compare_models
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file

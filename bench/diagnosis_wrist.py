@@ -17,11 +17,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.seeking import Search
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 

@@ -8,11 +8,11 @@ from dictionary import Dictionary
 from observe import Riddle
 from solvers import Answer, nothing
 
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import Decomposed
 from wrist_stiffness.campaign.searching.place import point_of
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.error_model import ErrorModel
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import SILENT, fit_base, free_base
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
 from wrist_stiffness.simulation.cell import CellSettings
 

@@ -9,7 +9,7 @@ from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
 from wrist_stiffness.campaign.fitting.judge import ANOTHER_SESSION, THIS_SESSION, judged
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import Decomposed
 from wrist_stiffness.campaign.searching.place import point_of
 from wrist_stiffness.campaign.searching.possible import possible
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.simulation.cell import CellSettings
 
 

@@ -6,7 +6,7 @@ import pytest
 from wrist_stiffness.campaign import units as units_module
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import as_units
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.observing import QUANTITIES, as_units
+from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching import refit as refitting
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.fitter import Fitter
@@ -20,6 +20,7 @@ from wrist_stiffness.campaign.searching.refit import (
     unseen,
     withdrawn,
 )
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.model.effect import Effect

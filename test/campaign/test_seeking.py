@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.recipes import effect_at
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching import seeking
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import contributions
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import WORTH, Reached, point_of
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.catalogue import HiddenEffect

@@ -7,7 +7,6 @@ import pytest
 
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, free_all
 from wrist_stiffness.campaign.fitting.problem import FitProblem
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.searching.asking import LEAST_WANDER, wander_of
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import SHARE, wrist_candidates
@@ -16,6 +15,7 @@ from wrist_stiffness.campaign.searching.diagnose import (
     diagnose_sessions,
 )
 from wrist_stiffness.campaign.searching.place import point_of
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.result import Finding, Unexplained
 from wrist_stiffness.model.effect import Effect

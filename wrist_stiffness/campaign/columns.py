@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.observing import UnitSession
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.batch import Recent
 from wrist_stiffness.model.effect import Effect

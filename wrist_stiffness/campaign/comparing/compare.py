@@ -14,7 +14,8 @@ from wrist_stiffness.campaign.comparing.wiring import told_mistake
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
-from wrist_stiffness.campaign.observing import Observed, as_units, predict_units, tabulate
+from wrist_stiffness.campaign.observing import Observed, predict_units, tabulate
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError

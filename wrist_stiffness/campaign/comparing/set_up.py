@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.observing import Observed, UnitSession
+from wrist_stiffness.campaign.observing import Observed
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.diagnosis.observations import Mask
 from wrist_stiffness.diagnosis.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array

@@ -14,7 +14,8 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import sizes
 from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
-from wrist_stiffness.campaign.observing import UnitSession, predict_units, tabulate
+from wrist_stiffness.campaign.observing import predict_units, tabulate
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel

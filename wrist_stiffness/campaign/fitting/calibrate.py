@@ -15,7 +15,7 @@ from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, requi
 from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
-from wrist_stiffness.campaign.observing import UnitSession, as_units
+from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect

@@ -22,8 +22,8 @@ from wrist_stiffness.campaign.fitting.result import Fit, Fitted
 from wrist_stiffness.campaign.fitting.start_search import start_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
-from wrist_stiffness.campaign.observing import UnitSession, as_units
 from wrist_stiffness.campaign.refitted import AXES, TOLERATED
+from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.diagnosis.sealed import bought, refuted
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array

@@ -11,7 +11,8 @@ import numpy as np
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
 from wrist_stiffness.campaign.fitting.shims import GAP, Shims
-from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.campaign.observing import Observed, tabulate
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.diagnosis.observations import Observations
 from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import as_units
 from wrist_stiffness.campaign.planning.timeline import Experiment
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.error_model import ErrorModel
 
 SAME_COUNTS = 1.5

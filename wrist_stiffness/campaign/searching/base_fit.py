@@ -21,7 +21,8 @@ from wrist_stiffness.campaign.fitting.free_effects import (
     within_tolerances,
 )
 from wrist_stiffness.campaign.fitting.problem import FitProblem
-from wrist_stiffness.campaign.observing import Observed, UnitSession, tabulate
+from wrist_stiffness.campaign.observing import Observed, tabulate
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis.shared import Apart, own_covariance
 from wrist_stiffness.mechanism.components import Array

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import Observed, as_units
+from wrist_stiffness.campaign.observing import Observed
 from wrist_stiffness.campaign.searching.asking import asked
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
@@ -36,6 +36,7 @@ from wrist_stiffness.campaign.searching.refit import (
 )
 from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
+from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis import Diagnosis, Settings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect

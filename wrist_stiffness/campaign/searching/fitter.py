@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.result import FAR
-from wrist_stiffness.campaign.observing import QUANTITIES, UnitSession
+from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit
 from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import INEXACT
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units

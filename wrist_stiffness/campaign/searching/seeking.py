@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.observing import UnitSession
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.searching.fitter import Fitter
@@ -24,6 +23,7 @@ from wrist_stiffness.campaign.searching.place import (
     point_of,
 )
 from wrist_stiffness.campaign.searching.screening import Fitted
+from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
