@@ -52,6 +52,7 @@ class Asked:
         self.strained = strains.get("strained", False)
         self.doubtful = strains.get("doubtful", False)
         self.explained = strains.get("explained", False)
+        self.rough = strains.get("rough", False)
         self.places = {
             "quick": place(*found),
             "thorough": place(fits=[AXIS]) if thorough else None,
@@ -59,7 +60,7 @@ class Asked:
             "beside": place(AXIS),
         }
         self.answers = {"quick": quick, "thorough": thorough, "further": further, "beside": beside}
-        self.asked, self.begun = [], []
+        self.asked, self.begun, self.fits = [], [], []
 
     def quick(self):
         return self.places["quick"]
@@ -68,9 +69,10 @@ class Asked:
         self.begun.append("thorough" if laws is None else laws)
         return self.places["thorough"]
 
-    def further(self, names):
+    def further(self, names, fits):
         self.begun.append("further")
-        return self.places["further"]
+        self.fits.append(fits)
+        return None if fits else self.places["further"]
 
     def beside(self, base):
         place = self.places["further" if self.begun[-1] == "further" else "thorough"]
@@ -217,6 +219,25 @@ def test_beside_play_too_everything_is_asked_again():
     _, result = search.answered()
     assert search.asked == ["quick", "further", "beside"]
     assert names(result) == [DELAY, PLAY]
+
+
+def test_beside_what_was_found_so_the_search_goes_on_from_its_fit():
+    quick, more = answer("effect", DELAY), answer("effect", PLAY)
+    search = Asked(quick, further=more, beside=answer("none"), found=[DELAY])
+    search.answered()
+    assert search.fits == [{}, {PLAY: search.places["further"].fits[PLAY]}]
+
+
+@pytest.mark.parametrize(("play", "asked"), [(True, []), (False, ["thorough"])])
+def test_where_very_much_is_left_play_is_sought_beside_what_was_named_first(play, asked):
+    """One by one, in its place, no other law leads anywhere."""
+    quick = answer("unknown", DELAY, share=MORE)
+    more = answer("effect", PLAY if play else AXIS)
+    search = Asked(quick, further=more, beside=answer("none"), found=[DELAY], rough=True)
+    where, result = search.answered()
+    assert [each for each in search.begun if each != "further"] == asked
+    assert names(result) == ([DELAY, PLAY] if play else [DELAY])
+    assert where == ("further" if play else "quick")
 
 
 def test_where_play_is_not_named_the_quick_answer_stands():

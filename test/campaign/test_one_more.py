@@ -10,6 +10,7 @@ from wrist_stiffness.campaign.searching import place, seeking
 from wrist_stiffness.campaign.searching.place import EXACT, ROUGH, WORTH, Reached
 from wrist_stiffness.campaign.searching.screening import Fitted
 from wrist_stiffness.campaign.searching.seeking import INEXACT, Search
+from wrist_stiffness.model.parameters import Parameter
 
 COST = 1000.0
 PRICE = 5.0
@@ -71,6 +72,10 @@ def test_a_step_is_given_up_after_three_fits_that_do_not_pay(whole):
 
 PLAY, CABLE = "joint_clearance@joint_1", "cable_wrench@platform"
 BACKLASH, DELAY, CREEP = "backlash@motor_1", "time_delay@pose_sensor", "creep@joint_1"
+OTHER_PLAY, FRICTION = "joint_clearance@joint_2", "joint_friction@joint_2"
+THIRD_PLAY = "joint_clearance@joint_3"
+UNPROMISED = (PLAY, OTHER_PLAY, THIRD_PLAY, FRICTION, CABLE)
+PARAMETER = Parameter("shape", 0.0, 9.0, 1.0)
 NUMBERS = 100
 """Measured numbers, so what noise alone would leave."""
 
@@ -78,25 +83,26 @@ NUMBERS = 100
 class Wrist:
     """Stands for a fitter: knows what is left along with any effects.
 
-    `afresh` and `beside` say what else is left of fits from the drawing, and beside play; `done`
-    lists the fits in turn.  What columns promise is what whole fits keep, where `promised` does not
-    list it; no tangent shows play and friction.
+    `afresh`, `beside` and `rounded` say what else is left of fits from the drawing, beside play,
+    and with rounded walls; `done` lists the fits in turn.  What columns promise is what whole fits
+    keep, where `promised` does not list it; no tangent shows play and friction.
     """
 
     model = None
 
     def __init__(self):
-        self.left, self.afresh, self.beside = {}, {}, {}
-        self.promised = {PLAY: 0.0, CABLE: 0.0}
+        self.left, self.afresh, self.beside, self.rounded = {}, {}, {}, {}
+        self.promised = dict.fromkeys(UNPROMISED, 0.0)
         self.done, self.strained, self.unmeasured = [], set(), []
 
     def tell(self, text):
         """Nobody listens."""
 
-    def __call__(self, sessions, extras=(), start=None, beside=False):
+    def __call__(self, sessions, extras=(), start=None, beside=False, rounded=False):
         names = frozenset(each.name for each in extras)
-        self.done.append((names, start, beside))
+        self.done.append((names, start, "rounded" if rounded else beside))
         how = self.beside if beside else self.afresh if start is None else {}
+        how = self.rounded if rounded else how
         return self.base(how.get(names, self.left[names]), extras)
 
     def base(self, cost, extras=()):
@@ -140,8 +146,9 @@ class Wrist:
 
 def effect(name):
     law, component = name.split("@")
+    own = SimpleNamespace(id=law, parameters=lambda place: (PARAMETER,))
     return SimpleNamespace(
-        name=name, law=SimpleNamespace(id=law), component=component, estimates={}
+        name=name, law=own, component=component, parameters=(PARAMETER,), estimates={}
     )
 
 
@@ -149,6 +156,7 @@ def candidate(name, **whole):
     return SimpleNamespace(
         name=name,
         law=effect(name).law,
+        place=effect(name).component,
         effect_of=lambda values: effect(name),
         changed_by=lambda change, strain: candidate(name, change=change, strain=strain),
         **whole,
@@ -173,7 +181,11 @@ def wrist(monkeypatch):
     return wrist
 
 
-LETTERS = {"b": BACKLASH, "c": CREEP, "d": DELAY, "p": PLAY, "w": CABLE}
+LETTERS = {"b": BACKLASH, "c": CREEP, "d": DELAY, "p": PLAY, "w": CABLE} | {
+    "f": FRICTION,
+    "q": OTHER_PLAY,
+    "t": THIRD_PLAY,
+}
 
 
 def leaves(**kept):
@@ -373,10 +385,10 @@ def test_a_base_that_is_strained_beside_what_was_found_is_doubted(wrist, first, 
 def test_play_is_tried_beside_what_was_named_alone(wrist):
     """What only slopes named would bear what play leaves."""
     wrist.left = leaves(alone=1000, b=600, d=800, bd=300, bp=250, bdp=290)
-    wrist.beside = leaves(bp=240)
+    wrist.rounded, wrist.beside = leaves(bp=280), leaves(bp=240)
     search = Search(wrist, ())
     assert search.found == {BACKLASH, DELAY}
-    place = search.further([BACKLASH])
+    place = search.further([BACKLASH], {})
     assert place.known
     assert place.base.extras == (BACKLASH,)
     assert {name: set(fit.extras) for name, fit in place.fits.items()} == {PLAY: {BACKLASH, PLAY}}
@@ -400,13 +412,42 @@ def test_play_is_tried_only_where_more_than_noise_is_left(wrist, share, tried):
     left = share * INEXACT * NUMBERS
     wrist.left = leaves(alone=1000, b=left, bp=left - 60)
     search = Search(wrist, ())
-    assert (search.further([BACKLASH]) is not None) == tried
+    assert (search.further([BACKLASH], {}) is not None) == tried
     assert any(PLAY in names for names, _, _ in wrist.done) == tried
+
+
+def test_of_several_plays_the_two_that_lead_with_rounded_walls_are_fitted_as_they_are(wrist):
+    """Rounded walls tell which leads, in a third of the time."""
+    wrist.left = leaves(alone=1000, b=500, bp=400, bq=400, bt=400)
+    wrist.rounded = leaves(bp=300, bq=250, bt=350)
+    wrist.beside = leaves(bp=200, bq=260)
+    place = Search(wrist, ()).further([BACKLASH], {})
+    assert {name: fit.cost for name, fit in place.fits.items()} == {PLAY: 200, OTHER_PLAY: 260}
+
+
+def test_what_rounded_walls_promise_and_the_law_does_not_keep_is_no_answer(wrist):
+    wrist.left = leaves(alone=1000, b=500, bp=600)
+    wrist.rounded, wrist.beside = leaves(bp=200), leaves(bp=490)
+    assert Search(wrist, ()).further([BACKLASH], {}) is None
+
+
+@pytest.mark.parametrize(("share", "tried"), [(0.9, False), (1.1, True)])
+def test_a_joint_that_rubs_is_tried_beside_play_that_leaves_very_much(wrist, share, tried):
+    """What it holds off its wall is no play, and alone it explains little."""
+    left = share * ROUGH * NUMBERS
+    wrist.left = leaves(alone=5000, b=4000, bp=left, bpf=left / 2, bpq=5000)
+    search = Search(wrist, ())
+    fit = wrist.reached(BACKLASH, PLAY).base
+    place = search.further([BACKLASH, PLAY], {PLAY: fit})
+    assert any(FRICTION in names for names, _, _ in wrist.done) == tried
+    if tried:
+        assert place.base is fit
+        assert set(place.fits) == {FRICTION}
 
 
 def test_play_that_explains_nothing_beside_what_was_named_is_no_answer(wrist):
     wrist.left = leaves(alone=1000, b=500, bp=480)
     search = Search(wrist, ())
-    assert search.further([BACKLASH]) is None
+    assert search.further([BACKLASH], {}) is None
     # Nor is anything tried beside what only slopes named.
-    assert search.further([CREEP]) is None
+    assert search.further([CREEP], {}) is None

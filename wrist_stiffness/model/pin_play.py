@@ -10,7 +10,7 @@ with Armijo's rule:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -21,6 +21,9 @@ from wrist_stiffness.model.contacts import forces_of, solve_contacts
 
 SMALL_FORCE = 1e-2
 """An end that carries less radial force than this does not reach its wall altogether [N]."""
+
+OF_ALL = ("radial", "small_force")
+"""Fields of `Play` that all samples share."""
 
 WALLS = (1e6, 1e7, 1e8)
 """Stiffness of the walls [N/m]: into the last one 1 N presses an end by 10 nm, and softer ones lead
@@ -49,6 +52,8 @@ class Play:
         B, what the ends' displacements open.
     approach : (n, m, m) float
         A, flexibility of the flanges [m/N].
+    small_force : float
+        An end that carries less does not reach its wall altogether [N].
     """
 
     radial: float
@@ -56,6 +61,7 @@ class Play:
     gap: Array
     opening: Array
     approach: Array
+    small_force: float = field(default=SMALL_FORCE, kw_only=True)
 
     def resting(self, near: Array | None = None) -> Array:
         """Return the displacements of both ends, (n, 4) [m].
@@ -178,18 +184,18 @@ class Play:
 
     @property
     def _of_samples(self) -> dict[str, Array]:
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "radial"}
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in OF_ALL}
 
     @property
     def _centring(self) -> float:
-        return SMALL_FORCE / self.radial
+        return self.small_force / self.radial
 
     def _unhindered(self) -> Array:
         """Return the displacements with all flanges open: along the forces."""
         ends = self.force.reshape(-1, 2, 2)
         size = np.linalg.norm(ends, axis=-1, keepdims=True)
-        pressed = self.radial + (size - SMALL_FORCE) / (self._centring + WALLS[-1])
-        moved = np.where(size < SMALL_FORCE, size / self._centring, pressed)
+        pressed = self.radial + (size - self.small_force) / (self._centring + WALLS[-1])
+        moved = np.where(size < self.small_force, size / self._centring, pressed)
         direction = np.divide(ends, size, out=np.zeros_like(ends), where=size > 0.0)
         return (moved * direction).reshape(-1, 4)
 

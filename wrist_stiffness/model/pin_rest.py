@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.model.at_point import end_screws
 from wrist_stiffness.model.contribution import NOTHING, Contribution
-from wrist_stiffness.model.pin_play import WALLS, Play
+from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
 from wrist_stiffness.model.rubbing import Rubbing, dragged, slip
 from wrist_stiffness.model.situation import Situation
 
@@ -105,11 +105,14 @@ class Pin:
         Its joint.
     radial : float
         How far an end may move from the middle [m], above 0.
+    small_force : float
+        With less an end does not reach its wall altogether [N].
     """
 
     at: Situation
     place: str
     radial: float
+    small_force: float = SMALL_FORCE
 
     def rest(self, before: Rest | None) -> tuple[Contribution, Rest]:
         """Return what the play adds, and where the pin rests.
@@ -176,6 +179,7 @@ class Pin:
                 drag,
                 np.stack([each.compliance for each in bristles], axis=1),
                 np.stack([each.budget for each in bristles], axis=1),
+                small_force=self.small_force,
             )
             x = held.resting(x)
             force = held.held(x)[1]
@@ -193,7 +197,9 @@ class Pin:
         opening = np.stack([at.carried(at.screw(self.place, end))[1] for end in ends], axis=-1)
         carried = at.at_home(self.place, at.through_place(self.place)) @ ends.T
         flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
-        return Play(self.radial, carried - flanges, at.free[1], opening, at.operators.approach)
+        gap, approach = at.free[1], at.operators.approach
+        force = carried - flanges
+        return Play(self.radial, force, gap, opening, approach, small_force=self.small_force)
 
     def _drag(self, rubbing: Rubbing) -> Array:
         """Return how a joint turns (radius times angle) and slides with the pin's ends."""

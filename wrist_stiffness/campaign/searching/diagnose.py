@@ -34,7 +34,7 @@ from wrist_stiffness.campaign.searching.refit import (
     valued,
     withdrawn,
 )
-from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
+from wrist_stiffness.campaign.searching.seeking import MOST_EXTRAS, PRESSING, Search
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis import Diagnosis, Settings
@@ -190,18 +190,36 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     if doubted and search.explained and not (strained or others):
         # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
         return replace(place, fits=dict.fromkeys(search.found, place.base)), result
+    if search.rough and result.findings:
+        # So much is left that what no slope shows stands beside what was named, not in its place.
+        further = _furthered(search, ask, place, result)
+        if further[1] is not result:
+            return further
     if doubted or result.verdict == "none":
         # What presses the base takes up whole, within its tolerances: then nothing seems missing.
         whole = search.thorough() if doubted else search.thorough(PRESSING)
         other = _whole(whole, search, ask)
         if other is not None and _says_more(other[1], result):
             return other
-    beside = search.further([each.name for each in result.findings])
-    if beside is not None:
+    return _furthered(search, ask, place, result)
+
+
+def _furthered(
+    search: Search, ask: Ask, place: Place, result: Diagnosis
+) -> tuple[Place, Diagnosis]:
+    """Return an answer with what whole fits find beside it, one after the other."""
+    fits: dict[str, BaseFit] = {}
+    while len(result.findings) < MOST_EXTRAS:
+        beside = search.further([each.name for each in result.findings], fits)
+        if beside is None:
+            break
         more = _with_the_first(search, beside, ask)
-        if any(each.name in beside.fits for each in more.findings):
-            fitted = [each for each in result.findings if each.name in beside.base.extras]
-            return beside, _together(replace(result, findings=tuple(fitted)), more)
+        found = [each.name for each in more.findings if each.name in beside.fits]
+        if not found:
+            break
+        fitted = [each for each in result.findings if each.name in beside.base.extras]
+        place, result = beside, _together(replace(result, findings=tuple(fitted)), more)
+        fits = {name: beside.fits[name] for name in found}
     return place, result
 
 

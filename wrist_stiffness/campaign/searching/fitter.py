@@ -38,8 +38,9 @@ class Fitter:
         extras: Sequence[Effect] = (),
         start: BaseFit | None = None,
         beside: bool = False,
+        rounded: bool = False,
     ) -> BaseFit:
         """Fit as `fit_base`."""
         names = ", ".join(each.name for each in extras)
         self.tell(f"fitting the wrist with {names}" if extras else "fitting the wrist as it is")
-        return fit_base(self.model, sessions, extras, start, beside)
+        return fit_base(self.model, sessions, extras, start, beside, rounded)

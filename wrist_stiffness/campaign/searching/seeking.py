@@ -53,6 +53,9 @@ its columns there say little of what it would explain."""
 RUBBING = frozenset(("joint_friction", "cable_wrench"))
 """Laws that stick before they slip: tried likewise, as the base takes up what holds it."""
 
+STICKING = frozenset(("joint_friction",))
+"""Laws that hold a pin off its wall: beside play they explain what alone they do not."""
+
 CLOSING = frozenset(("bushing_stiffness", "bushing_hardening"))
 """Laws of a bushing: 0.5 um of play of another shape looked like one of 0.2 of its stiffness."""
 
@@ -127,6 +130,11 @@ class Search:
         return self._reached.base.strained and not self._first.rough
 
     @property
+    def rough(self) -> bool:
+        """Whether very much is left beside what tangents led to."""
+        return self._reached.rough
+
+    @property
     def explained(self) -> bool:
         """Whether one effect, to which tangents led, leaves no more than the noise as it is."""
         base = self._reached.base
@@ -161,31 +169,59 @@ class Search:
             trials |= dict.fromkeys(self._reached.prices, self._reached)
         return _as_they_are(alone, known, trials)
 
-    def further(self, names: Collection[str]) -> Place | None:
+    def further(self, names: Collection[str], fits: Mapping[str, BaseFit]) -> Place | None:
         """Try play with the whole base beside what was named, where that leaves more than noise.
 
-        Beside what of it the search had fitted: what only slopes named stands to question again.
-        Axes, gaps and weights would be mistaken for each other, play is not.
+        Beside what of it was fitted: what only slopes named stands to question again.  Axes, gaps
+        and weights would be mistaken for each other, play is not; nor is, beside play that leaves
+        very much, a joint that rubs.
 
         Parameters
         ----------
         names : collection of str
             What was named.
+        fits : dict of str to BaseFit
+            Whole fits that were found already, by what was named last.
         """
+        begun = self._named(names, fits)
+        if begun is None or begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
+            return None
+        loose = any(each.law.id in LOOSE for each in begun.effects.values())
+        laws = LOOSE | STICKING if loose and begun.rough else LOOSE
+        tried = [e for e in self._catalogue if e.law.id in laws and e.name not in begun.effects]
+        easy = [self._beside_play(begun, each) for each in tried]
+        easy = sorted((e for e in easy if e.total < begun.total), key=lambda each: each.total)
+        if not easy:
+            return None
+        ends = [self._sharpened(each) for each in easy[:MOST_REFITTED]]
+        trials = {list(end.prices)[-1]: end for end in ends if end.total < begun.total}
+        if not trials:
+            return None
+        known = self.beside(begun.base).candidates
+        return replace(_as_they_are(begun, known, trials), known=True)
+
+    def _named(self, names: Collection[str], fits: Mapping[str, BaseFit]) -> Reached | None:
+        """Return where the search stands with what was named alone; None where no fit has it."""
+        if whole := [fits[name] for name in names if name in fits]:
+            base = max(whole, key=lambda each: len(each.extras))
+            prices = dict.fromkeys(base.extras, 0.0)
+            return Reached(base, prices, self.first_cost)
         begun = self._reached
         if not begun.prices.keys() & set(names):
             return None
         for name in [each for each in begun.prices if each not in names]:
             begun = _without(self._fitter, begun, name)
-        if begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
-            return None
-        trials = self._trials(begun, self.beside(begun.base, LOOSE).candidates)
-        trials = {name: each for name, each in trials.items() if each.total < begun.total}
-        if not trials:
-            return None
-        self._finish(trials)
-        known = self.beside(begun.base).candidates
-        return replace(_as_they_are(begun, known, trials), known=True)
+        return begun
+
+    def _beside_play(self, begun: Reached, added: WristCandidate) -> Reached:
+        """Fit one more effect from its usual size, with rounded walls."""
+        usual = added.effect_of(
+            {p.key: p.mean or p.scale for p in added.law.parameters(added.place)}
+        )
+        sessions, extras = begun.base.problem.sessions, [*begun.effects.values(), usual]
+        base = self._fitter(sessions, extras, begun.base, beside=True, rounded=True)
+        price = len(usual.parameters) * float(np.log(begun.base.problem.table.measured.sum()))
+        return replace(begun, base=base, prices={**begun.prices, added.name: price})
 
     def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
         """Fit candidates one by one, with the whole base and what it has."""
@@ -194,6 +230,11 @@ class Search:
         for value, each, shape in leaders:
             found[each.name] = _with(self._fitter, begun, screen.fitted(each, shape, value))
         return found
+
+    def _sharpened(self, easy: Reached) -> Reached:
+        """Return what was fitted with rounded walls with the laws as they are."""
+        sessions, extras = easy.base.problem.sessions, list(easy.effects.values())
+        return replace(easy, base=self._fitter(sessions, extras, easy.base, beside=True))
 
     def _finish(self, trials: dict[str, Reached]) -> None:
         """Fit play to its end where it explains most, and put it in its place.

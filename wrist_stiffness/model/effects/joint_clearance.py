@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from wrist_stiffness.mechanism.components import JOINTS
 from wrist_stiffness.model.law import NOTHING, Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.pin_play import SMALL_FORCE
 from wrist_stiffness.model.pin_rest import Pin
 from wrist_stiffness.model.situation import Situation
 
@@ -19,6 +21,13 @@ class JointClearance(Law):
     end moves by half the diametral clearance along its own.  Equal end forces shift the pin,
     opposite ones tilt it.  A flange that touches pushes the pin back within its play, and a joint
     that rubs holds it.
+
+    Parameters
+    ----------
+    small_force : float
+        With less an end does not reach its wall altogether [N].
+    sharp : JointClearance, optional
+        The law of which this one has rounded walls.
     """
 
     id = "joint_clearance"
@@ -28,6 +37,15 @@ class JointClearance(Law):
     sentence = "{place} has play: the pin lies on the side of its bearing force"
     check = "push and pull the joint across its axis with a dial gauge; swap the bushing"
     excited_by = "loads of opposite directions, so that the bearing force changes sides"
+
+    def __init__(
+        self, small_force: float = SMALL_FORCE, sharp: JointClearance | None = None
+    ) -> None:
+        self._small_force, self._sharp = small_force, sharp or self
+
+    def rounded(self, force: float | None) -> Law:
+        """Return play in which a pin goes from wall to wall little by little."""
+        return self._sharp if force is None else _rounded(self._sharp, force)
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the diametral clearance."""
@@ -40,4 +58,9 @@ class JointClearance(Law):
         radial = 0.5 * values["clearance_um"]
         if radial == 0.0:
             return NOTHING, None
-        return Pin(at, place, radial).rest(state)
+        return Pin(at, place, radial, self._small_force).rest(state)
+
+
+@cache
+def _rounded(sharp: JointClearance, force: float) -> JointClearance:
+    return JointClearance(force, sharp)
