@@ -37,8 +37,8 @@ MOST_POINTS = 4
 COOLING = 0.05
 """Least ratio of the variances of two steps: believed too early, the data close a wrong flange."""
 
-ENOUGH = 3e-3
-"""Relative fall of the sum of squares below which the fit has converged."""
+ENOUGH, NEARLY = 3e-3, 3e-2
+"""Relative fall of the sum of squares below which the fit has converged, and with rounded walls."""
 
 SMALLEST_STEP = 1.0 / 16.0
 
@@ -300,7 +300,7 @@ def fit_base(
         for force in ROUNDED_N:
             gradual = [replace(each, effect=_rounded(each.effect, force)) for each in more]
             easy = replace(problem, free=(*free, *gradual))
-            z, residual = _descended(easy, easy, z)
+            z, residual = _descended(easy, easy, z, NEARLY)
             if rounded:
                 cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
                 return BaseFit(easy, z, residual, tuple(added), cost, alone, easy)
@@ -314,7 +314,9 @@ def _rounded(effect: Effect, force: float | None) -> Effect:
     return effect if law is effect.law else replace(effect, law=law)
 
 
-def _descended(problem: BaseProblem, bare: BaseProblem, z: Array) -> tuple[Array, Array]:
+def _descended(
+    problem: BaseProblem, bare: BaseProblem, z: Array, enough: float = ENOUGH
+) -> tuple[Array, Array]:
     """Return where Gauss-Newton steps lead from `z`, and the residual there."""
     lower, upper = problem.bounds
     weights = problem.weights
@@ -338,7 +340,7 @@ def _descended(problem: BaseProblem, bare: BaseProblem, z: Array) -> tuple[Array
             size /= 2.0
         if after < before:
             z, residual = trial, tried
-        if cooled and before - after < ENOUGH * before:
+        if cooled and before - after < enough * before:
             break
     return z, residual
 

@@ -135,7 +135,7 @@ def diagnose_sessions(
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
-    suspected = _with_all(fitter, base, named)
+    suspected = _with_all(fitter, base, named, final)
     parts = contributions(suspected, {each.name for each in kept})
     parts = ranked([*parts, *possible(suspected, search.catalogue)])
     observed = base.left(with_extras=False)
@@ -308,12 +308,15 @@ def _says_more(one: Diagnosis, other: Diagnosis) -> bool:
     )
 
 
-def _with_all(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
-    """Return the base fitted along with what the search found and what was named."""
+def _with_all(fitter: Fitter, base: BaseFit, named: Sequence[Effect], final: BaseFit) -> BaseFit:
+    """Return the base fitted along with what the search found and what was named.
+
+    Where that is what was named alone, this fit is known.
+    """
     more = [each for each in named if each.name not in base.extras]
-    if not more:
-        return base
-    return fitter(base.problem.sessions, [*base.beyond().values(), *more], base)
+    if {*base.extras, *(each.name for each in more)} == set(final.extras):
+        return final
+    return fitter(base.problem.sessions, [*base.beyond().values(), *more], base) if more else base
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
