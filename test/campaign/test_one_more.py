@@ -98,11 +98,11 @@ class Wrist:
     def tell(self, text):
         """Nobody listens."""
 
-    def __call__(self, sessions, extras=(), start=None, beside=False, rounded=False):
+    def __call__(self, sessions, extras=(), start=None, beside=False, walls="sharp"):
         names = frozenset(each.name for each in extras)
-        self.done.append((names, start, "rounded" if rounded else beside))
+        self.done.append((names, start, walls if walls == "rounded" else beside))
         how = self.beside if beside else self.afresh if start is None else {}
-        how = self.rounded if rounded else how
+        how = self.rounded if walls == "rounded" else how
         return self.base(how.get(names, self.left[names]), extras)
 
     def base(self, cost, extras=()):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -57,6 +58,8 @@ of the base is a search for where the pins rest."""
 SILENT = 1e-6
 """Length, in standard deviations of the noise, of a column that is rounding: bases of columns are
 blind to scales, and what rounding says differs from machine to machine."""
+
+Walls = Literal["sharp", "rounded first", "rounded"]
 
 MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
 
@@ -253,7 +256,7 @@ def fit_base(
     extras: Sequence[Effect] = (),
     start: BaseFit | None = None,
     beside: bool = False,
-    rounded: bool = False,
+    walls: Walls = "sharp",
 ) -> BaseFit:
     """Fit registrations, zeros, tare and tolerances, within their priors.
 
@@ -270,12 +273,11 @@ def fit_base(
     start : BaseFit, optional
         Where the base begins.
     beside : bool
-        Whether the base's columns are taken beside play too, and play is fitted with rounded walls
-        first; else as if no play were there, which is far quicker, and leads nearly as far where
-        play is all that is missing.
-    rounded : bool
-        Whether the walls stay as they were first: enough to tell which of several fits leads
-        furthest, in a third of the time.
+        Whether the base's columns are taken beside play too; else as if no play were there, which
+        is far quicker and leads nearly as far.
+    walls : {"sharp", "rounded first", "rounded"}
+        Whether pins go from wall to wall little by little first, and whether they stay so: enough
+        to tell which of several fits leads furthest, in a third of the time.
     """
     free, held = free_base(model)
     # What was fitted with rounded walls begins with its own law again.
@@ -296,12 +298,12 @@ def fit_base(
     if 0 < firm < len(more):
         bare = BaseProblem(whole, sessions, (*free, *more[:firm]), model)
     z = _start(problem, start, added)
-    if beside and any(effect.law.id in LOOSE for effect in ordered):
+    if walls != "sharp":
         for force in ROUNDED_N:
             gradual = [replace(each, effect=_rounded(each.effect, force)) for each in more]
             easy = replace(problem, free=(*free, *gradual))
             z, residual = _descended(easy, easy, z, NEARLY)
-            if rounded:
+            if walls == "rounded":
                 cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
                 return BaseFit(easy, z, residual, tuple(added), cost, alone, easy)
     z, residual = _descended(problem, bare, z)

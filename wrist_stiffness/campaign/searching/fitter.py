@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, Walls, fit_base
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -38,9 +38,9 @@ class Fitter:
         extras: Sequence[Effect] = (),
         start: BaseFit | None = None,
         beside: bool = False,
-        rounded: bool = False,
+        walls: Walls = "sharp",
     ) -> BaseFit:
         """Fit as `fit_base`."""
         names = ", ".join(each.name for each in extras)
         self.tell(f"fitting the wrist with {names}" if extras else "fitting the wrist as it is")
-        return fit_base(self.model, sessions, extras, start, beside, rounded)
+        return fit_base(self.model, sessions, extras, start, beside, walls)

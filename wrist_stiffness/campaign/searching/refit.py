@@ -14,7 +14,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.result import FAR
 from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit
+from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, Walls
 from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import INEXACT
@@ -135,9 +135,16 @@ def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
         fitted = min(fitted, fitter(sessions, named), key=_cost)
     if any(each.law.id in LOOSE for each in named):
         # Where a pin is free, the base does something else than without play.
-        extras = list(fitted.beyond().values())
-        fitted = min(fitted, fitter(sessions, extras, fitted, beside=True), key=_cost)
+        fitted = min(fitted, _again(fitter, fitted, "sharp"), key=_cost)
+        if fitted.variance >= INEXACT:
+            # Each pin that turns over is a minimum: from another one, and the better end counts.
+            fitted = min(fitted, _again(fitter, fitted, "rounded first"), key=_cost)
     return fitted
+
+
+def _again(fitter: Fitter, fitted: BaseFit, walls: Walls) -> BaseFit:
+    extras = list(fitted.beyond().values())
+    return fitter(fitted.problem.sessions, extras, fitted, beside=True, walls=walls)
 
 
 def _cost(fitted: BaseFit) -> float:

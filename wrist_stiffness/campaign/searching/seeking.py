@@ -219,7 +219,7 @@ class Search:
             {p.key: p.mean or p.scale for p in added.law.parameters(added.place)}
         )
         sessions, extras = begun.base.problem.sessions, [*begun.effects.values(), usual]
-        base = self._fitter(sessions, extras, begun.base, beside=True, rounded=True)
+        base = self._fitter(sessions, extras, begun.base, beside=True, walls="rounded")
         price = len(usual.parameters) * float(np.log(begun.base.problem.table.measured.sum()))
         return replace(begun, base=base, prices={**begun.prices, added.name: price})
 
@@ -234,7 +234,9 @@ class Search:
     def _sharpened(self, easy: Reached) -> Reached:
         """Return what was fitted with rounded walls with the laws as they are."""
         sessions, extras = easy.base.problem.sessions, list(easy.effects.values())
-        return replace(easy, base=self._fitter(sessions, extras, easy.base, beside=True))
+        return replace(
+            easy, base=self._fitter(sessions, extras, easy.base, beside=True, walls="rounded first")
+        )
 
     def _finish(self, trials: dict[str, Reached]) -> None:
         """Fit play to its end where it explains most, and put it in its place.
