@@ -14,6 +14,7 @@ from wrist_stiffness.campaign.searching.diagnose import (
     _judged,
     _says_more,
     _settled,
+    _with_all,
 )
 from wrist_stiffness.campaign.searching.place import Place
 from wrist_stiffness.campaign.searching.seeking import PRESSING
@@ -341,3 +342,28 @@ class TestWhatDoesNotHold:
         where, result, judged = self.judged(search)
         assert where is search.places["quick"]
         assert judged.base.extras == ()
+
+
+@pytest.mark.parametrize(
+    ("extras", "named", "final", "which"),
+    [
+        ([DELAY], [DELAY], [DELAY], "final"),
+        ([DELAY], [DELAY, PLAY], [DELAY, PLAY], "final"),
+        ([DELAY, AXIS], [DELAY], [DELAY], "base"),
+        ([DELAY, AXIS], [PLAY], [PLAY], "anew"),
+    ],
+)
+def test_suspects_are_fitted_anew_only_where_no_fit_has_them_all(extras, named, final, which):
+    def fit(*names):
+        effects = {name: SimpleNamespace(name=name) for name in names}
+        problem = SimpleNamespace(sessions=())
+        return SimpleNamespace(extras=names, beyond=lambda: effects, problem=problem)
+
+    def anew(sessions, extras, start):
+        assert [each.name for each in extras] == [DELAY, AXIS, PLAY]
+        assert start is base
+        return "anew"
+
+    base, last = fit(*extras), fit(*final)
+    found = _with_all(anew, base, [SimpleNamespace(name=name) for name in named], last)
+    assert {"base": base, "final": last}.get(which, "anew") == found

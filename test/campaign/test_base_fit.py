@@ -5,7 +5,10 @@ import pytest
 
 from wrist_stiffness.campaign.searching.base_fit import SILENT, fit_base, free_base
 from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.model.effect import Effect, Estimate
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
+from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
 
@@ -46,3 +49,38 @@ def test_tolerances_are_limits_within_which_parts_are_evenly_spread(model):
     assert spread["axis_misalignment"]["shift_u_um"] == pytest.approx(shift, rel=0.01)
     assert spread["axis_misalignment"]["tilt_u_mdeg"] == pytest.approx(tilt, rel=0.01)
     assert spread["load_scale"]["scale_percent"] == pytest.approx(scale, rel=0.01)
+
+
+def effect(law, place, **values):
+    return Effect(find_law(law), place, {key: Estimate(value) for key, value in values.items()})
+
+
+@pytest.mark.slow
+def test_rounded_walls_lead_past_the_pins_that_turn_over(model, in_the_cell):
+    """One minute of 5 um of play and friction: with sharp walls a fit ends at the next pin that turns."""
+    hidden = (
+        HiddenEffect("joint_clearance", "joint_3", "algebraic", 5e-6, 5),
+        HiddenEffect("joint_friction", "joint_2", "coulomb", 0.2, 6),
+    )
+    settings = CellSettings(
+        rate_hz=10.0,
+        program_seconds=60.0,
+        program_seed=101,
+        base="wrong",
+        base_seed=1003,
+        hidden=hidden,
+    )
+    units = (as_units(model, in_the_cell(model.table, settings, 1)),)
+    base = fit_base(model, units)
+    extras = [
+        effect("joint_clearance", "joint_3", clearance_um=3.0),
+        effect("joint_friction", "joint_2", coefficient=0.1),
+    ]
+    sharp = fit_base(model, units, extras, base, beside=True)
+    easy = fit_base(model, units, extras, base, beside=True, walls="rounded")
+    found = fit_base(model, units, list(easy.beyond().values()), easy, True, "rounded first")
+    assert found.cost < 0.5 * sharp.cost
+    # What is handed on is play as it is.
+    assert all(each.law is find_law(each.law.id) for each in found.effects(0))
+    play = found.beyond()["joint_clearance@joint_3"].estimates["clearance_um"]
+    assert play.value == pytest.approx(5.0, rel=0.1)

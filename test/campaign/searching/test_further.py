@@ -1,0 +1,85 @@
+"""What is sought beside what was named: play, and beside it a joint that rubs."""
+
+import pytest
+
+from wrist_stiffness.campaign.searching.place import ROUGH
+from wrist_stiffness.campaign.searching.seeking import INEXACT, Search
+
+PLAY = "joint_clearance@joint_1"
+BACKLASH = "backlash@motor_1"
+DELAY = "time_delay@pose_sensor"
+CREEP = "creep@joint_1"
+OTHER_PLAY = "joint_clearance@joint_2"
+FRICTION = "joint_friction@joint_2"
+NUMBERS = 100
+
+
+def test_play_is_tried_beside_what_was_named_alone(wrist):
+    """What only slopes named would bear what play leaves."""
+    wrist.left = wrist.leaves(alone=1000, b=600, d=800, bd=300, bp=250, bdp=290)
+    wrist.rounded, wrist.beside = wrist.leaves(bp=280), wrist.leaves(bp=240)
+    search = Search(wrist, ())
+    assert search.found == {BACKLASH, DELAY}
+    place = search.further([BACKLASH], {})
+    assert place.known
+    assert place.base.extras == (BACKLASH,)
+    assert {name: set(fit.extras) for name, fit in place.fits.items()} == {PLAY: {BACKLASH, PLAY}}
+    assert place.fits[PLAY].cost == 240
+
+
+@pytest.mark.parametrize("law", ["bushing_stiffness", "bushing_hardening"])
+def test_beside_play_the_bushing_in_its_gap_is_not_asked_for(wrist, law):
+    """It would stand for the way the gap closes, which no law knows exactly."""
+    own, other = ({f"{law}@joint_{number}"} for number in (1, 2))
+    wrist.left = wrist.leaves(alone=1000, p=300) | {frozenset(each): 900 for each in (own, other)}
+    search = Search(wrist, ())
+    fit = wrist.reached(PLAY).base
+    assert {each.name for each in search.beside(fit).candidates} == other
+    assert {each.name for each in search.quick().candidates} >= own | other
+
+
+@pytest.mark.parametrize(("share", "tried"), [(0.9, False), (1.1, True)])
+def test_play_is_tried_only_where_more_than_noise_is_left(wrist, share, tried):
+    """It takes minutes, and what is left there needs no further name."""
+    left = share * INEXACT * NUMBERS
+    wrist.left = wrist.leaves(alone=1000, b=left, bp=left - 60)
+    search = Search(wrist, ())
+    assert (search.further([BACKLASH], {}) is not None) == tried
+    assert any(PLAY in names for names, _, _ in wrist.done) == tried
+
+
+def test_of_several_plays_the_two_that_lead_with_rounded_walls_are_fitted_as_they_are(wrist):
+    """Rounded walls tell which leads, in a third of the time."""
+    wrist.left = wrist.leaves(alone=1000, b=500, bp=400, bq=400, bt=400)
+    wrist.rounded = wrist.leaves(bp=300, bq=250, bt=350)
+    wrist.beside = wrist.leaves(bp=200, bq=260)
+    place = Search(wrist, ()).further([BACKLASH], {})
+    assert {name: fit.cost for name, fit in place.fits.items()} == {PLAY: 200, OTHER_PLAY: 260}
+
+
+def test_what_rounded_walls_promise_and_the_law_does_not_keep_is_no_answer(wrist):
+    wrist.left = wrist.leaves(alone=1000, b=500, bp=600)
+    wrist.rounded, wrist.beside = wrist.leaves(bp=200), wrist.leaves(bp=490)
+    assert Search(wrist, ()).further([BACKLASH], {}) is None
+
+
+@pytest.mark.parametrize(("share", "tried"), [(0.9, False), (1.1, True)])
+def test_a_joint_that_rubs_is_tried_beside_play_that_leaves_very_much(wrist, share, tried):
+    """What it holds off its wall is no play, and alone it explains little."""
+    left = share * ROUGH * NUMBERS
+    wrist.left = wrist.leaves(alone=5000, b=4000, bp=left, bpf=left / 2, bpq=5000)
+    search = Search(wrist, ())
+    fit = wrist.reached(BACKLASH, PLAY).base
+    place = search.further([BACKLASH, PLAY], {PLAY: fit})
+    assert any(FRICTION in names for names, _, _ in wrist.done) == tried
+    if tried:
+        assert place.base is fit
+        assert set(place.fits) == {FRICTION}
+
+
+def test_play_that_explains_nothing_beside_what_was_named_is_no_answer(wrist):
+    wrist.left = wrist.leaves(alone=1000, b=500, bp=480)
+    search = Search(wrist, ())
+    assert search.further([BACKLASH], {}) is None
+    # Nor is anything tried beside what only slopes named.
+    assert search.further([CREEP], {}) is None
