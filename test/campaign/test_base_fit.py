@@ -57,7 +57,7 @@ def effect(law, place, **values):
 
 @pytest.mark.slow
 def test_rounded_walls_lead_past_the_pins_that_turn_over(model, in_the_cell):
-    """One minute of 5 um of play and friction: with sharp walls a fit ends at the next pin that turns."""
+    """Play of 5 um and friction: with sharp walls a fit ends at the next pin that turns over."""
     hidden = (
         HiddenEffect("joint_clearance", "joint_3", "algebraic", 5e-6, 5),
         HiddenEffect("joint_friction", "joint_2", "coulomb", 0.2, 6),
