@@ -14,6 +14,7 @@ import numpy as np
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, free_base
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate, wrist_candidates
 from wrist_stiffness.campaign.searching.fitter import Fitter
+from wrist_stiffness.campaign.searching.from_afar import from_afar
 from wrist_stiffness.campaign.searching.place import (
     INEXACT,
     WORTH,
@@ -52,9 +53,6 @@ its columns there say little of what it would explain."""
 
 RUBBING = frozenset(("joint_friction", "cable_wrench"))
 """Laws that stick before they slip: tried likewise, as the base takes up what holds it."""
-
-STICKING = frozenset(("joint_friction",))
-"""Laws that hold a pin off its wall: beside play they explain what alone they do not."""
 
 CLOSING = frozenset(("bushing_stiffness", "bushing_hardening"))
 """Laws of a bushing: 0.5 um of play of another shape looked like one of 0.2 of its stiffness."""
@@ -186,17 +184,17 @@ class Search:
         begun = self._named(names, fits)
         if begun is None or begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
             return None
-        loose = any(each.law.id in LOOSE for each in begun.effects.values())
-        laws = LOOSE | STICKING if loose and begun.rough else LOOSE
-        tried = [e for e in self._catalogue if e.law.id in laws and e.name not in begun.effects]
-        easy = [self._beside_play(begun, each) for each in tried]
-        easy = sorted((e for e in easy if e.total < begun.total), key=lambda each: each.total)
-        if not easy:
+        if fits and not begun.rough:
             return None
-        ends = [self._sharpened(each) for each in easy[:MOST_REFITTED]]
-        trials = {list(end.prices)[-1]: end for end in ends if end.total < begun.total}
+        if begun.rough:
+            trials = from_afar(self._fitter, begun, self._catalogue)
+        else:
+            trials = self._trials(begun, self.beside(begun.base, LOOSE).candidates)
+        trials = {name: each for name, each in trials.items() if each.total < begun.total}
         if not trials:
             return None
+        if not begun.rough:
+            self._finish(trials)
         known = self.beside(begun.base).candidates
         return replace(_as_they_are(begun, known, trials), known=True)
 
@@ -213,16 +211,6 @@ class Search:
             begun = _without(self._fitter, begun, name)
         return begun
 
-    def _beside_play(self, begun: Reached, added: WristCandidate) -> Reached:
-        """Fit one more effect from its usual size, with rounded walls."""
-        usual = added.effect_of(
-            {p.key: p.mean or p.scale for p in added.law.parameters(added.place)}
-        )
-        sessions, extras = begun.base.problem.sessions, [*begun.effects.values(), usual]
-        base = self._fitter(sessions, extras, begun.base, beside=True, walls="rounded")
-        price = len(usual.parameters) * float(np.log(begun.base.problem.table.measured.sum()))
-        return replace(begun, base=base, prices={**begun.prices, added.name: price})
-
     def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
         """Fit candidates one by one, with the whole base and what it has."""
         screen, found = begun.screen(), {}
@@ -230,13 +218,6 @@ class Search:
         for value, each, shape in leaders:
             found[each.name] = _with(self._fitter, begun, screen.fitted(each, shape, value))
         return found
-
-    def _sharpened(self, easy: Reached) -> Reached:
-        """Return what was fitted with rounded walls with the laws as they are."""
-        sessions, extras = easy.base.problem.sessions, list(easy.effects.values())
-        return replace(
-            easy, base=self._fitter(sessions, extras, easy.base, beside=True, walls="rounded first")
-        )
 
     def _finish(self, trials: dict[str, Reached]) -> None:
         """Fit play to its end where it explains most, and put it in its place.
