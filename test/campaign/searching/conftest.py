@@ -26,7 +26,8 @@ class Wrist:
     """Stands for a fitter: knows what is left along with any effects.
 
     `afresh`, `beside` and `rounded` say what else is left of fits from the drawing, beside play,
-    and with rounded walls; `done` lists the fits in turn.  What columns promise is what whole fits
+    and with rounded walls; `done` lists the fits in turn, and
+    `sizes` where their effects began (None: as found).  What columns promise is what whole fits
     keep, where `promised` does not list it; no tangent shows play and friction.
     """
 
@@ -35,7 +36,7 @@ class Wrist:
     def __init__(self):
         self.left, self.afresh, self.beside, self.rounded = {}, {}, {}, {}
         self.promised = dict.fromkeys(UNPROMISED, 0.0)
-        self.done, self.strained, self.unmeasured = [], set(), []
+        self.done, self.sizes, self.strained, self.unmeasured = [], [], set(), []
 
     @staticmethod
     def leaves(**kept):
@@ -54,6 +55,7 @@ class Wrist:
 
     def __call__(self, sessions, extras=(), start=None, beside=False, walls="sharp"):
         names = frozenset(each.name for each in extras)
+        self.sizes.append({each.name: each.size for each in extras})
         self.done.append((names, start, walls if walls == "rounded" else beside))
         how = self.beside if beside else self.afresh if start is None else {}
         how = self.rounded if walls == "rounded" else how
@@ -98,11 +100,16 @@ class Wrist:
         )
 
 
-def effect(name):
+def effect(name, size=None):
     law, component = name.split("@")
-    own = SimpleNamespace(id=law, parameters=lambda place: (PARAMETER,))
     return SimpleNamespace(
-        name=name, law=own, component=component, parameters=(PARAMETER,), estimates={}
+        name=name,
+        law=SimpleNamespace(id=law),
+        component=component,
+        parameters=(PARAMETER,),
+        estimates={},
+        size=size,
+        with_values=lambda values: effect(name, values[PARAMETER.key]),
     )
 
 
@@ -110,7 +117,6 @@ def candidate(name, **whole):
     return SimpleNamespace(
         name=name,
         law=effect(name).law,
-        place=effect(name).component,
         effect_of=lambda values: effect(name),
         changed_by=lambda change, strain: candidate(name, change=change, strain=strain),
         **whole,
