@@ -104,12 +104,11 @@ def effect(name, size=None):
     law, component = name.split("@")
     return SimpleNamespace(
         name=name,
-        law=SimpleNamespace(id=law),
+        law=SimpleNamespace(id=law, parameters=lambda place: (PARAMETER,)),
         component=component,
         parameters=(PARAMETER,),
         estimates={},
         size=size,
-        with_values=lambda values: effect(name, values[PARAMETER.key]),
     )
 
 
@@ -117,7 +116,8 @@ def candidate(name, **whole):
     return SimpleNamespace(
         name=name,
         law=effect(name).law,
-        effect_of=lambda values: effect(name),
+        place=effect(name).component,
+        effect_of=lambda values: effect(name, values.get(PARAMETER.key)),
         changed_by=lambda change, strain: candidate(name, change=change, strain=strain),
         **whole,
     )

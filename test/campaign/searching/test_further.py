@@ -57,17 +57,15 @@ def test_of_several_plays_the_two_that_lead_with_rounded_walls_are_fitted_as_the
     assert {name: fit.cost for name, fit in place.fits.items()} == {PLAY: 200, OTHER_PLAY: 260}
 
 
-def test_what_rubs_begins_anew_beside_play(wrist):
-    """Without the play it stood in for it."""
+def test_play_begins_with_its_usual_size_beside_what_was_found(wrist):
     wrist.left = wrist.leaves(alone=9000, bf=5000, b=7000, f=6000, bfp=4000)
     fit = wrist.reached(BACKLASH, FRICTION).base
     search = Search(wrist, ())
     wrist.done.clear(), wrist.sizes.clear()
     assert search.further([BACKLASH, FRICTION], {FRICTION: fit})
-    usual = {BACKLASH: None, FRICTION: 1.0, PLAY: 1.0}
     easy = [n for n, (_, _, walls) in enumerate(wrist.done) if walls == "rounded"]
-    assert [wrist.sizes[n] for n in easy] == [usual]
-    assert [wrist.done[n][1] for n in easy] == [None]
+    assert [wrist.sizes[n] for n in easy] == [{BACKLASH: None, FRICTION: None, PLAY: 1.0}]
+    assert [wrist.done[n][1] for n in easy] == [fit]
 
 
 def test_what_rounded_walls_promise_and_the_law_does_not_keep_is_no_answer(wrist):

@@ -14,7 +14,6 @@ from wrist_stiffness.campaign.searching.base_fit import LOOSE
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import Candidates, Reached
-from wrist_stiffness.model.effect import Effect
 
 STICKING = frozenset(("joint_friction",))
 """Laws that hold a pin off its wall: beside play they explain what alone they do not."""
@@ -49,21 +48,16 @@ def from_afar(fitter: Fitter, begun: Reached, catalogue: Candidates) -> dict[str
 
 
 def _with_rounded_walls(fitter: Fitter, begun: Reached, added: WristCandidate) -> Reached:
-    """Fit one more effect from the drawing.
+    """Fit one more effect from its usual size, and everything else from where it was found.
 
-    It begins with its usual size, as does what sticks or has play already: without the new one that
-    stood in for it.
+    From the drawing, with what rubs at its usual size again, no more was found (ten wrists).
     """
-    turned = LOOSE | STICKING
-    known = [_usual(e) if e.law.id in turned else e for e in begun.effects.values()]
-    new = _usual(added.effect_of({}))
-    base = fitter(begun.base.problem.sessions, [*known, new], beside=True, walls="rounded")
-    price = len(new.parameters) * float(np.log(base.problem.table.measured.sum()))
+    parameters = added.law.parameters(added.place)
+    usual = added.effect_of({p.key: p.mean or p.scale for p in parameters})
+    sessions, extras = begun.base.problem.sessions, [*begun.effects.values(), usual]
+    base = fitter(sessions, extras, begun.base, beside=True, walls="rounded")
+    price = len(parameters) * float(np.log(base.problem.table.measured.sum()))
     return replace(begun, base=base, prices={**begun.prices, added.name: price})
-
-
-def _usual(effect: Effect) -> Effect:
-    return effect.with_values({p.key: p.mean or p.scale for p in effect.parameters})
 
 
 def _sharpened(fitter: Fitter, easy: Reached) -> Reached:
