@@ -1,6 +1,6 @@
 """Write the results of the benchmark into docs/hidden-effects.md and draw its pictures.
 
-python bench/hidden_effects/page.py [--results FILE] [--docs FOLDER]
+python bench/hidden_effects/page.py [--results FILE] [--docs FOLDER] [--all-code]
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from aims import CEILING, OWN, aims
 from cases import SIZES, TINY
-from run import SOLVERS, current
+from run import SOLVERS, current, read
 from score import wilson
 from tables import Line, by_solver, of_one_solver, paired
 
@@ -34,11 +34,12 @@ def text_of(lines: Sequence[Line]) -> str:
     failed = Counter(line["solver"] for line in lines if "error" in line)
     failures = ", ".join(f"{name}: {count}" for name, count in sorted(failed.items())) or "none"
     main = [line for line in scored if line["main"]]
-    version = next((line["version"] for line in scored if line["solver"] == OWN), "-")
+    versions = Counter(line["version"] for line in scored if line["solver"] == OWN)
+    code = ", ".join(f"`{version}` ({count})" for version, count in versions.most_common())
     return "\n\n".join(
         [
             f"{_posed(scored)}. {unreached} more cannot even be half as large as wanted. "
-            f"Answers that failed with an error: {failures}. Code `{version}`.",
+            f"Answers that failed with an error: {failures}. Code of `{OWN}`: {code or '-'}.",
             f"**Aims** (main design: wrong base, rich experiment, interferometer or tracker; "
             f"effects that a wrist may have)\n\n{aims([x for x in main if x['plausible']])}",
             f"**The same with magnitudes that no working wrist has**\n\n{aims(main)}",
@@ -132,8 +133,12 @@ def main() -> None:
     here = Path(__file__).parent
     parser.add_argument("--results", type=Path, default=here / "results" / "full.jsonl")
     parser.add_argument("--docs", type=Path, default=here.parents[1] / "docs")
+    parser.add_argument(
+        "--all-code", action="store_true", help="also answers that other code than today's gave"
+    )
     arguments = parser.parse_args()
-    lines = current(arguments.results, list(SOLVERS))
+    all_code, path = arguments.all_code, arguments.results
+    lines = list(read(path)) if all_code else current(path, list(SOLVERS))
     page = arguments.docs / "hidden-effects.md"
     before, rest = page.read_text(encoding="utf-8").split(BEGIN)
     after = rest.split(END)[1]
