@@ -237,6 +237,8 @@ def test_where_very_much_is_left_play_is_sought_beside_what_was_named_first(play
     search = Asked(quick, further=more, beside=answer("none"), found=[DELAY], rough=True)
     where, result = search.answered()
     assert [each for each in search.begun if each != "further"] == asked
+    # What led nowhere is not sought again.
+    assert search.begun.count("further") == (2 if play else 1)
     assert names(result) == ([DELAY, PLAY] if play else [DELAY])
     assert where == ("further" if play else "quick")
 

@@ -190,7 +190,8 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     if doubted and search.explained and not (strained or others):
         # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
         return replace(place, fits=dict.fromkeys(search.found, place.base)), result
-    if search.rough and result.findings:
+    sought = search.rough and bool(result.findings)
+    if sought:
         # So much is left that what no slope shows stands beside what was named, not in its place.
         further = _furthered(search, ask, place, result)
         if further[1] is not result:
@@ -201,7 +202,7 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
         other = _whole(whole, search, ask)
         if other is not None and _says_more(other[1], result):
             return other
-    return _furthered(search, ask, place, result)
+    return (place, result) if sought else _furthered(search, ask, place, result)
 
 
 def _furthered(
