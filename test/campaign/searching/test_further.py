@@ -49,7 +49,7 @@ def test_play_is_tried_only_where_more_than_noise_is_left(wrist, share, tried):
 
 
 def test_of_several_plays_the_two_that_lead_with_rounded_walls_are_fitted_as_they_are(wrist):
-    """Rounded walls tell which leads, in a third of the time."""
+    """Rounded walls tell which leads; the walls as they are, how far."""
     wrist.left = wrist.leaves(alone=9000, b=5000, bp=4000, bq=4000, bt=4000)
     wrist.rounded = wrist.leaves(bp=300, bq=250, bt=350)
     wrist.beside = wrist.leaves(bp=200, bq=260)

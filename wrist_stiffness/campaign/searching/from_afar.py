@@ -1,7 +1,7 @@
 """Play, and what rubs beside it, sought where so much is left that no slope leads to it.
 
 Between one wall and the other the sum of squares has a minimum for every pin that turns over.  With
-rounded walls there are few, and a fit tells within seconds in which joint the play is.
+rounded walls there are fewer, and a fit tells in which joint the play is.
 """
 
 from __future__ import annotations
