@@ -81,9 +81,11 @@ def test_a_joint_that_rubs_is_tried_beside_play_that_leaves_very_much(wrist, sha
     wrist.left = wrist.leaves(alone=5000, b=4000, bp=left, bpf=left / 2, bpq=5000)
     search = Search(wrist, ())
     fit = wrist.reached(BACKLASH, PLAY).base
+    wrist.done.clear()
     place = search.further([BACKLASH, PLAY], {PLAY: fit})
     assert any(FRICTION in names for names, _, _ in wrist.done) == tried
-    assert (place is not None) == tried
+    # Once was enough where little is left: with play in the base a fit takes long.
+    assert bool(wrist.done) == (place is not None) == tried
     if place:
         assert place.base is fit
         assert set(place.fits) == {FRICTION}
