@@ -243,6 +243,16 @@ def test_where_very_much_is_left_play_is_sought_beside_what_was_named_first(play
     assert where == ("further" if play else "quick")
 
 
+@pytest.mark.parametrize("rough", [True, False])
+def test_where_nothing_is_named_play_is_sought_before_all_else_if_very_much_is_left(rough):
+    """Of 326,539 a joint that rubs and play left 23,182; each alone hid the other from slopes."""
+    quick, more = answer("unknown", share=1.0), answer("effect", PLAY)
+    search = Asked(quick, further=more, beside=answer("none"), rough=rough)
+    where, result = search.answered()
+    assert search.begun[0] == ("further" if rough else "thorough")
+    assert (where, names(result)) == ("further", [PLAY])
+
+
 def test_where_play_is_not_named_the_quick_answer_stands():
     quick = answer("effect", DELAY)
     search = Asked(quick, further=answer("effect", AXIS), found=[DELAY])

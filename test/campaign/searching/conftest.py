@@ -15,8 +15,8 @@ PRICE = 5.0
 PLAY, CABLE = "joint_clearance@joint_1", "cable_wrench@platform"
 BACKLASH, DELAY, CREEP = "backlash@motor_1", "time_delay@pose_sensor", "creep@joint_1"
 OTHER_PLAY, FRICTION = "joint_clearance@joint_2", "joint_friction@joint_2"
-THIRD_PLAY = "joint_clearance@joint_3"
-UNPROMISED = (PLAY, OTHER_PLAY, THIRD_PLAY, FRICTION, CABLE)
+THIRD_PLAY, OTHER_FRICTION = "joint_clearance@joint_3", "joint_friction@joint_3"
+UNPROMISED = (PLAY, OTHER_PLAY, THIRD_PLAY, FRICTION, OTHER_FRICTION, CABLE)
 PARAMETER = Parameter("shape", 0.0, 9.0, 1.0)
 NUMBERS = 100
 """Measured numbers, so what noise alone would leave."""
@@ -143,6 +143,7 @@ def wrist(monkeypatch):
 
 LETTERS = {"b": BACKLASH, "c": CREEP, "d": DELAY, "p": PLAY, "w": CABLE} | {
     "f": FRICTION,
+    "g": OTHER_FRICTION,
     "q": OTHER_PLAY,
     "t": THIRD_PLAY,
 }

@@ -91,6 +91,49 @@ def test_a_joint_that_rubs_is_tried_beside_play_that_leaves_very_much(wrist, sha
         assert set(place.fits) == {FRICTION}
 
 
+@pytest.mark.parametrize(("share", "tried"), [(0.9, False), (1.1, True)])
+def test_where_nothing_was_named_play_is_tried_beside_what_rubs_most(wrist, share, tried):
+    """Either alone explains little of what both do, and only if very much is left is it asked."""
+    left = share * ROUGH * NUMBERS
+    wrist.left = wrist.leaves(alone=left, f=0.8 * left, g=0.9 * left, fp=0.5 * left, gp=left)
+    wrist.left |= wrist.leaves(p=0.5 * left, b=0.9 * left, bf=left, bfp=left)
+    wrist.beside = wrist.leaves(fp=0.1 * left)
+    place = Search(wrist, ()).further([], {})
+    assert (place is not None) == tried
+    if place:
+        assert place.base.extras == ()
+        assert {name: set(fit.extras) for name, fit in place.fits.items()} == {
+            PLAY: {FRICTION, PLAY}
+        }
+        assert place.fits[PLAY].cost == pytest.approx(0.1 * left)
+
+
+def test_where_nothing_rubs_play_is_tried_alone(wrist):
+    wrist.left = wrist.leaves(alone=9000, f=8990, p=5000)
+    place = Search(wrist, ()).further([], {})
+    assert {name: fit.extras for name, fit in place.fits.items()} == {PLAY: (PLAY,)}
+
+
+def test_what_was_fitted_along_and_not_named_is_asked_for_again(wrist):
+    """Play may stand for a fit along with a joint that rubs: this one has to show as well."""
+    wrist.left = wrist.leaves(alone=9000, p=8000, fp=1500)
+    search = Search(wrist, ())
+    fit = wrist.reached(PLAY, FRICTION).base
+    place = search.further([PLAY], {PLAY: fit})
+    assert place.base.extras == (PLAY,)
+    assert set(place.fits) == {FRICTION}
+
+
+def test_beside_play_and_what_rubs_nothing_is_sought_from_afar(wrist):
+    """With both in the base each fit takes ten seconds or more."""
+    wrist.left = wrist.leaves(alone=9000, p=8000, fp=5000, fpq=1000)
+    search = Search(wrist, ())
+    fit = wrist.reached(PLAY, FRICTION).base
+    wrist.done.clear()
+    assert search.further([PLAY, FRICTION], {FRICTION: fit}) is None
+    assert not wrist.done
+
+
 def test_play_that_explains_nothing_beside_what_was_named_is_no_answer(wrist):
     wrist.left = wrist.leaves(alone=1000, b=500, bp=480)
     search = Search(wrist, ())

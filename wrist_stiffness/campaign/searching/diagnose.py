@@ -190,7 +190,7 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     if doubted and search.explained and not (strained or others):
         # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
         return replace(place, fits=dict.fromkeys(search.found, place.base)), result
-    sought = search.rough and bool(result.findings)
+    sought = search.rough
     if sought:
         # So much is left that what no slope shows stands beside what was named, not in its place.
         further = _furthered(search, ask, place, result)

@@ -172,7 +172,7 @@ class Search:
 
         Beside what of it was fitted: what only slopes named stands to question again.  Axes, gaps
         and weights would be mistaken for each other, play is not; nor is, beside play that leaves
-        very much, a joint that rubs.
+        very much, a joint that rubs.  Where nothing was named only if very much is left.
 
         Parameters
         ----------
@@ -184,7 +184,7 @@ class Search:
         begun = self._named(names, fits)
         if begun is None or begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
             return None
-        if fits and not begun.rough:
+        if (fits or not names) and not begun.rough:
             return None
         if begun.rough:
             trials = from_afar(self._fitter, begun, self._catalogue)
@@ -200,11 +200,12 @@ class Search:
 
     def _named(self, names: Collection[str], fits: Mapping[str, BaseFit]) -> Reached | None:
         """Return where the search stands with what was named alone; None where no fit has it."""
+        if not names:
+            return self._first
+        begun = self._reached
         if whole := [fits[name] for name in names if name in fits]:
             base = max(whole, key=lambda each: len(each.extras))
-            prices = dict.fromkeys(base.extras, 0.0)
-            return Reached(base, prices, self.first_cost)
-        begun = self._reached
+            begun = Reached(base, dict.fromkeys(base.extras, 0.0), self.first_cost)
         if not begun.prices.keys() & set(names):
             return None
         for name in [each for each in begun.prices if each not in names]:
