@@ -298,6 +298,13 @@ def test_no_headroom_is_claimed_where_nothing_could_fall():
     assert "a curve over the conditions alone reaches 1." in found.verdict[-2]
 
 
+@pytest.mark.parametrize(
+    ("level", "moves"), [(0.5, "s falls from"), (1.0, "s stays at"), (2.0, "s rises from")]
+)
+def test_an_error_that_shows_no_change_stays(level, moves):
+    assert moves in compared((1.0, level), 0.5).verdict[-2]
+
+
 def test_verdict_says_whether_it_is_noise():
     found = compared((5.0, 1.0), 1.0)
     assert "5.1 x the noise" in found.verdict[0] or "5.0 x the noise" in found.verdict[0]

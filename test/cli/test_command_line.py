@@ -12,6 +12,7 @@ import wrist_stiffness
 from wrist_stiffness.cli.main import COMMANDS, EPILOG, build_parser, main
 from wrist_stiffness.cli.progress import Progress, Status
 from wrist_stiffness.errors import GeometryError
+from wrist_stiffness.simulation.blind import ToldScale
 
 
 def command(run):
@@ -83,6 +84,13 @@ def test_closed_stdout_is_quiet():
         ["sh", "-c", 'exec "$0" -c "$1" >&-', sys.executable, PRINTING], stderr=subprocess.PIPE
     )
     assert (ran.returncode, ran.stderr) == (0, b"")
+
+
+def test_a_letter_that_the_terminal_lacks_is_shown_by_its_number():
+    printing = PRINTING.replace("answer", "written: gr\\u00f6\\u00dfe.yaml")
+    lacking = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    ran = subprocess.run([sys.executable, "-c", printing], env=lacking, capture_output=True)
+    assert (ran.returncode, ran.stdout) == (0, b"written: gr\\xf6\\xdfe.yaml\n")
 
 
 def test_a_fault_of_the_program_is_not_hidden():
@@ -272,6 +280,23 @@ def test_an_effect_where_it_cannot_be_names_the_places(effect, named, tmp_path, 
     argv = ["simulate", "-o", str(tmp_path / "a"), "--seconds", "1", "--effect", effect]
     assert main(argv) == 2
     assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("secret", [["--blind", "7"], ["--effect", "creep@joint_3"]])
+def test_an_existing_recording_is_named_before_the_work(secret, refused, tmp_path, monkeypatch):
+    path = tmp_path / "riddle.mcap"
+    path.write_bytes(b"")
+    monkeypatch.setattr(ToldScale, "__init__", lambda *given: pytest.fail("worked before it asked"))
+    assert "exists already" in refused("simulate", "-o", str(path), *secret)
+
+
+@pytest.mark.parametrize("secret", [["--reveal", "7"], ["--effect", "backlash@motor_1"]])
+def test_the_search_for_a_size_says_that_it_is_at_work(secret, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("wrist_stiffness.cli.progress.SHOWN_AFTER_S", 0.0)
+    monkeypatch.chdir(tmp_path)
+    output = ["-o", "a.mcap"] if "--effect" in secret else []
+    assert main(["simulate", "--seconds", "3", *output, *secret]) == 0
+    assert "finding how much of the effect has the wanted size, run 1" in capsys.readouterr().err
 
 
 def test_a_secret_is_told_and_not_recorded(refused):

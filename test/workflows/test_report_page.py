@@ -1,4 +1,5 @@
 import base64
+import os
 import re
 from html.parser import HTMLParser
 
@@ -92,6 +93,12 @@ def test_the_same_page_gives_the_same_bytes():
         return drawn(figure, "c").svg
 
     assert once() == once()
+
+
+def test_a_name_that_is_no_text_is_shown_by_its_bytes(tmp_path):
+    """As Python gives the name of a file from a machine with another encoding."""
+    write_page(tmp_path / "out.html", page(os.fsdecode(b"tag_\xff")))
+    assert "tag_\\udcff" in (tmp_path / "out.html").read_text(encoding="utf-8")
 
 
 def test_a_folder_that_is_missing_is_named(tmp_path):

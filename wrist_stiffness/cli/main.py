@@ -5,6 +5,7 @@ import errno
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Protocol
 
@@ -142,6 +143,7 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
     SystemExit
         From argparse: 0 after `--help` and `--version`, 2 on wrong use; 143 after SIGTERM.
     """
+    _show_every_name()
     arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
     try:
         for option, begins in RESULTS.items():
@@ -175,6 +177,12 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
         _discard_output()
         return _refuse(f"the output cannot be written: {error.strerror}")
     return code
+
+
+def _show_every_name() -> None:
+    """Let a terminal that lacks a letter of a file's name show its number, as stderr does."""
+    if isinstance(sys.stdout, TextIOWrapper):  # None where the caller closed it
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _require_place(path: str | None, option: str, begins: bytes) -> None:

@@ -103,9 +103,10 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.cli.progress import Progress, Status
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.lookup.table_file import load_table
+    from wrist_stiffness.recording import RecordingWriter
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.json_file import write_json
     from wrist_stiffness.workflows.simulate import (
@@ -132,11 +133,14 @@ def _run(arguments: argparse.Namespace) -> int:
         return _reveal(arguments, table, settings)
     if arguments.output is None:
         raise InputError("simulate: -o RECORDING says where to write")
-    if arguments.blind is not None:
-        settings = hide_blind(arguments.blind, table, settings, arguments.seconds)
-    elif arguments.effect is not None:
-        size = USUAL_SIZE if arguments.size is None else arguments.size
-        settings = hide(arguments.effect, size, table, settings, arguments.seconds)
+    # Before the work: the size of an effect takes long to find.
+    RecordingWriter(arguments.output, overwrite=arguments.overwrite).check_target()
+    with Status() as status:
+        if arguments.blind is not None:
+            settings = hide_blind(arguments.blind, table, settings, arguments.seconds, status)
+        elif arguments.effect is not None:
+            size = USUAL_SIZE if arguments.size is None else arguments.size
+            settings = hide(arguments.effect, size, table, settings, arguments.seconds, status)
     written = simulate_recording(
         arguments.output,
         table,
@@ -180,11 +184,13 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     from dataclasses import asdict
 
     from wrist_stiffness.campaign.refitted import SET_UP
+    from wrist_stiffness.cli.progress import Status
     from wrist_stiffness.simulation.blind import draw
     from wrist_stiffness.simulation.catalogue import ALL
     from wrist_stiffness.workflows.json_file import write_json
 
-    secret = draw(arguments.reveal, table, settings, arguments.seconds)
+    with Status() as status:
+        secret = draw(arguments.reveal, table, settings, arguments.seconds, status)
     hidden = secret.hidden
     if arguments.json:
         write_json(arguments.json, {"size": secret.size, **asdict(hidden)})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +35,37 @@ class Secret:
     size: float
 
 
-def draw(seed: int, table: Table, settings: CellSettings, seconds: float) -> Secret:
+class ToldScale(Scale):
+    """A scale that tells before every run of the experiment, of which a size takes several.
+
+    Parameters
+    ----------
+    tell : callable
+        Is told what begins; not of which effect.
+    table, settings, seconds
+        As of `Scale`.
+    """
+
+    def __init__(
+        self, tell: Callable[[str], None], table: Table, settings: CellSettings, seconds: float
+    ) -> None:
+        self._tell, self._runs = tell, 0
+        super().__init__(table, settings, seconds)
+
+    def size(self, hidden: HiddenEffect) -> float:
+        """Return the size of an effect in units of one sample's noise."""
+        self._runs += 1
+        self._tell(f"finding how much of the effect has the wanted size, run {self._runs}")
+        return super().size(hidden)
+
+
+def draw(
+    seed: int,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
+) -> Secret:
     """Draw effect, place, form and size.
 
     Every effect of the catalogue is as likely as any other, then every place of it.  A drawn size
@@ -50,6 +81,8 @@ def draw(seed: int, table: Table, settings: CellSettings, seconds: float) -> Sec
         The size holds for this experiment.
     seconds : float
         Duration of the experiment [s].
+    tell : callable
+        Is told before every run of the experiment; not what is tried.
 
     Returns
     -------
@@ -65,7 +98,7 @@ def draw(seed: int, table: Table, settings: CellSettings, seconds: float) -> Sec
         raise InputError(f"blind seed {seed} is negative")
     # Apart from the noise, which a user may seed with the same number.
     rng = np.random.default_rng([seed, 0x5EC2E7])
-    scale = Scale(table, replace(settings, hidden=()), seconds)
+    scale = ToldScale(tell, table, replace(settings, hidden=()), seconds)
     for _ in range(ATTEMPTS):
         effect = str(rng.choice(list(CATALOGUE)))
         _, component, form = places({effect: CATALOGUE[effect]})[

@@ -13,10 +13,9 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.recording import RecordingWriter, topics
 from wrist_stiffness.recording.messages import String
-from wrist_stiffness.simulation.blind import draw
+from wrist_stiffness.simulation.blind import ToldScale, draw
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.simulation.size import Scale
 from wrist_stiffness.workflows.cell_messages import CellMessages
 
 START_NS = 1_700_000_000_000_000_000
@@ -140,7 +139,12 @@ def check_bounds(seconds: float, rate_hz: float, seed: int) -> None:
 
 
 def hide(
-    name: str, size: float, table: Table, settings: CellSettings, seconds: float
+    name: str,
+    size: float,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> CellSettings:
     """Return the settings with one more hidden effect of a wanted size.
 
@@ -156,6 +160,8 @@ def hide(
         The experiment.
     seconds : float
         Its duration [s].
+    tell : callable
+        Is told before every run of the experiment that finds the size.
 
     Returns
     -------
@@ -183,13 +189,19 @@ def hide(
     start = HiddenEffect(
         effect, component, form or entry.forms[0], entry.plausible, settings.program_seed
     )
-    hidden = Scale(table, settings, seconds).sized(start, size)
+    hidden = ToldScale(tell, table, settings, seconds).sized(start, size)
     return replace(settings, hidden=(*settings.hidden, hidden))
 
 
-def hide_blind(seed: int, table: Table, settings: CellSettings, seconds: float) -> CellSettings:
+def hide_blind(
+    seed: int,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
+) -> CellSettings:
     """Return the settings with the effect that a seed draws (see `blind.draw`)."""
-    return replace(settings, hidden=(draw(seed, table, settings, seconds).hidden,))
+    return replace(settings, hidden=(draw(seed, table, settings, seconds, tell).hidden,))
 
 
 def on_day(day: int, settings: CellSettings) -> CellSettings:

@@ -175,11 +175,11 @@ class Comparison:
     def _fall(self, quantity: Quantity) -> str:
         first, last = self.models[0], self.models[-1]
         before, after = first.after[quantity.key].rms, last.after[quantity.key].rms
-        text = (
-            f"From {first.name} to {last.name} {quantity.name} "
-            f"{'falls' if after < before else 'rises'} from {before:.3g} to {after:.3g} "
-            f"{quantity.unit}"
-        )
+        was, is_now = f"{before:.3g}", f"{after:.3g}"
+        moves = f"{'falls' if after < before else 'rises'} from {was} to {is_now}"
+        if was == is_now:
+            moves = f"stays at {is_now}"
+        text = f"From {first.name} to {last.name} {quantity.name} {moves} {quantity.unit}"
         share = self.headroom(last, quantity.key)
         if share is None:
             left = f"{self.process[quantity.key]:.3g} {quantity.unit}"

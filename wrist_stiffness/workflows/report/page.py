@@ -145,7 +145,8 @@ def write_page(path: str | Path, page: Page) -> None:
     """
     try:
         with replacing(path) as written:
-            written.write_text(html_of(page), encoding="utf-8")
+            # A file's name may be no text: its bytes are shown by their numbers.
+            written.write_text(html_of(page), encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
