@@ -122,6 +122,19 @@ def test_each_kind_of_condition_is_found_first_with_its_size(change, name, size)
     assert shift.uncertainty < 0.3 * size
 
 
+def test_of_a_condition_that_is_constant_but_for_rounding_nothing_is_asked():
+    """A constant load as a sensor's frame turns it, and a room at 0.1 + 0.2 degrees."""
+    rng = np.random.default_rng(14)
+    observations = table(rng)
+    rounding = 1.0 + 2e-16 * rng.integers(-1, 2, N)
+    still = {"force": rounding, "fz": -rounding, "T_link_1": 0.3 * rounding}
+    zero = dict.fromkeys(("fx", "fy", "mx", "my", "mz", "moment"), np.zeros(N))
+    constant = replace(observations, covariates={**observations.covariates, **still, **zero})
+    asked, not_varied = conditions(constant)
+    assert {"load direction", "load size", "zero load", "temperature"} <= set(not_varied)
+    assert not any("with load" in each.name or "temperature" in each.name for each in asked)
+
+
 def test_twins_are_named():
     def with_twin(c):
         c["spindle"] = 2 * c["humidity"] + 5

@@ -79,7 +79,7 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "the nodes can correct it where they get its signal",
         "another session",
         "registration: 700 µm of s",
-        "3 units were left out",
+        "units left out as lost beams: 3",
         "monday: 5 spikes",
         "creep at joint_2, creep at joint_5",
         "hold a load for 60 s",

@@ -90,7 +90,7 @@ class Diagnosed:
         out += taken_up_lines(self.answer.absorbed)
         out.append(f"held-out errors are valid for {result.scope}")
         if result.lost_units:
-            out.append(f"note: {result.lost_units} units left out as lost beams")
+            out.append(f"note: units left out as lost beams: {result.lost_units}")
         return [*out, *(f"note: {remark}" for remark in self.remarks)]
 
     def as_values(self) -> dict[str, Any]:

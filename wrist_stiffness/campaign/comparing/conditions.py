@@ -14,6 +14,9 @@ from wrist_stiffness.mechanism.components import Array
 FEWEST = 4
 """A condition varies if so many units differ from the commonest value."""
 
+DECIMALS = 6
+"""Of a condition's largest value to which its values are told apart: the rest is rounding."""
+
 UNLOADED = 0.02
 """Share of the largest load up to which a unit counts as unloaded."""
 
@@ -90,11 +93,17 @@ def _varies(columns: Array, sessions: Labels) -> bool:
         size = np.abs(column).max()
         different = 0
         for session in np.unique(sessions):
-            own = np.round(column[sessions == session] / (size or 1.0), 6)
+            own = np.round(column[sessions == session] / (size or 1.0), DECIMALS)
             different += len(own) - np.unique(own, return_counts=True)[1].max()
         if different < FEWEST:
             return False
     return True
+
+
+def _difference(column: Array, other: Array | np.floating) -> Array:
+    """Return values (n,) minus others; zero where only rounding makes a difference."""
+    left = column - other
+    return np.where(np.abs(left) > 10.0**-DECIMALS * np.abs(column).max(), left, 0.0)
 
 
 def _every(covariates: Mapping[str, Array], sessions: Labels) -> Iterator[Condition]:
@@ -145,7 +154,7 @@ def _approaches(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             "approach direction",
             f"approach of motor {motor} with load",
             "For every newton more of load",
-            (sense * (force - force.mean()))[:, None],
+            (sense * _difference(force, force.mean()))[:, None],
             f"the gap between both approaches of motor {motor}",
             axis=f"approach of motor {motor} x load above its mean [N]",
         )
@@ -174,7 +183,7 @@ def _loads(covariates: Mapping[str, Array]) -> Iterator[Condition]:
             "load size",
             f"give along {name[1]} with load",
             "For every newton more of load",
-            (covariates[name] * (force - force.mean()))[:, None],
+            (covariates[name] * _difference(force, force.mean()))[:, None],
             f"the give per newton along {name[1]}",
             axis=f"{name} x load above its mean [N^2]",
         )
@@ -253,7 +262,7 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator
                 "temperature",
                 f"temperature of {place} with the angle of motor {motor}",
                 f"With the temperature of {place} and the angle of motor {motor} together",
-                (column - column.mean())[:, None] * (turned - turned.mean(axis=0)),
+                _difference(column, column.mean())[:, None] * (turned - turned.mean(axis=0)),
                 swings=True,
                 axis=axis,
                 along=column,
@@ -268,7 +277,7 @@ def _temperatures(covariates: Mapping[str, Array], sessions: Labels) -> Iterator
                 f"temperature of {place}, {minutes} late",
                 f"For every kelvin that {place} was warmer, felt about {minutes} late",
                 # What the temperature itself tells is not asked twice.
-                (late - column)[:, None],
+                _difference(late, column)[:, None],
                 axis=f"lagged minus present temperature of {place} [K]",
             )
     if not found:

@@ -266,7 +266,7 @@ def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
 
 def _absorbed(result: Diagnosis, notes: Sequence[str]) -> tuple[Part, ...]:
     parts: list[Part] = [Bullets(tuple(typeset(line) for line in result.absorbed))]
-    lost = [f"{result.lost_units} units were left out as lost beams"] if result.lost_units else []
+    lost = [f"units left out as lost beams: {result.lost_units}"] if result.lost_units else []
     if lost or notes:
         parts += [Text("To be kept in mind:"), Bullets((*lost, *notes))]
     return tuple(parts)
