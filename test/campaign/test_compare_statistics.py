@@ -135,6 +135,16 @@ def test_of_a_condition_that_is_constant_but_for_rounding_nothing_is_asked():
     assert not any("with load" in each.name or "temperature" in each.name for each in asked)
 
 
+def test_what_only_went_with_another_condition_has_the_chance_that_is_left_to_it():
+    """A speed that follows the side of approach looks like its backlash at first."""
+    rng = np.random.default_rng(15)
+    observations = table(rng, lambda c: along(3, 5e-3 * c["approach_1"]))
+    speed = np.radians(5.0) * (observations.covariates["approach_1"] + rng.normal(0, 1.0, N))
+    found = told(replace(observations, covariates={**observations.covariates, "speed_1": speed}))
+    assert [each.condition.topic for each in found.statements] == ["approach direction"]
+    assert found.silent["speed"] > 0.02
+
+
 def test_twins_are_named():
     def with_twin(c):
         c["spindle"] = 2 * c["humidity"] + 5

@@ -73,7 +73,7 @@ class Dependences:
     entered : tuple of Dependence
         Strongest first.
     p_values : (k,) float
-        Of every condition as first asked, before any entered; NaN where it does not vary.
+        Of every condition as last asked, beside those that had entered; NaN where it does not vary.
     """
 
     entered: tuple[Dependence, ...]
@@ -127,7 +127,7 @@ def dependences(
     chosen: list[int] = []
     p_entry: list[float] = []
     falls: list[float] = []
-    first = np.full(len(conditions), np.nan)
+    chances = np.full(len(conditions), np.nan)
     taken = base
     energy = noise_energy(residual, variance, taken)
     while len(chosen) < min(MOST, len(conditions)):
@@ -136,8 +136,7 @@ def dependences(
         fit = _Weighted(residual, variance, taken, every, blocks)
         p_values, gains = np.full(len(conditions), np.nan), fit.gains(owner, signs)
         p_values[asked], beyond_chance = _corrected(gains[:, asked])
-        if not chosen:
-            first = p_values
+        chances[asked] = p_values[asked]
         sure = p_values[asked] <= CHANCE
         if not sure.any():
             break
@@ -159,7 +158,7 @@ def dependences(
         flat = (own[:, None] * m + np.arange(m)).ravel()
         own_covariance = covariance[np.ix_(flat, flat)]
         entered.append(Dependence(which, slopes[own], own_covariance, p_entry[place], falls[place]))
-    return Dependences(tuple(entered), first)
+    return Dependences(tuple(entered), chances)
 
 
 def noise_energy(residual: Array, variance: Array, base: Array) -> float:
