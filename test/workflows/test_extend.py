@@ -127,6 +127,15 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert again.estimates["sag_mdeg"].sigma == pytest.approx(size.sigma)
 
 
+def test_a_formula_may_divide_by_its_parameter(model, extend_by):
+    addition = FormulaEffect(
+        "lean", "link_2", [0, 0, 0, 1, 0, 0], "lean_mdeg * theta_1 / far_deg", {"far_deg": 20.0}
+    )
+    true = addition.effect([]).with_values({"lean_mdeg": 150.0})
+    found, _ = extend_by(addition, session_of(model, true))
+    assert {each.key for each in found.extension.own} == {"lean_mdeg", "far_deg"}
+
+
 def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     addition = FileEffect("own.py:Bow@platform")

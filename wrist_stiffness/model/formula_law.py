@@ -97,8 +97,13 @@ class FormulaLaw(Law):
         )
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the formula's own parameters, without bounds."""
-        return tuple(Parameter(key, -np.inf, np.inf, np.inf, linear=False) for key in self._keys)
+        """Return the formula's own parameters, without bounds.
+
+        Their first value is 1: a formula may divide by them.
+        """
+        return tuple(
+            Parameter(key, -np.inf, np.inf, np.inf, mean=1.0, linear=False) for key in self._keys
+        )
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

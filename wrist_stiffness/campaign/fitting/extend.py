@@ -138,7 +138,11 @@ class Extension:
         judge = self.after.fit
         without, with_it = self.before.held_out(judge), self.after.held_out(judge)
         if refuted(without, with_it):
-            out.append("the error on the unseen part GROWS: leave this effect out")
+            # Its RMS may fall all the same: there wander counts like white noise.
+            out.append(
+                "the error on the unseen part GROWS, weighed with the noise and its wander: leave "
+                "this effect out"
+            )
         elif not refuted(with_it, without):
             out.append("the error on the unseen part does not fall beyond chance")
         return tuple(out)
