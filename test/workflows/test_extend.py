@@ -190,6 +190,7 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
         (CatalogueEffect("encoder_offset@motor_1"), "'calibrate' fits it"),
         (CatalogueEffect("thermal_expansion@link_1"), "temperature of ambient is missing"),
         (FileEffect("nothing.py:Bow@platform"), "no file"),
+        (FileEffect("nothing.py:Bow"), "of your own, laws.py:Twist@platform"),
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "sin(theta_1)", {}),
             "has no parameter to fit",

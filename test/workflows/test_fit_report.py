@@ -1,5 +1,7 @@
 """What a fit tells a technician."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.fit import fit
@@ -13,7 +15,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.fit_report import told_lines, untold_lines
+from wrist_stiffness.workflows.fit_report import told_lines, tolerances, untold_lines
 
 
 def test_what_is_not_told_stands_under_what_to_record():
@@ -41,3 +43,7 @@ def test_what_is_not_told_stands_under_what_to_record():
     ]
     (line,) = told_lines(found.parameters)
     assert line.split()[:2] == ["encoder_offset@motor_1", "offset_mdeg"]
+    # A gap is usual where shims follow the axes, and -36 um of it no more than that.
+    shimmed = replace(found.parameters[-1], value=-36.0, prior=-35.0, usual=10.0)
+    assert tolerances(shimmed) == "0.1 x its usual size from -35"
+    assert tolerances(replace(shimmed, prior=0.0)) == "3.6 x its usual size"

@@ -180,7 +180,10 @@ def at_component(text: str) -> tuple[str, str]:
     """
     name, _, component = text.rpartition("@")
     if not name or not component:
-        raise InputError(f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2")
+        raise InputError(
+            f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2 or, of your own, "
+            "laws.py:Twist@platform"
+        )
     return name, component
 
 

@@ -210,4 +210,6 @@ def plus_minus(value: float, sigma: float) -> str:
 
 def tolerances(parameter: Fitted) -> str:
     """Return how far a parameter went, in the words of a fitter."""
-    return f"{abs(parameter.moved):.1f} x its usual size"
+    text = f"{abs(parameter.moved):.1f} x its usual size"
+    # The usual gap is where shims follow the axes; 11.5 ppm/K is steel.
+    return f"{text} from {parameter.prior:.3g}" if parameter.prior else text
