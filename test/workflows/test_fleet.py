@@ -1,6 +1,8 @@
 """Many recordings at once: each answers or says why not."""
 
 import os
+import signal
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -96,3 +98,37 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
     monkeypatch.setattr("wrist_stiffness.workflows.fleet.CONNECT_S", 0.5)
     with pytest.raises(InputError, match="tcp://127.0.0.1:9"):
         map_recordings(partial(judge, length=0), PATHS, "tcp://127.0.0.1:9")
+
+
+HANGING = """
+import sys
+from pathlib import Path
+from threading import Event
+from wrist_stiffness.workflows.fleet import map_recordings
+
+def hang(path):
+    path.write_text("begun")
+    Event().wait()
+
+if __name__ == "__main__":
+    try:
+        map_recordings(hang, [Path(name) for name in sys.argv[1:]], workers=2)
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+def test_an_interrupt_at_the_terminal_ends_all_without_a_word(tmp_path):
+    """Ctrl-C goes to every process of the terminal; each worker ended with a traceback."""
+    program = tmp_path / "hanging.py"
+    program.write_text(HANGING)
+    begun = [tmp_path / name for name in ("a", "b")]
+    for path in begun:
+        os.mkfifo(path)
+    argv = [sys.executable, str(program), *map(str, begun)]
+    with subprocess.Popen(argv, stderr=subprocess.PIPE, start_new_session=True) as ran:
+        for path in begun:
+            assert path.read_text() == "begun"
+        os.killpg(ran.pid, signal.SIGINT)
+        assert ran.stderr.read() == b""
+    assert ran.returncode == 130

@@ -15,8 +15,10 @@ runs; a cluster needs them on a file system that all see.
 
 from __future__ import annotations
 
+import logging
 import os
 import pickle
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -138,12 +140,15 @@ def _client(scheduler_address: str | None, workers: int) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
     if scheduler_address is None:
-        with (
-            LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0"
-            ) as local,
-            Client(local) as client,
-        ):
+        with _deaf_to_interrupts():
+            local = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address="127.0.0.1:0",
+                # What befalls a recording is told in its row.
+                silence_logs=logging.CRITICAL,
+            )
+        with local, Client(local) as client:
             yield client
         return
     try:
@@ -155,6 +160,19 @@ def _client(scheduler_address: str | None, workers: int) -> Iterator[Any]:
     with client:
         _require_same_version(client, scheduler_address)
         yield client
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Let processes that start here ignore Ctrl-C, which a terminal sends to all of them.
+
+    This process ends them; on their own each would do so with a traceback.
+    """
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _require_same_version(client: Any, scheduler_address: str) -> None:
