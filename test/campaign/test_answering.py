@@ -360,12 +360,13 @@ class TestWhatDoesNotHold:
 class TestClassesWhoseLawsDiffer:
     """An eccentric encoder whose slopes were a gear's left 299,000 as a gear, 4,215 as it is."""
 
-    def judged(self, *named, variance=2.0 * INEXACT, laws=AXIS, left=500.0, **told):
+    def judged(self, *named, variance=2.0 * INEXACT, laws=AXIS, left=500.0, fit=AXIS, fits=()):
         """Return the answer where slopes name a class at last and `laws` its first member."""
         unsure = finding(PLAY, AXIS)
-        quick = answer("unknown", *named, share=told.pop("share", LITTLE))
+        quick = answer("unknown", *named, share=LITTLE)
         quick = replace(quick, findings=(*quick.findings, unsure))
-        search = Asked(quick, beside=answer("none"), found=[*named, PLAY], **told)
+        search = Asked(quick, beside=answer("none"), found=[*named, fit])
+        search.places["quick"] = place(*named, fits=fits)
         search.classes = []
 
         def by_law(names, members):
@@ -398,8 +399,12 @@ class TestClassesWhoseLawsDiffer:
         assert search.classes == []
 
     def test_they_are_not_asked_where_whole_fits_gave_the_answer(self):
-        search, where, _, _ = self.judged(explained=True, share=MORE)
-        assert list(where.fits) == [PLAY]
+        search, _, _, _ = self.judged(fits=[AXIS])
+        assert search.classes == []
+
+    def test_they_are_not_asked_where_a_fit_led_to_the_first_of_the_class(self):
+        search, where, _, _ = self.judged(fit=PLAY)
+        assert where is search.places["quick"]
         assert search.classes == []
 
     @pytest.mark.parametrize("other", [{"left": 1000.0}, {"laws": ""}, {"laws": DELAY}])

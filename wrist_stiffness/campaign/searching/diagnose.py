@@ -213,11 +213,18 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
 
 
 def _by_law(search: Search, ask: Ask, result: Diagnosis) -> tuple[Place, Diagnosis] | None:
-    """Return an answer in which whole fits tell apart what slopes did not; None without a class."""
-    of_several = [n for n, each in enumerate(result.findings) if len(each.members) > 1]
-    if not of_several:
+    """Return an answer in which whole fits tell apart what slopes did not.
+
+    None without a class, or where fits had led to its first member already.
+    """
+    unsure_at = [
+        n
+        for n, each in enumerate(result.findings)
+        if len(each.members) > 1 and each.name not in search.found
+    ]
+    if not unsure_at:
         return None
-    before, unsure = result.findings[: of_several[0]], result.findings[of_several[0]]
+    before, unsure = result.findings[: unsure_at[0]], result.findings[unsure_at[0]]
     place = search.by_law([each.name for each in before], unsure.names)
     if place is None:
         return None
