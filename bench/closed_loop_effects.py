@@ -73,6 +73,7 @@ ON_WRONG_BASE = (
     *("backlash@motor_1:single", "drive_compliance@motor_1:linear"),
     *("transmission_error@motor_1:single", "encoder_eccentricity@motor_1:once"),
     *("mount_compliance@motor_1:plain", "gravity@platform:mass"),
+    *("joint_clearance@joint_1:algebraic", "joint_friction@joint_2:coulomb"),
 )
 
 FAULT = 5.0

@@ -16,7 +16,7 @@ from wrist_stiffness.campaign.searching.diagnose import (
     _settled,
     _with_all,
 )
-from wrist_stiffness.campaign.searching.place import Place
+from wrist_stiffness.campaign.searching.place import INEXACT, Place
 from wrist_stiffness.campaign.searching.seeking import PRESSING
 from wrist_stiffness.diagnosis import Diagnosis
 from wrist_stiffness.diagnosis.result import Finding, Unexplained
@@ -25,8 +25,9 @@ AXIS, DELAY, PLAY = "axis_misalignment@joint_4", "time_delay@pose_sensor", "join
 LITTLE, MORE = 0.5 * MUCH, 2.0 * MUCH
 
 
-def finding(name):
-    return Finding((tuple(name.split("@")),), {}, 0.1, 50.0, 0.001, 1.0, {}, "yes", "", "")
+def finding(*names):
+    members = tuple(tuple(name.split("@")) for name in names)
+    return Finding(members, {}, 0.1, 50.0, 0.001, 1.0, {}, "yes", "", "")
 
 
 def answer(verdict, *names, share=0.0, after=3.0):
@@ -325,7 +326,7 @@ class TestWhatDoesNotHold:
 
         def judge(place, result):
             kept = [name for name in names(result) if name in held]
-            return SimpleNamespace(base=SimpleNamespace(extras=tuple(kept)))
+            return SimpleNamespace(base=SimpleNamespace(extras=tuple(kept), variance=1.0))
 
         return _judged(search, search.ask, judge)
 
@@ -354,6 +355,65 @@ class TestWhatDoesNotHold:
         where, result, judged = self.judged(search)
         assert where is search.places["quick"]
         assert judged.base.extras == ()
+
+
+class TestClassesWhoseLawsDiffer:
+    """An eccentric encoder whose slopes were a gear's left 299,000 as a gear, 4,215 as it is."""
+
+    def judged(self, *named, variance=2.0 * INEXACT, laws=AXIS, left=500.0, fit=AXIS, fits=()):
+        """Return the answer where slopes name a class at last and `laws` its first member."""
+        unsure = finding(PLAY, AXIS)
+        quick = answer("unknown", *named, share=LITTLE)
+        quick = replace(quick, findings=(*quick.findings, unsure))
+        search = Asked(quick, beside=answer("none"), found=[*named, fit])
+        search.places["quick"] = place(*named, fits=fits)
+        search.classes = []
+
+        def by_law(names, members):
+            search.classes.append((names, members))
+            return search.places["by law"]
+
+        def judge(place, result):
+            cost = left if place is search.places["by law"] else 1000.0
+            base = SimpleNamespace(extras=names(result), variance=variance, cost=cost)
+            return SimpleNamespace(base=base)
+
+        search.by_law = by_law
+        search.places["by law"] = place(*named)
+        search.answers["by law"] = answer("effect", *([laws] if laws else []))
+        return search, *_judged(search, search.ask, judge)
+
+    @pytest.mark.parametrize("named", [(), (DELAY,)])
+    def test_whole_fits_tell_which_is_first(self, named):
+        search, where, result, _ = self.judged(*named)
+        assert search.classes == [(list(named), (PLAY, AXIS))]
+        assert where is search.places["by law"]
+        assert [each.names for each in result.findings] == [(each,) for each in named] + [
+            (AXIS, PLAY)
+        ]
+        assert result.verdict == "effect"
+
+    def test_they_are_not_asked_where_little_is_left(self):
+        search, where, _, _ = self.judged(variance=0.9 * INEXACT)
+        assert where is search.places["quick"]
+        assert search.classes == []
+
+    def test_they_are_not_asked_where_whole_fits_gave_the_answer(self):
+        search, _, _, _ = self.judged(fits=[AXIS])
+        assert search.classes == []
+
+    def test_they_are_not_asked_where_a_fit_led_to_the_first_of_the_class(self):
+        search, where, _, _ = self.judged(fit=PLAY)
+        assert where is search.places["quick"]
+        assert search.classes == []
+
+    @pytest.mark.parametrize("other", [{"left": 1000.0}, {"laws": ""}, {"laws": DELAY}])
+    def test_the_first_answer_stands_where_they_name_nothing_of_it_or_leave_as_much(self, other):
+        search, where, result, judged = self.judged(**other)
+        assert search.classes
+        assert where is search.places["quick"]
+        assert judged.base.cost == 1000.0
+        assert [each.names for each in result.findings] == [(PLAY, AXIS)]
 
 
 @pytest.mark.parametrize(

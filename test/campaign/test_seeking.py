@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.fitting.recipes import effect_at
-from wrist_stiffness.campaign.searching import seeking
+from wrist_stiffness.campaign.searching import stepwise
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_candidates
 from wrist_stiffness.campaign.searching.contributions import contributions
@@ -63,7 +63,7 @@ def reached(model, units, alone, *extras):
 @pytest.fixture(scope="module")
 def both(model, alone, candidates):
     """Where the search arrives from the base alone."""
-    return seeking._extended(Fitter(model), Reached(alone, {}, alone.cost), candidates)
+    return stepwise.extended(Fitter(model), Reached(alone, {}, alone.cost), candidates)
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_what_does_not_pay_beside_the_others_is_taken_out(model, units, alone):
     idle = effect("time_delay@load_sensor", delay_ms=1.0)
     width = effect("backlash@motor_1", width_mdeg=40.0)
     late = effect("time_delay@motor_2", delay_ms=8.0)
-    thinned = seeking._thinned(Fitter(model), reached(model, units, alone, idle, width, late))
+    thinned = stepwise._thinned(Fitter(model), reached(model, units, alone, idle, width, late))
     assert thinned.prices.keys() == {"backlash@motor_1", "time_delay@motor_2"}
 
 
@@ -89,11 +89,11 @@ def test_the_place_of_a_wrong_effect_goes_to_the_right_one(model, units, alone, 
     wrong = effect("time_delay@pose_sensor", delay_ms=1.0)
     width = effect("backlash@motor_1", width_mdeg=40.0)
     start = reached(model, units, alone, wrong, width)
-    swapped = seeking._contested(Fitter(model), start, wrong.name, candidates)
+    swapped = stepwise._contested(Fitter(model), start, wrong.name, candidates)
     assert swapped.prices.keys() == {"backlash@motor_1", "time_delay@motor_2"}
     assert swapped.base.cost < start.base.cost
     # The right one keeps its place.
-    assert seeking._contested(Fitter(model), swapped, width.name, candidates) is swapped
+    assert stepwise._contested(Fitter(model), swapped, width.name, candidates) is swapped
 
 
 @pytest.mark.slow
@@ -107,7 +107,7 @@ def test_a_rival_that_explains_less_is_not_fitted_with_the_base(model, units, al
     def never(*given):
         pytest.fail("fitted, which takes seconds")
 
-    assert seeking._contested(never, start, width.name, rivals) is start
+    assert stepwise._contested(never, start, width.name, rivals) is start
 
 
 @pytest.mark.slow

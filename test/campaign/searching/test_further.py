@@ -2,8 +2,8 @@
 
 import pytest
 
-from wrist_stiffness.campaign.searching.place import ROUGH
-from wrist_stiffness.campaign.searching.seeking import INEXACT, Search
+from wrist_stiffness.campaign.searching.place import ASTRAY, INEXACT
+from wrist_stiffness.campaign.searching.seeking import Search
 
 PLAY = "joint_clearance@joint_1"
 BACKLASH = "backlash@motor_1"
@@ -77,7 +77,7 @@ def test_what_rounded_walls_promise_and_the_law_does_not_keep_is_no_answer(wrist
 @pytest.mark.parametrize(("share", "tried"), [(0.9, False), (1.1, True)])
 def test_a_joint_that_rubs_is_tried_beside_play_that_leaves_very_much(wrist, share, tried):
     """What it holds off its wall is no play, and alone it explains little."""
-    left = share * ROUGH * NUMBERS
+    left = share * ASTRAY * NUMBERS
     wrist.left = wrist.leaves(alone=5000, b=4000, bp=left, bpf=left / 2, bpq=5000)
     search = Search(wrist, ())
     fit = wrist.reached(BACKLASH, PLAY).base
@@ -94,7 +94,7 @@ def test_a_joint_that_rubs_is_tried_beside_play_that_leaves_very_much(wrist, sha
 @pytest.mark.parametrize(("share", "tried"), [(0.9, False), (1.1, True)])
 def test_where_nothing_was_named_play_is_tried_beside_what_rubs_most(wrist, share, tried):
     """Either alone explains little of what both do, and only if very much is left is it asked."""
-    left = share * ROUGH * NUMBERS
+    left = share * ASTRAY * NUMBERS
     wrist.left = wrist.leaves(alone=left, f=0.8 * left, g=0.9 * left, fp=0.5 * left, gp=left)
     wrist.left |= wrist.leaves(p=0.5 * left, b=0.9 * left, bf=left, bfp=left)
     wrist.beside = wrist.leaves(fp=0.1 * left)
@@ -140,3 +140,22 @@ def test_play_that_explains_nothing_beside_what_was_named_is_no_answer(wrist):
     assert search.further([BACKLASH], {}) is None
     # Nor is anything tried beside what only slopes named.
     assert search.further([CREEP], {}) is None
+
+
+def test_members_of_a_class_are_fitted_one_by_one_beside_what_was_named_before(wrist):
+    """What slopes do not tell apart, laws may."""
+    wrist.left = wrist.leaves(alone=1000, b=600, c=990, d=980, bc=300, bd=250, bdc=249)
+    search = Search(wrist, ())
+    wrist.done.clear()
+    place = search.by_law([BACKLASH], (CREEP, DELAY))
+    assert place.known
+    assert place.base.extras == (BACKLASH,)
+    assert {name: fit.cost for name, fit in place.fits.items()} == {CREEP: 300, DELAY: 250}
+    assert search.by_law([PLAY], (CREEP, DELAY)) is None
+
+
+def test_members_that_explain_nothing_are_no_answer(wrist):
+    wrist.left = wrist.leaves(alone=1000, c=990, d=300)
+    search = Search(wrist, ())
+    assert set(search.by_law([], (CREEP, DELAY)).fits) == {DELAY}
+    assert search.by_law([], (CREEP,)) is None

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from wrist_stiffness.campaign.searching import seeking
+from wrist_stiffness.campaign.searching import stepwise
 from wrist_stiffness.campaign.searching.place import WORTH, Reached
 from wrist_stiffness.campaign.searching.screening import Fitted
 
@@ -42,19 +42,19 @@ def whole(monkeypatch):
         done.append(name)
         return Reached(SimpleNamespace(cost=costs[name]), {name: added.price}, COST)
 
-    monkeypatch.setattr(seeking, "_with", with_base)
+    monkeypatch.setattr(stepwise, "with_one_more", with_base)
     return SimpleNamespace(costs=costs, done=done)
 
 
 def test_leaders_whose_laws_keep_nothing_end_the_search(whole):
     reached = promising(play=-3.0, cable=WORTH - 1.0)
-    assert seeking._one_more(None, reached, ()) is None
+    assert stepwise._one_more(None, reached, ()) is None
     assert whole.done == []
 
 
 def test_a_fit_that_does_not_pay_beside_the_whole_base_gives_way_to_the_next(whole):
     whole.costs.update(play=COST, cable=COST - PRICE - WORTH - 1.0)
-    more = seeking._one_more(None, promising(play=PROMISED, cable=100.0), ())
+    more = stepwise._one_more(None, promising(play=PROMISED, cable=100.0), ())
     assert whole.done == ["play", "cable"]
     assert more.prices == {"cable": PRICE}
 
@@ -62,5 +62,5 @@ def test_a_fit_that_does_not_pay_beside_the_whole_base_gives_way_to_the_next(who
 def test_a_step_is_given_up_after_three_fits_that_do_not_pay(whole):
     kept = {"a": 400.0, "b": 150.0, "c": 60.0, "d": 50.0, "e": 40.0}
     whole.costs.update(dict.fromkeys(kept, COST - PRICE - WORTH + 1.0))
-    assert seeking._one_more(None, promising(**kept), ()) is None
+    assert stepwise._one_more(None, promising(**kept), ()) is None
     assert whole.done == ["a", "b", "c"]

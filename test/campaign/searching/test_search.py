@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_equal
 
-from wrist_stiffness.campaign.searching import seeking
+from wrist_stiffness.campaign.searching import stepwise
 from wrist_stiffness.campaign.searching.place import EXACT, ROUGH, WORTH
 from wrist_stiffness.campaign.searching.screening import Fitted
 from wrist_stiffness.campaign.searching.seeking import Search
@@ -23,7 +23,7 @@ def test_what_an_inexact_law_leaves_of_a_large_effect_draws_nothing_in(wrist, in
     """Else an effect that is not there would be named beside every large one."""
     wrist.left = wrist.leaves(b=20e3, bd=20e3 - 1e3)
     reached = wrist.reached(BACKLASH, first=20e3 + inexact / EXACT**2)
-    more = seeking._one_more(wrist, reached, [wrist.candidate(DELAY)])
+    more = stepwise._one_more(wrist, reached, [wrist.candidate(DELAY)])
     assert (more is not None) == enters
 
 
@@ -33,7 +33,7 @@ def test_a_fit_that_leaves_very_much_is_begun_from_the_drawing_too(wrist, share,
     large = share * ROUGH * NUMBERS
     wrist.left, wrist.afresh = wrist.leaves(alone=2.0 * large, b=large), wrist.leaves(b=NUMBERS)
     added = Fitted(wrist.candidate(BACKLASH), {}, large, PRICE)
-    found = seeking._with(wrist, wrist.reached(), added)
+    found = stepwise.with_one_more(wrist, wrist.reached(), added)
     assert len(wrist.done) == starts
     assert found.base.cost == (NUMBERS if starts == 2 else large)
     assert found.prices == {BACKLASH: PRICE}
@@ -44,14 +44,14 @@ def test_the_better_of_two_starts_is_kept(wrist):
     large = 2.0 * ROUGH * NUMBERS
     wrist.left, wrist.afresh = wrist.leaves(alone=2.0 * large, b=large), wrist.leaves(b=1.5 * large)
     added = Fitted(wrist.candidate(BACKLASH), {}, large, PRICE)
-    assert seeking._with(wrist, wrist.reached(), added).base.cost == large
+    assert stepwise.with_one_more(wrist, wrist.reached(), added).base.cost == large
 
 
 def test_an_effect_that_entered_first_gives_its_place_to_a_better_one(wrist):
     """What explains most alone is not always what explains most beside the others."""
     wrist.left = wrist.leaves(alone=1000, c=500, d=700, b=800, bc=300, cd=460, bd=280, bcd=278)
     known = [wrist.candidate(each) for each in (BACKLASH, CREEP, DELAY)]
-    found = seeking._extended(wrist, wrist.reached(first=1000.0), known)
+    found = stepwise.extended(wrist, wrist.reached(first=1000.0), known)
     assert found.prices.keys() == {BACKLASH, DELAY}
     assert found.base.cost == 280
 
@@ -61,7 +61,7 @@ def test_a_rival_takes_no_place_by_promises(wrist):
     wrist.left, wrist.promised = wrist.leaves(b=800, bc=300, bd=310), {DELAY: 600.0}
     begun = wrist.reached(CREEP, BACKLASH, first=1000.0)
     known = [wrist.candidate(each) for each in (BACKLASH, CREEP, DELAY)]
-    assert seeking._contested(wrist, begun, CREEP, known) is begun
+    assert stepwise._contested(wrist, begun, CREEP, known) is begun
     assert [names for names, _, _ in wrist.done] == [{BACKLASH, DELAY}]
 
 

@@ -22,7 +22,7 @@ from wrist_stiffness.campaign.searching.contributions import (
     ranked,
 )
 from wrist_stiffness.campaign.searching.fitter import Fitter, Tell, silent
-from wrist_stiffness.campaign.searching.place import Place
+from wrist_stiffness.campaign.searching.place import INEXACT, Place
 from wrist_stiffness.campaign.searching.possible import possible
 from wrist_stiffness.campaign.searching.refit import (
     Refitted,
@@ -34,7 +34,8 @@ from wrist_stiffness.campaign.searching.refit import (
     valued,
     withdrawn,
 )
-from wrist_stiffness.campaign.searching.seeking import MOST_EXTRAS, PRESSING, Search
+from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
+from wrist_stiffness.campaign.searching.stepwise import MOST_EXTRAS
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis import Diagnosis, Settings
@@ -169,6 +170,12 @@ def _judged(
     """
     place, result = _answered(search, ask)
     judged = judge(place, result)
+    if not place.fits and judged.base.variance >= INEXACT:
+        other = _by_law(search, ask, result)
+        if other is not None:
+            again = judge(*other)
+            if again.base.cost < judged.base.cost:
+                return *other, again
     held = len(judged.base.extras)
     if held == len(result.findings) or place.fits:
         return place, result, judged
@@ -203,6 +210,32 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
         if other is not None and _says_more(other[1], result):
             return other
     return (place, result) if sought else _furthered(search, ask, place, result)
+
+
+def _by_law(search: Search, ask: Ask, result: Diagnosis) -> tuple[Place, Diagnosis] | None:
+    """Return an answer in which whole fits tell apart what slopes did not.
+
+    None without a class, or where fits had led to its first member already.
+    """
+    unsure_at = [
+        n
+        for n, each in enumerate(result.findings)
+        if len(each.members) > 1 and each.name not in search.found
+    ]
+    if not unsure_at:
+        return None
+    before, unsure = result.findings[: unsure_at[0]], result.findings[unsure_at[0]]
+    place = search.by_law([each.name for each in before], unsure.names)
+    if place is None:
+        return None
+    more = _with_the_first(search, place, ask)
+    if not more.findings or more.findings[0].name not in unsure.names:
+        return None
+    first, *others = more.findings
+    left = [each for each in unsure.members if each not in first.members]
+    first = replace(first, members=(*first.members, *left))
+    more = replace(more, findings=(first, *others))
+    return place, _together(replace(result, findings=before), more)
 
 
 def _furthered(

@@ -28,6 +28,11 @@ ROUGH = 10.0
 a base that gave way to a large effect does not find back."""
 
 
+ASTRAY = 4.0
+"""Variance of what is left, in units of the noise, from which what is missing is sought from afar:
+inexact laws of what was found leave less."""
+
+
 @dataclass(frozen=True, eq=False)
 class Place:
     """A base and the catalogue about it, for the statistics.
@@ -82,6 +87,11 @@ class Reached:
     def rough(self) -> bool:
         """Whether so much is left that a fit is begun from the drawing as well."""
         return self.base.cost > ROUGH * float(self.base.problem.table.measured.sum())
+
+    @property
+    def astray(self) -> bool:
+        """Whether so much is left that what is missing is sought from afar."""
+        return self.base.cost > ASTRAY * float(self.base.problem.table.measured.sum())
 
     @property
     def gave_way(self) -> bool:

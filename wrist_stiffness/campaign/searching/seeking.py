@@ -1,7 +1,6 @@
 """The point about which effects become columns: the base, fitted along with what shows beside it.
 
-Effects enter one at a time with their own laws, for as long as the next one pays for its freedom.
-After each the earlier ones must still pay, and at the end each must be the best in its place.
+Where slopes lead nowhere, what they do not show is fitted whole.
 """
 
 from __future__ import annotations
@@ -23,29 +22,16 @@ from wrist_stiffness.campaign.searching.place import (
     Reached,
     point_of,
 )
-from wrist_stiffness.campaign.searching.screening import Fitted
+from wrist_stiffness.campaign.searching.stepwise import extended, with_one_more, without_one
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 
 Sessions = tuple[UnitSession, ...]
 
-LEADING = 0.3
-"""Candidates that explain this share of what the best explains are fitted too."""
-
-MOST_FITTED = 6
-"""So many leaders are fitted with their own law, the base to first order."""
-
-CLOSE, MOST_REFITTED = 0.6, 2
-"""So many candidates that gain nearly as much as the best are fitted with the whole base: what the
-base took up of one of them shows only then."""
-
 CAUGHT = 0.5
 """Share of what effects seem to explain from which on it is the base's own: a wrong flange had
 caught it at first, and what is found at such a place stands in for that."""
-
-MOST_TRIED = 3
-"""So many candidates are fitted with the whole base before a step is given up."""
 
 PRESSING = frozenset(("axis_misalignment", "flange_contact", "gravity"))
 """Laws that press and open flanges: where the base took up a part of one, other flanges touch, and
@@ -59,9 +45,6 @@ CLOSING = frozenset(("bushing_stiffness", "bushing_hardening"))
 
 UNSEEN = PRESSING | RUBBING | LOOSE
 """Laws that no slope shows as they are."""
-
-MOST_EXTRAS = 3
-"""With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
 
 
 class Search:
@@ -86,7 +69,7 @@ class Search:
         """Search from a base alone."""
         self._first = Reached(base, {}, base.cost)
         self._catalogue = self._at(self._first)
-        self._reached = _extended(self._fitter, self._first, self._catalogue)
+        self._reached = extended(self._fitter, self._first, self._catalogue)
         self._alone = self._again()
 
     def _again(self) -> Reached:
@@ -184,19 +167,41 @@ class Search:
         begun = self._named(names, fits)
         if begun is None or begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
             return None
-        if (fits or not names) and not begun.rough:
+        if (fits or not names) and not begun.astray:
             return None
-        if begun.rough:
+        if begun.astray:
             trials = from_afar(self._fitter, begun, self._catalogue)
         else:
             trials = self._trials(begun, self.beside(begun.base, LOOSE).candidates)
-        trials = {name: each for name, each in trials.items() if each.total < begun.total}
-        if not trials:
+        return self._side_by_side(begun, trials)
+
+    def by_law(self, names: Collection[str], members: Collection[str]) -> Place | None:
+        """Fit what slopes do not tell apart one by one with the whole base, beside what was named.
+
+        None where no fit has what was named, or none of them explains anything.
+
+        Parameters
+        ----------
+        names : collection of str
+            What was named before.
+        members : collection of str
+            Of a class.
+        """
+        begun = self._named(names, {})
+        if begun is None:
             return None
-        if not begun.rough:
-            self._finish(trials)
+        tried = [each for each in self.beside(begun.base).candidates if each.name in members]
+        return self._side_by_side(begun, self._trials(begun, tried))
+
+    def _side_by_side(self, begun: Reached, trials: Mapping[str, Reached]) -> Place | None:
+        """Return the place of fits that explain anything beside what was found; None without."""
+        worthy = {name: each for name, each in trials.items() if each.total < begun.total}
+        if not worthy:
+            return None
+        if not begun.astray:
+            self._finish(worthy)
         known = self.beside(begun.base).candidates
-        return replace(_as_they_are(begun, known, trials), known=True)
+        return replace(_as_they_are(begun, known, worthy), known=True)
 
     def _named(self, names: Collection[str], fits: Mapping[str, BaseFit]) -> Reached | None:
         """Return where the search stands with what was named alone; None where no fit has it."""
@@ -209,7 +214,7 @@ class Search:
         if not begun.prices.keys() & set(names):
             return None
         for name in [each for each in begun.prices if each not in names]:
-            begun = _without(self._fitter, begun, name)
+            begun = without_one(self._fitter, begun, name)
         return begun
 
     def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
@@ -217,7 +222,7 @@ class Search:
         screen, found = begun.screen(), {}
         leaders = screen.leaders(tried)
         for value, each, shape in leaders:
-            found[each.name] = _with(self._fitter, begun, screen.fitted(each, shape, value))
+            found[each.name] = with_one_more(self._fitter, begun, screen.fitted(each, shape, value))
         return found
 
     def _finish(self, trials: dict[str, Reached]) -> None:
@@ -310,82 +315,3 @@ def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[
         for name, each in extras.items()
         if name not in usual
     }
-
-
-def _extended(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reached:
-    """Add effects while they pay, and let each of them hold its place."""
-    while len(reached.prices) < MOST_EXTRAS:
-        more = _one_more(fitter, reached, candidates)
-        if more is None:
-            break
-        reached = _thinned(fitter, more)
-    if len(reached.prices) > 1:
-        for name in reached.prices:
-            reached = _contested(fitter, reached, name, candidates)
-    return reached
-
-
-def _one_more(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reached | None:
-    """Add the effect that gains most with its own law, if it pays."""
-    screen = reached.screen()
-    leaders = screen.leaders([each for each in candidates if each.name not in reached.prices])
-    least = reached.least
-    chosen = [each for each in leaders if each[0] > max(least, LEADING * leaders[0][0])]
-    fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
-    # Columns may promise what the law itself, within its bounds, does not keep.
-    hopeful = sorted((each for each in fits if each.gain > least), key=lambda each: -each.gain)
-    hopeful = hopeful[:MOST_TRIED]
-    while hopeful:
-        close = [each for each in hopeful if each.gain > CLOSE * hopeful[0].gain][:MOST_REFITTED]
-        trials = [_with(fitter, reached, each) for each in close]
-        best = min(trials, key=lambda each: each.total)
-        if reached.total - best.total > least - WORTH:
-            return best
-        hopeful = hopeful[len(close) :]
-    return None
-
-
-def _thinned(fitter: Fitter, reached: Reached) -> Reached:
-    """Take out effects that do not pay any more beside the newest."""
-    for name in list(reached.prices)[:-1]:
-        lost = reached.screen(without=name).energy - reached.screen().energy
-        if lost < WORTH + reached.prices[name]:
-            less = _without(fitter, reached, name)
-            reached = less if less.total < reached.total else reached
-    return reached
-
-
-def _contested(fitter: Fitter, reached: Reached, name: str, candidates: Candidates) -> Reached:
-    """Give the place of one effect to another where that explains more beside all the others."""
-    screen = reached.screen(without=name)
-    others = reached.prices.keys() - {name}
-    value, best, shape = screen.leaders([e for e in candidates if e.name not in others])[0]
-    if best.name == name or value < WORTH:
-        return reached
-    rival = screen.fitted(best, shape, value)
-    kept = screen.energy - reached.screen().energy - reached.prices[name]
-    if rival.gain < kept:
-        return reached
-    swapped = _with(fitter, reached, rival, instead_of=name)
-    return swapped if swapped.total < reached.total else reached
-
-
-def _with(
-    fitter: Fitter, reached: Reached, added: Fitted, instead_of: str | None = None
-) -> Reached:
-    prices = {name: price for name, price in reached.prices.items() if name != instead_of}
-    extras = [reached.effects[name] for name in prices] + [added.effect]
-    sessions = reached.base.problem.sessions
-    base = fitter(sessions, extras, reached.base)
-    found = replace(reached, base=base, prices={**prices, added.candidate.name: added.price})
-    if found.rough:
-        afresh = replace(found, base=fitter(sessions, extras))
-        found = min(found, afresh, key=lambda each: each.total)
-    return found
-
-
-def _without(fitter: Fitter, reached: Reached, name: str) -> Reached:
-    prices = {own: price for own, price in reached.prices.items() if own != name}
-    extras = [reached.effects[own] for own in prices]
-    base = fitter(reached.base.problem.sessions, extras, reached.base)
-    return replace(reached, base=base, prices=prices)
