@@ -11,6 +11,8 @@ import pytest
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.compare_fleet import FleetComparison
+from wrist_stiffness.workflows.fleet import FleetRow
 
 DATA = Path(__file__).parents[1] / "data"
 BACKLASH = """\
@@ -120,6 +122,18 @@ def test_a_model_fitted_to_the_recording_is_said_to_be(with_backlash, tmp_path, 
     model.write_text(with_backlash.read_text() + lineage)
     assert main(["compare", str(DATA / "wrist_b.mcap"), "--model", str(model)]) == 0
     assert "fitted was fitted to one of these recordings" in capsys.readouterr().out
+
+
+def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong():
+    mistake = "Look at the set-up first: with positions times 1000 the error falls"
+    model = {"model": "wrist_7", "after_registration": {"s_um": {"rms": 4.9}}, "depends_on": []}
+    values = {"models": [model], "noise_floor": {"s_um": 0.004}, "verdict": ["off", mistake]}
+    rows = (FleetRow(Path("a"), values), FleetRow(Path("b"), None, "no recording"))
+    title, _, row, _, _, told = FleetComparison(rows).lines()
+    assert title.startswith("wrist_7, RMS with registrations")
+    assert row.split()[:3] == ["a", "4.9", "0.004"]
+    assert told == f"a: {mistake}"
+    assert FleetComparison(rows[1:]).lines()[-1] == "b  not compared: no recording"
 
 
 @pytest.mark.slow

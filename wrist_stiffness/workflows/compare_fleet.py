@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wrist_stiffness.campaign.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import compare
@@ -30,16 +31,25 @@ class FleetComparison:
     def lines(self) -> list[str]:
         """Return one table for a terminal."""
         wide = max(len(str(row.path)) for row in self.rows)
+        models = {row.result["models"][-1]["model"] for row in self.rows if row.result is not None}
         out = [
+            *(f"{name}, RMS with registrations, zeros, tare refitted" for name in models),
             f"{'recording':{wide}}{'s [um]':>10}{'floor':>8}{'phi [mdeg]':>12}{'floor':>8}  "
-            "strongest dependence"
+            "strongest dependence",
         ]
         for row in self.rows:
             if row.result is None:
                 out.append(f"{row.path!s:{wide}}  not compared: {row.error}")
             else:
                 out.append(f"{row.path!s:{wide}}{_cells(row.result)}")
-        return out
+        mistakes = [
+            f"{row.path}: {sentence}"
+            for row in self.rows
+            if row.result is not None
+            for sentence in row.result["verdict"]
+            if sentence.startswith(LOOK_FIRST)
+        ]
+        return [*out, *(["", *mistakes] if mistakes else [])]
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""

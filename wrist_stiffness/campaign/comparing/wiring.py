@@ -20,6 +20,9 @@ from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 
+LOOK_FIRST = "Look at the set-up first"
+"""How the sentence begins that tells a mistake."""
+
 WORTH_ASKING = 2.0
 """Error over the noise floor from which a mistake is looked for."""
 
@@ -139,8 +142,7 @@ def told_mistake(
             )
             best = (
                 share,
-                f"Look at the set-up first: with {mistake.without} the error falls {fall}; "
-                f"{mistake.check}",
+                f"{LOOK_FIRST}: with {mistake.without} the error falls {fall}; {mistake.check}",
             )
     return best[1]
 
