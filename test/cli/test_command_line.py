@@ -145,6 +145,27 @@ def test_a_negative_number_is_no_option(number):
     assert seen[0].number == float(number)
 
 
+@pytest.mark.parametrize(
+    ("argv", "option"),
+    [
+        (["diagnose", "monday", "--model", "a.yaml", "--model", "b.yaml"], "--model"),
+        (["simulate", "-o", "a", "--output", "b"], "-o/--output"),
+        (["predict", "--angles", "0", "0", "--angles", "9", "9"], "--angles"),
+    ],
+)
+def test_a_second_value_does_not_replace_the_first(argv, option, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(argv)
+    assert caught.value.code == 2
+    assert f"argument {option}: given twice" in capsys.readouterr().err
+
+
+def test_recordings_to_fit_may_be_named_one_by_one(refused):
+    """Of --fit monday --fit tuesday only Tuesday was fitted."""
+    both = ["--fit", "none_1.mcap", "--fit", "none_2.mcap"]
+    assert "none_1.mcap does not exist" in refused("calibrate", *both, "-o", "a.yaml")
+
+
 def test_version_and_module_entry():
     ran = subprocess.run(
         [sys.executable, "-m", "wrist_stiffness", "--version"], capture_output=True, text=True

@@ -52,6 +52,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of commands that write a fitted model."""
     parser.add_argument(
         "--fit",
+        action="extend",
         nargs="+",
         required=True,
         metavar="RECORDING",

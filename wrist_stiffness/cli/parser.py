@@ -16,14 +16,34 @@ EXIT_INTERRUPTED = 130
 EXIT_PIPE_CLOSED = 141
 
 
+class _StoreOnce(argparse._StoreAction):
+    """Refuses a second value: the first would be gone without a word, as one of two models."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        given = vars(namespace).setdefault("given", set())
+        if self.dest in given:
+            raise argparse.ArgumentError(self, "given twice; the first would not count")
+        if option_string is not None:
+            given.add(self.dest)
+        super().__call__(parser, namespace, values, option_string)
+
+
 class OneLineParser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, without the usage text before it.
 
-    Negative numbers may have an exponent: Python 3.11 and 3.12 take -1e-6 for an option.
+    An option whose second value would replace its first is refused.  Negative numbers may have an
+    exponent: Python 3.11 and 3.12 take -1e-6 for an option.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
+        self.register("action", None, _StoreOnce)
         self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
 
     def error(self, message: str) -> NoReturn:
