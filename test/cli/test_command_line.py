@@ -153,7 +153,8 @@ def test_a_negative_number_is_no_option(number):
         (["predict", "--angles", "0", "0", "--angles", "9", "9"], "--angles"),
     ],
 )
-def test_a_second_value_does_not_replace_the_first(argv, option, capsys):
+def test_a_second_value_does_not_replace_the_first(argv, option, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as caught:
         main(argv)
     assert caught.value.code == 2

@@ -58,8 +58,8 @@ def test_wrong_wishes_are_refused(wrist, tmp_path):
 def test_command_writes_a_recording_and_its_result(wrist, tmp_path, capsys):
     save_table(wrist(), tmp_path / "table.npz")
     arguments = ["simulate", "-o", str(tmp_path / "run"), "--table", str(tmp_path / "table.npz")]
-    arguments += ["--seconds", "1", "--rate", "20", "--json", str(tmp_path / "run.json")]
-    assert main(arguments, [command]) == 0
+    arguments += ["--seconds", "1", "--json", str(tmp_path / "run.json")]
+    assert main([*arguments, "--rate", "20"], [command]) == 0
     assert "20 samples" in capsys.readouterr().out
     assert '"samples": 20' in (tmp_path / "run.json").read_text()
     assert main([*arguments, "--rate", "-3"], [command]) == 2
