@@ -24,7 +24,7 @@ from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.parameters import Estimate, Parameter
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
@@ -257,6 +257,7 @@ def laws(monkeypatch):
             extras=names,
             cost=costs.get(names, 0.0),
             variance=laws.variance,
+            beyond=lambda: {each.name: each for each in extras},
             problem=SimpleNamespace(sessions=sessions, table=None),
         )
 
@@ -273,7 +274,7 @@ def laws(monkeypatch):
 
 def entered(*names):
     laws = {name: SimpleNamespace(id=name.split("@")[0]) for name in names}
-    return [SimpleNamespace(name=name, law=law) for name, law in laws.items()]
+    return [SimpleNamespace(name=name, law=law, parameters=()) for name, law in laws.items()]
 
 
 TWO = "backlash@motor_1", "creep@joint_1"
@@ -327,6 +328,55 @@ def test_a_base_that_nothing_was_named_of_is_fitted_from_both_its_starts(laws, c
     assert again.cost == 300.0
 
 
+class TestWhatComesToNothing:
+    """Play of nothing was named: along with it the base had found out of a wrong flange's hold."""
+
+    FIRST, SECOND = TWO
+
+    def kept(self, laws, sizes, costs):
+        """Return what is kept of two effects, of sizes in usual ones; their shape is no size."""
+        size, shape = Parameter("size", -9.0, 9.0, 2.0), Parameter("shape", 0.0, 9.0, 2.0, mean=5.0)
+        named = entered(*TWO)
+        for each in named:
+            each.parameters = (size, shape)
+            each.estimates = {"size": Estimate(2.0 * sizes[each.name]), "shape": Estimate(9.0)}
+        laws.cost = laws.anew = costs
+        return refit(laws.fit, laws.fit(()), named, SHARE, np.inf).base
+
+    @pytest.mark.parametrize("nil", TWO)
+    def test_it_goes_whenever_it_entered(self, laws, nil):
+        (other,) = set(TWO) - {nil}
+        costs = {(): 900.0, TWO: 200.0, (other,): 203.0, (nil,): 900.0}
+        assert self.kept(laws, {nil: 0.04, other: 3.0}, costs).extras == (other,)
+
+    def test_all_of_it_goes(self, laws):
+        costs = dict.fromkeys([(), TWO, TWO[:1], TWO[1:]], 200.0)
+        assert self.kept(laws, dict.fromkeys(TWO, 0.0), costs).extras == ()
+
+    def test_a_small_one_that_is_missed_stays(self, laws):
+        costs = {(): 900.0, TWO: 200.0, TWO[:1]: 205.0, TWO[1:]: 205.0}
+        assert self.kept(laws, dict.fromkeys(TWO, 0.04), costs).extras == TWO
+
+    def test_one_that_has_a_size_is_not_asked(self, laws):
+        """With play in the base a fit takes long, and units put aside judge it."""
+        costs = {(): 900.0, TWO: 200.0, TWO[:1]: 200.0, TWO[1:]: 200.0}
+        assert self.kept(laws, dict.fromkeys(TWO, 0.06), costs).extras == TWO
+
+
+def test_the_base_alone_foretells_from_where_it_stood_along_with_effects(laws, monkeypatch):
+    """From the drawing it may be caught, and anything beside it would seem to foretell more."""
+    laws.cost, laws.anew = {(): 100.0}, {(): 300.0}
+    fit, alone = laws.fit, []
+
+    def judged(fitted, *others):
+        alone.extend([fitted.cost] if not fitted.extras else [])
+        return HeldOut(np.zeros((1, 6)), np.ones(1))
+
+    monkeypatch.setattr(refitting, "unseen", judged)
+    refit(fit, fit(()), entered(*TWO), SHARE, np.inf)
+    assert alone == [100.0]
+
+
 def finding(name, fall):
     effect, component = name.split("@")
     return Finding(
@@ -344,12 +394,15 @@ def answer(*findings):
 def test_an_answer_says_what_was_withdrawn():
     two = (finding("backlash@motor_1", 5.0), finding("creep@joint_1", 2.0))
     whole = answer(*two)
-    told = withdrawn(whole, 1)
+    told = withdrawn(whole, [two[0].name])
     assert told.findings == two[:1]
     assert told.verdict == "unknown"
     assert told.after == {"s_um": 5.0}
-    assert told.unexplained.evidence == "creep@joint_1 with its own law makes the sealed part worse"
-    assert withdrawn(whole, 2) is whole
+    assert told.unexplained.evidence == (
+        "creep@joint_1 with its own law is nothing, or makes the sealed part worse"
+    )
+    assert withdrawn(whole, [each.name for each in two]) is whole
+    assert withdrawn(whole, [two[1].name]).findings == two[1:]
 
 
 def test_an_effect_far_beyond_the_usual_is_told_as_such():

@@ -132,7 +132,7 @@ def diagnose_sessions(
     base, named = _begun(place, result)
     final = judged.base
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
-    result = rejudged(withdrawn(result, len(effects)), judged.stages)
+    result = rejudged(withdrawn(result, effects), judged.stages)
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
@@ -176,8 +176,8 @@ def _judged(
             again = judge(*other)
             if again.base.cost < judged.base.cost:
                 return *other, again
-    held = len(judged.base.extras)
-    if held == len(result.findings) or place.fits:
+    held = judged.base.extras
+    if len(held) == len(result.findings) or place.fits:
         return place, result, judged
     other = _whole(search.thorough(), search, ask)
     if other is None or not _says_more(other[1], withdrawn(result, held)):

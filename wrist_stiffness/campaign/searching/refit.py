@@ -27,6 +27,13 @@ from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
 
+NIL = 0.05
+"""Of its usual size: an effect that ends below it has led the base somewhere and is none itself."""
+
+MISSED = 4.0
+"""Sum of squares, in units of the noise, that is left more without an effect that is there: two
+standard deviations of one parameter."""
+
 
 @dataclass(frozen=True, eq=False)
 class Refitted:
@@ -55,8 +62,10 @@ def refit(
 ) -> Refitted:
     """Fit the base along with as much of what was named as holds.
 
-    Where the laws leave much more than noise, or more than the base alone, what entered last is
-    taken out for as long as the units put aside come out worse with the effects than without.
+    What comes to nothing goes first: along with play that is none a base may find out of a wrong
+    flange's hold.  Where the laws leave much more than noise, or more than the base alone, what
+    entered last is taken out for as long as the units put aside come out worse with the effects
+    than without.
 
     Parameters
     ----------
@@ -73,15 +82,14 @@ def refit(
     saw_all : bool
         Whether fits to all units chose what was named: then it is judged however little it leaves.
     """
-    kept = list(named)
-    fitted = _along(fitter, base, kept)
+    fitted, kept = _without_nil(fitter, _along(fitter, base, named), named)
     exact = fitted.variance < INEXACT and fitted.cost < first_cost
     if not kept or (exact and not saw_all):
         return Refitted(fitted)
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
     seen = blanked(sessions, aside)
-    alone = unseen(fitter(seen), sessions, aside, fitted)
+    alone = unseen(_alone(fitter, seen, fitted), sessions, aside, fitted)
     while kept:
         trial = unseen(fitter(seen, kept, fitted), sessions, aside, fitted)
         if trial.energy < alone.energy:
@@ -116,18 +124,17 @@ def foretold(
     sessions = fitted.problem.sessions
     aside = sealed_units(fitted.problem.table, sealed_share)
     seen = blanked(sessions, aside)
-    fits = [fitter(seen), *(fitter(seen, named[: n + 1], fitted) for n in range(len(named)))]
+    fits = [
+        _alone(fitter, seen, fitted),
+        *(fitter(seen, named[: n + 1], fitted) for n in range(len(named))),
+    ]
     return tuple(unseen(each, sessions, aside, fitted) for each in fits)
 
 
 def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
     sessions = base.problem.sessions
     if not named:
-        if not base.extras:
-            return base
-        # What is not named may have drawn the base along, or out of a wrong flange's hold.
-        starts = (None, base)
-        return min((fitter(sessions, (), each) for each in starts), key=_cost)
+        return _alone(fitter, sessions, base) if base.extras else base
     same = {each.name for each in named} == set(base.extras)
     fitted = base if same else fitter(sessions, named, base)
     if fitted.variance >= INEXACT:
@@ -142,6 +149,36 @@ def _along(fitter: Fitter, base: BaseFit, named: Sequence[Effect]) -> BaseFit:
     return fitted
 
 
+def _alone(fitter: Fitter, sessions: Sessions, start: BaseFit) -> BaseFit:
+    """Fit the base alone, from the drawing and from where it stands along with effects.
+
+    These may have drawn it along, or out of a wrong flange's hold.
+    """
+    return min((fitter(sessions, (), each) for each in (None, start)), key=_cost)
+
+
+def _without_nil(
+    fitter: Fitter, fitted: BaseFit, named: Sequence[Effect]
+) -> tuple[BaseFit, list[Effect]]:
+    """Take out effects that have no size, where nothing is missed without them."""
+    kept = list(named)
+    for effect in named:
+        found = fitted.beyond()
+        if _size(found[effect.name]) > NIL:
+            continue
+        others = [each for name, each in found.items() if name != effect.name]
+        less = fitter(fitted.problem.sessions, others, fitted)
+        if less.cost < fitted.cost + MISSED:
+            fitted, kept = less, [each for each in kept if each is not effect]
+    return fitted, kept
+
+
+def _size(effect: Effect) -> float:
+    """Return the largest size of an effect, in usual ones; infinite for laws that have none."""
+    sizes = [_usual_sizes(effect, p) for p in effect.parameters if p.mean == 0.0]
+    return max(sizes, default=np.inf)
+
+
 def _again(fitter: Fitter, fitted: BaseFit, walls: Walls) -> BaseFit:
     extras = list(fitted.beyond().values())
     return fitter(fitted.problem.sessions, extras, fitted, beside=True, walls=walls)
@@ -151,17 +188,18 @@ def _cost(fitted: BaseFit) -> float:
     return fitted.cost
 
 
-def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
-    """Return an answer without the findings that entered last, and say so.
+def withdrawn(result: Diagnosis, kept: Collection[str]) -> Diagnosis:
+    """Return an answer without the findings that do not hold, and say so.
 
     Parameters
     ----------
     result : Diagnosis
         With all its findings.
-    kept : int
-        How many of them stay.
+    kept : collection of str
+        Names of those that stay.
     """
-    gone, stay = result.findings[kept:], result.findings[:kept]
+    stay = tuple(each for each in result.findings if each.name in kept)
+    gone = [each.name for each in result.findings if each.name not in kept]
     if not gone:
         return result
     after = {
@@ -169,7 +207,9 @@ def withdrawn(result: Diagnosis, kept: int) -> Diagnosis:
         for key, error in result.before.items()
     }
     sentences = [result.unexplained.evidence] if result.unexplained.evidence else []
-    sentences += [f"{each.name} with its own law makes the sealed part worse" for each in gone]
+    sentences += [
+        f"{name} with its own law is nothing, or makes the sealed part worse" for name in gone
+    ]
     unexplained = replace(result.unexplained, evidence="; ".join(sentences))
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
 
