@@ -1,5 +1,6 @@
 """Commissioning: what was set up anew, what is this wrist's own, and the lineage."""
 
+import csv
 import json
 
 import pytest
@@ -39,6 +40,7 @@ def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, ca
     assert main(["calibrate", *fit, "-o", str(output), "--json", str(report)]) == 0
     told = json.loads(report.read_text())
     assert told["judged_by"] == "another session"
+    assert told["set_up_mistake"] == ""
     assert told["before"]["rmse_s_um"] > 500.0
     for key in ("s_um", "phi_mdeg"):
         assert told["after"][f"rmse_{key}"] < 1.2 * told["noise_floor"][key]
@@ -62,6 +64,28 @@ def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, ca
     # All were fitted together, so a node evaluates the model once for a sample.
     assert model.variations == ()
     assert 0.0 < model.joint.sigma[:3].max() < 1e-6
+
+
+@pytest.mark.slow
+def test_what_is_left_asks_for_wrong_signs_and_units(tmp_path, capsys):
+    """Positions in metres where millimetres belong: no effect is missing, and none would help."""
+    day, table, wrong = recorded(tmp_path, 0, 60.0), tmp_path / "day.csv", tmp_path / "wrong.csv"
+    assert main(["export", str(day), "-o", str(table)]) == 0
+    with table.open() as rows, wrong.open("w") as out:
+        reader = csv.DictReader(rows)
+        writer = csv.DictWriter(out, reader.fieldnames)
+        writer.writeheader()
+        for row in reader:
+            writer.writerow(row | {key: float(row[key]) / 1e3 for key in ("x_mm", "y_mm", "z_mm")})
+    assert main(["import", str(wrong), "-o", str(tmp_path / "wrong")]) == 0
+    output, told = tmp_path / "mine.yaml", tmp_path / "mine.json"
+    fit = ["--fit", str(tmp_path / "wrong"), "-o", str(output), "--json", str(told)]
+    assert main(["calibrate", *fit]) == 0
+    mistake = json.loads(told.read_text())["set_up_mistake"]
+    assert "with positions times 1000 the error falls" in mistake
+    text = capsys.readouterr().out
+    assert mistake in text
+    assert text.index("an effect is missing") < text.index(mistake)
 
 
 def test_the_output_folder_is_looked_for_before_the_work(tmp_path, capsys):

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.contributions import Contribution
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations
 from wrist_stiffness.diagnosis.result import NotExcited, Unexplained
+from wrist_stiffness.workflows.diagnose import Diagnosed
 from wrist_stiffness.workflows.provenance import Provenance
 from wrist_stiffness.workflows.report.diagnosis_report import report_of_diagnosis, shown_by
 from wrist_stiffness.workflows.report.page import html_of
@@ -60,10 +62,14 @@ def observations():
     return Observations(values, conditions, time_s=conditions["time_s"], quantities=QUANTITIES)
 
 
-def page_of(result, observations, notes=(), contributions=()):
+MISTAKE = "Look at the set-up first: with the load's sign turned the error falls from 9 to 1 um"
+
+
+def page_of(result, observations, notes=(), contributions=(), mistake=""):
     shown = shown_by(observations, np.random.default_rng(0), 0.1 * observations.values)
     provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
-    page = report_of_diagnosis(result, contributions, shown, ["monday"], notes, provenance)
+    told = (mistake, notes, provenance)
+    page = report_of_diagnosis(result, contributions, shown, ["monday"], *told)
     return unescape(html_of(page))
 
 
@@ -89,6 +95,18 @@ def test_everything_of_a_finding_is_on_the_page(observations):
     # The fall, and the residual against its condition.
     assert page.count("data:image/svg+xml") == 2
     assert re.search(r"evidence \(2 ln Bayes factor\)\W+td\W+td\W+123", page)
+
+
+def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
+    """No effect is as large, and whatever is named stands in for it."""
+    page = page_of(RESULT, observations, mistake=MISTAKE)
+    assert 0 < page.index("Look at the set-up first") < page.index("Missing in the model")
+    answer = SimpleNamespace(diagnosis=RESULT, contributions=(), absorbed=())
+    provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
+    told = Diagnosed(answer, ("monday",), MISTAKE, (), provenance)
+    assert told.lines()[:2] == [MISTAKE, ""]
+    assert told.lines()[2].startswith("Missing in the model")
+    assert told.as_values()["set_up_mistake"] == MISTAKE
 
 
 def test_nothing_missing_is_said_first(observations):

@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wrist_stiffness.atomic_file import require_room
+from wrist_stiffness.campaign.comparing.compare import mistake_in
 from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
@@ -32,6 +35,9 @@ from wrist_stiffness.workflows.read_sessions import (
 )
 
 Progress = Callable[[int, int], None]
+
+SEED = 0
+"""Of the noise floor beside which a mistake shows."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +74,14 @@ class Calibrated:
         What was measured, in the order of time.
     output : Path
         The model file that was written.
+    mistake : str
+        Of signs, units or names, where one explains most of what is left; else empty.
     """
 
     calibration: Calibration
     sessions: tuple[MeasuredSession, ...]
     output: Path
+    mistake: str
 
     @property
     def errors(self) -> Errors:
@@ -87,6 +96,7 @@ class Calibrated:
         parameters = found.parameters
         lines = used_lines(self.sessions, found.fit)
         lines += ["", *self.errors.lines(), *left_lines(self.errors, found.judged)]
+        lines += [self.mistake] if self.mistake else []
         for session in self.sessions:
             own = told_lines(each for each in parameters if each.session == session.name)
             lines += ["", f"set up in {session.name}:", *(own or ["  nothing that the data tell"])]
@@ -106,6 +116,7 @@ class Calibrated:
         found = self.calibration
         return {
             **fit_values(self.errors, found.judged, self.sessions, found.fit),
+            "set_up_mistake": self.mistake,
             "calibrated_otherwise": list(found.calibrated),
             "parameters": parameter_values(found.parameters),
         }
@@ -154,7 +165,11 @@ def calibrate_model(
     found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
     save_model(child, output)
-    return Calibrated(found, tuple(sessions.values()), output)
+    calibrated = Calibrated(found, tuple(sessions.values()), output, "")
+    if calibrated.errors.at_floor:
+        return calibrated
+    mistake = mistake_in(parent, calibrated.sessions, np.random.default_rng(SEED))
+    return replace(calibrated, mistake=mistake)
 
 
 def writable(output: str | Path) -> Path:

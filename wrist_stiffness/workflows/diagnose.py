@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wrist_stiffness.campaign.comparing.compare import mistake_in
 from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
@@ -55,6 +56,8 @@ class Diagnosed:
         What was found.
     recordings : tuple of str
         Names of the sessions.
+    mistake : str
+        Of signs, units or names, where one explains most of the error; else empty.
     remarks : tuple of str
         What could not be used of the recordings.
     provenance : Provenance
@@ -63,6 +66,7 @@ class Diagnosed:
 
     answer: WristDiagnosis
     recordings: tuple[str, ...]
+    mistake: str
     remarks: tuple[str, ...]
     provenance: Provenance
 
@@ -74,7 +78,8 @@ class Diagnosed:
     def lines(self) -> list[str]:
         """Return the answer for a terminal, the verdict first."""
         result = self.result
-        out = [*verdict_lines(result), "", *_table(result)]
+        out = [*([self.mistake, ""] if self.mistake else []), *verdict_lines(result), ""]
+        out += _table(result)
         for place, finding in enumerate(result.findings, 1):
             out += ["", *_finding_lines(place, finding)]
         out += adding_lines(worth_hearing(self.answer.contributions, result.verdict == "unknown"))
@@ -102,6 +107,7 @@ class Diagnosed:
                 | {key: list(size) for key, size in c.sizes.items()}
                 for c in self.answer.contributions
             ],
+            "set_up_mistake": self.mistake,
             "notes": list(self.remarks),
             "provenance": self.provenance.as_values(),
         }
@@ -121,6 +127,7 @@ class Diagnosed:
             self.answer.contributions,
             shown,
             self.recordings,
+            self.mistake,
             self.remarks,
             self.provenance,
         )
@@ -163,10 +170,15 @@ def diagnose_recordings(
     known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
     rng = np.random.default_rng(SEED)
     answer = diagnose_sessions(known, list(sessions.values()), rng, tell=tell)
+    mistake = ""
+    if answer.diagnosis.verdict != "none":
+        tell("asking for wrong signs, units and names")
+        mistake = mistake_in(known, list(sessions.values()), rng)
     hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
     return Diagnosed(
         answer,
         tuple(hashes),
+        mistake,
         remarks_of(sessions.values()),
         Provenance(run.command, run.date, {Path(model).stem: file_sha256(model)}, hashes),
     )

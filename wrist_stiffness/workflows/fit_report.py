@@ -53,6 +53,11 @@ class Errors:
         """Last error over the noise floor, the larger of the quantities'."""
         return over_floor(list(self.rows.values())[-1], self.floor)
 
+    @property
+    def at_floor(self) -> bool:
+        """Whether no more than noise is left."""
+        return is_at_floor(self.over_floor, self.floor_source)
+
     def lines(self) -> list[str]:
         """Return a table for people."""
         keys = list(self.floor)
@@ -94,7 +99,7 @@ def left_lines(errors: Errors, judged: Judged) -> list[str]:
         f"judged {JUDGED_BY[judged.by]}",
         f"what is left is {against_floor(ratio, errors.floor_source)}",
     ]
-    if not is_at_floor(ratio, errors.floor_source):
+    if not errors.at_floor:
         wanders = f"; {OR_WANDER}" if errors.floor_source == "instrument" else ""
         lines.append(f"{NOT_AT_THE_FLOOR}{wanders}")
     return lines

@@ -15,13 +15,14 @@ from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
 from wrist_stiffness.campaign.observing import Observed, predict_units, tabulate
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 
 Progress = Callable[[int, int], None]
+Prepared = tuple[Observed, Observations, tuple[str, ...]]
 
 
 def compare_models(
@@ -58,22 +59,13 @@ def compare_models(
     first = models[0][1]
     cuts = tuple(as_units(first, session) for session in sessions)
     calibrated = said_calibrated(sessions)
-    tables: list[tuple[Observed, Observations, tuple[str, ...]]] = []
+    tables: list[Prepared] = []
     for number, (name, model) in enumerate(models):
         if not _same_wrist(model, first):
             raise InputError(
                 f"model {name} is of another wrist than {models[0][0]}: its axes differ"
             )
-        predicted = np.concatenate([predict_units(model, each) for each in cuts])
-        observed = tabulate(model, cuts, predicted)
-        units = observed.observations.n_units
-        if units < FEWEST_UNITS:
-            raise InputError(
-                f"{units} dwells and moments are too few to compare with, it needs {FEWEST_UNITS}"
-            )
-        set_ups = refit_set_up(model, observed, calibrated)
-        refitted = observed.observations.with_values(refitted_values(observed, set_ups))
-        tables.append((observed, refitted, tuple(each.sentence for each in set_ups)))
+        tables.append(_prepared(model, cuts, calibrated))
         progress(number + 1, steps)
     left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
     floor = noise_floor(left)
@@ -94,6 +86,48 @@ def compare_models(
         {key: size.rms for key, size in sizes(left).items()},
         mistake,
     )
+
+
+def mistake_in(
+    model: ErrorModel, sessions: Sequence[MeasuredSession], rng: np.random.Generator
+) -> str:
+    """Return the mistake of signs, units or names that explains most of an error; empty for none.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        With which the sessions are compared.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+    rng : numpy.random.Generator
+        For the noise floor.
+
+    Raises
+    ------
+    InputError
+        If there is too little to compare.
+    """
+    cuts = tuple(as_units(model, session) for session in sessions)
+    calibrated = said_calibrated(sessions)
+    _, refitted, _ = _prepared(model, cuts, calibrated)
+    floor = noise_floor(refitted.with_values(held_out_process(refitted, rng)))
+    return told_mistake(model, cuts, calibrated, refitted, floor.rms(refitted))
+
+
+def _prepared(
+    model: ErrorModel, cuts: tuple[UnitSession, ...], calibrated: Sequence[str]
+) -> Prepared:
+    """Return what a model leaves, what the set-up leaves of that, and where this stands."""
+    predicted = np.concatenate([predict_units(model, each) for each in cuts])
+    observed = tabulate(model, cuts, predicted)
+    units = observed.observations.n_units
+    if units < FEWEST_UNITS:
+        raise InputError(
+            f"{units} dwells and moments are too few to compare with, it needs {FEWEST_UNITS}"
+        )
+    set_ups = refit_set_up(model, observed, calibrated)
+    refitted = observed.observations.with_values(refitted_values(observed, set_ups))
+    return observed, refitted, tuple(each.sentence for each in set_ups)
 
 
 def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:

@@ -97,6 +97,7 @@ def report_of_diagnosis(
     contributions: Sequence[Contribution],
     shown: Shown,
     recordings: Sequence[str],
+    mistake: str,
     notes: Sequence[str],
     provenance: Provenance,
 ) -> Page:
@@ -112,6 +113,8 @@ def report_of_diagnosis(
         For the pictures and the sentences.
     recordings : sequence of str
         Names.
+    mistake : str
+        Of the set-up, told first; empty for none.
     notes : sequence of str
         What could not be used.
     provenance : Provenance
@@ -132,7 +135,7 @@ def report_of_diagnosis(
     return Page(
         "Which physical effect is missing?",
         f"{', '.join(recordings)}: {shown.observations.n_units} dwells and half seconds in motion",
-        _verdict(result, quantities),
+        (*([mistake] if mistake else []), *_verdict(result, quantities)),
         tuple(sections),
     )
 
