@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from html import unescape
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,8 +13,12 @@ from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.contributions import Contribution
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations
 from wrist_stiffness.diagnosis.result import NotExcited, Unexplained
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows import diagnose
+from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.diagnose import Diagnosed
 from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.read_sessions import Recordings
 from wrist_stiffness.workflows.report.diagnosis_report import report_of_diagnosis, shown_by
 from wrist_stiffness.workflows.report.page import html_of
 
@@ -107,6 +112,21 @@ def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
     assert told.lines()[:2] == [MISTAKE, ""]
     assert told.lines()[2].startswith("Missing in the model")
     assert told.as_values()["set_up_mistake"] == MISTAKE
+
+
+@pytest.mark.parametrize(("left", "asked"), [(1.9, 0), (2.1, 1)])
+def test_a_mistake_is_looked_for_where_much_is_left(monkeypatch, left, asked):
+    """It takes seconds of a long recording, and what effects explain was no mistake."""
+    floor = {"s_um": 1.0, "phi_mdeg": 5.0}
+    result = replace(RESULT, noise_floor=floor, after={"s_um": 1.0, "phi_mdeg": 5.0 * left})
+    found = SimpleNamespace(diagnosis=result, contributions=(), absorbed=())
+    done = []
+    monkeypatch.setattr(diagnose, "diagnose_sessions", lambda *_, **__: found)
+    monkeypatch.setattr(diagnose, "mistake_in", lambda *_: done.append(1) or MISTAKE)
+    recordings = Recordings([Path(__file__).parents[1] / "data" / "wrist_b.mcap"], {})
+    model = shipped_file("config/palmieri2015_model.yaml")
+    told = diagnose.diagnose_recordings(model, recordings, Run("diagnose", "2026-01-01"))
+    assert (len(done), told.mistake) == (asked, MISTAKE if asked else "")
 
 
 def test_nothing_missing_is_said_first(observations):

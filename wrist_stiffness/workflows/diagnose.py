@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import mistake_in
+from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING
 from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
@@ -171,7 +172,7 @@ def diagnose_recordings(
     rng = np.random.default_rng(SEED)
     answer = diagnose_sessions(known, list(sessions.values()), rng, tell=tell)
     mistake = ""
-    if answer.diagnosis.verdict != "none":
+    if _leaves_much(answer.diagnosis):
         tell("asking for wrong signs, units and names")
         mistake = mistake_in(known, list(sessions.values()), rng)
     hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
@@ -182,6 +183,12 @@ def diagnose_recordings(
         remarks_of(sessions.values()),
         Provenance(run.command, run.date, {Path(model).stem: file_sha256(model)}, hashes),
     )
+
+
+def _leaves_much(result: Diagnosis) -> bool:
+    """Tell whether so much is left that a mistake of the set-up is looked for."""
+    floor = result.noise_floor
+    return any(error > WORTH_ASKING * floor[key] for key, error in result.after.items())
 
 
 def _table(result: Diagnosis) -> list[str]:
