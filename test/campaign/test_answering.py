@@ -3,10 +3,8 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.searching.asking import table_of
 from wrist_stiffness.campaign.searching.diagnose import (
     MUCH,
     _answered,
@@ -14,7 +12,6 @@ from wrist_stiffness.campaign.searching.diagnose import (
     _judged,
     _says_more,
     _settled,
-    _with_all,
 )
 from wrist_stiffness.campaign.searching.place import INEXACT, Place
 from wrist_stiffness.campaign.searching.seeking import PRESSING
@@ -293,31 +290,6 @@ def test_where_more_is_named_beside_whole_laws_nothing_is_settled():
     assert _settled(result, search, final, lambda _: more, 0.2, lambda told: None) is result
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_statistics_see_tolerances_about_their_means(known):
-    """Of an axis that moved after it was built all is still to be found, where it is not known."""
-    registration, built, moved, play = np.array([5.0, 2.0, 3.0, 7.0])
-    columns = np.arange(1.0, 49.0).reshape(2, 6, 4)
-    left = np.full((2, 6), 0.5)
-    asked = []
-
-    def table(with_extras):
-        asked.append(with_extras)
-        within = SimpleNamespace(values=left, with_values=lambda values: values)
-        return SimpleNamespace(observations=within)
-
-    base = SimpleNamespace(
-        tolerances=np.array([False, True, False, False]),
-        on_base=np.array([False, False, True, False]),
-        columns=columns,
-        z=np.array([registration, built, moved, play]),
-        left=table,
-    )
-    own = built * columns[:, :, 1] + (0.0 if known else moved * columns[:, :, 2])
-    np.testing.assert_allclose(table_of(Place(base, (), known=known)), left - own)
-    assert asked == [known]
-
-
 class TestWhatDoesNotHold:
     """Slopes between four poses named a bracket and a gear: with their laws worse than nothing."""
 
@@ -414,28 +386,3 @@ class TestClassesWhoseLawsDiffer:
         assert where is search.places["quick"]
         assert judged.base.cost == 1000.0
         assert [each.names for each in result.findings] == [(PLAY, AXIS)]
-
-
-@pytest.mark.parametrize(
-    ("extras", "named", "final", "which"),
-    [
-        ([DELAY], [DELAY], [DELAY], "final"),
-        ([DELAY], [DELAY, PLAY], [DELAY, PLAY], "final"),
-        ([DELAY, AXIS], [DELAY], [DELAY], "base"),
-        ([DELAY, AXIS], [PLAY], [PLAY], "anew"),
-    ],
-)
-def test_suspects_are_fitted_anew_only_where_no_fit_has_them_all(extras, named, final, which):
-    def fit(*names):
-        effects = {name: SimpleNamespace(name=name) for name in names}
-        problem = SimpleNamespace(sessions=())
-        return SimpleNamespace(extras=names, beyond=lambda: effects, problem=problem)
-
-    def anew(sessions, extras, start):
-        assert [each.name for each in extras] == [DELAY, AXIS, PLAY]
-        assert start is base
-        return "anew"
-
-    base, last = fit(*extras), fit(*final)
-    found = _with_all(anew, base, [SimpleNamespace(name=name) for name in named], last)
-    assert {"base": base, "final": last}.get(which, "anew") == found

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from wrist_stiffness.campaign.fitting.result import Fitted
-from wrist_stiffness.campaign.searching.refit import sized, valued
+from wrist_stiffness.campaign.searching.telling import sized, valued
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law

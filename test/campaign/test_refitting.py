@@ -6,25 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching import refit as refitting
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.refit import (
     blanked,
-    explained,
     foretold,
     refit,
-    rejudged,
-    sized,
     unseen,
-    withdrawn,
 )
 from wrist_stiffness.campaign.unit_session import as_units
-from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
-from wrist_stiffness.diagnosis.sealed import HeldOut
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.parameters import Estimate, Parameter
+from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
@@ -123,22 +116,6 @@ def test_errors_that_are_told_are_of_fits_that_had_not_seen_the_part(model, lost
         np.testing.assert_allclose(change[:3], more, atol=2e-7)
 
 
-def test_an_answer_is_told_with_the_errors_of_the_refits():
-    found = answer(finding("backlash@motor_1", 5.0), finding("creep@joint_1", 2.0))
-    found = replace(found, before={"s_um": 10.0, "phi_mdeg": 20.0})
-    left = [HeldOut(np.full((9, 6), size), np.full(54, size)) for size in (4e-6, 3e-6, 1e-6)]
-    told = rejudged(found, left)
-    assert set(told.before) == set(found.before)
-    for quantity in QUANTITIES:
-        each = quantity.per_si * np.sqrt(3.0)
-        assert told.before[quantity.key] == pytest.approx(4e-6 * each)
-        assert told.after[quantity.key] == pytest.approx(1e-6 * each)
-        assert told.findings[0].buys[quantity.key][0] == pytest.approx(1e-6 * each)
-        assert told.findings[1].buys[quantity.key][0] == pytest.approx(2e-6 * each)
-    assert told.findings[1].heldout_rmse_ratio == pytest.approx(1.0 / 3.0)
-    assert rejudged(found, ()) is found
-
-
 def test_what_was_not_judged_may_be_told_by_the_same_stages(model, lost_motion):
     base = fit_base(model, (as_units(model, lost_motion),))
     named = [backlash(1e3 * np.degrees(WIDTH_RAD))]
@@ -148,17 +125,6 @@ def test_what_was_not_judged_may_be_told_by_the_same_stages(model, lost_motion):
     for one, other in zip(told, judged.stages, strict=True):
         assert one.energy == pytest.approx(other.energy, rel=1e-3)
         np.testing.assert_allclose(one.residual, other.residual, atol=2e-8)
-
-
-def test_a_finding_says_what_its_own_law_explains():
-    """Slopes said a quarter of a bushing fifty times as soft, whose law reaches the noise."""
-    found = answer(finding("backlash@motor_1", 5.0), finding("creep@joint_1", 2.0))
-    left = [HeldOut(np.full((9, 6), size), np.full(54, size)) for size in (4e-6, 1e-6, 2e-6)]
-    creep = Effect(find_law("creep"), "joint_1")
-    first, second = explained(rejudged(found, left), [backlash(1.0), creep]).findings
-    assert "its own law explains 93.8 % of what is left without it" in first.evidence
-    assert "its own law explains 0.0 % of what is left without it" in second.evidence
-    assert creep.law.sentence.format(place="joint_1") in second.evidence
 
 
 @pytest.mark.slow
@@ -240,180 +206,3 @@ def test_what_is_set_up_anew_on_an_unseen_day_begins_where_all_units_led():
     # A day of which the fit saw something keeps its registration.
     seen = SimpleNamespace(problem=Days(sessions), z=far)
     assert unseen(seen, sessions, aside, whole).residual.min() > 10.0
-
-
-@pytest.fixture
-def laws(monkeypatch):
-    """A fitter that leaves much more than noise, and of unseen units less with each effect.
-
-    Other energies of these are listed by names, and costs, `anew` of fits from the drawing.
-    """
-    laws = SimpleNamespace(cost={}, anew={}, energy={}, variance=4.0 * refitting.INEXACT)
-
-    def fit(sessions, extras=(), start=None, beside=False):
-        names = tuple(each.name for each in extras)
-        costs = laws.anew if start is None else laws.cost
-        return SimpleNamespace(
-            extras=names,
-            cost=costs.get(names, 0.0),
-            variance=laws.variance,
-            beyond=lambda: {each.name: each for each in extras},
-            problem=SimpleNamespace(sessions=sessions, table=None),
-        )
-
-    def judge(fitted, sessions, aside, whole):
-        energy = laws.energy.get(fitted.extras, 100.0 / (1 + len(fitted.extras)))
-        return HeldOut(np.zeros((1, 6)), np.array([np.sqrt(energy)]))
-
-    monkeypatch.setattr(refitting, "sealed_units", lambda table, share: None)
-    monkeypatch.setattr(refitting, "blanked", lambda sessions, aside: sessions)
-    monkeypatch.setattr(refitting, "unseen", judge)
-    laws.fit = fit
-    return laws
-
-
-def entered(*names):
-    laws = {name: SimpleNamespace(id=name.split("@")[0]) for name in names}
-    return [SimpleNamespace(name=name, law=law, parameters=()) for name, law in laws.items()]
-
-
-TWO = "backlash@motor_1", "creep@joint_1"
-
-
-def test_what_entered_last_is_withdrawn_first(laws):
-    """The first explained most, and the last was named beside it."""
-    laws.energy = {TWO: 200.0}
-    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf).base
-    assert kept.extras == TWO[:1]
-
-
-def test_what_leaves_more_than_the_base_alone_is_judged_by_unseen_units(laws):
-    """Slopes named it; its own law ends elsewhere, though that is hardly more than noise."""
-    laws.variance = 1.0
-    laws.cost = laws.anew = {(): 100.0, TWO: 120.0}
-    laws.energy = {TWO: 200.0, TWO[:1]: 200.0}
-    assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 100.0).base.extras == ()
-    assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 130.0).base.extras == TWO
-
-
-def test_nothing_is_withdrawn_that_foretells_unseen_units(laws):
-    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf).base
-    assert kept.extras == TWO
-
-
-def test_each_stage_has_one_effect_more(laws):
-    """From these the technician is told what each of them buys."""
-    three = (*TWO, "drift@pose_sensor")
-    told = refit(laws.fit, laws.fit(()), entered(*three), SHARE, np.inf, saw_all=True)
-    assert told.base.extras == three
-    assert [each.energy for each in told.stages] == pytest.approx([100.0, 50.0, 100.0 / 3, 25.0])
-
-
-def test_stages_end_with_what_was_kept(laws):
-    laws.energy = {TWO: 200.0}
-    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf, saw_all=True)
-    assert [each.energy for each in told.stages] == pytest.approx([100.0, 50.0])
-    laws.energy[TWO[:1]] = 200.0
-    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf, saw_all=True)
-    assert (told.base.extras, told.stages) == ((), ())
-
-
-@pytest.mark.parametrize(("cost", "anew"), [(300.0, 500.0), (500.0, 300.0)])
-def test_a_base_that_nothing_was_named_of_is_fitted_from_both_its_starts(laws, cost, anew):
-    """What is not named may have drawn it along, or out of a wrong flange's hold."""
-    laws.cost, laws.anew = {(): cost}, {(): anew}
-    found = laws.fit((), entered(*TWO))
-    again = refit(laws.fit, found, [], SHARE, np.inf).base
-    assert again.extras == ()
-    assert again.cost == 300.0
-
-
-class TestWhatComesToNothing:
-    """Play of nothing was named: along with it the base had found out of a wrong flange's hold."""
-
-    FIRST, SECOND = TWO
-
-    def kept(self, laws, sizes, costs):
-        """Return what is kept of two effects, of sizes in usual ones; their shape is no size."""
-        size, shape = Parameter("size", -9.0, 9.0, 2.0), Parameter("shape", 0.0, 9.0, 2.0, mean=5.0)
-        named = entered(*TWO)
-        for each in named:
-            each.parameters = (size, shape)
-            each.estimates = {"size": Estimate(2.0 * sizes[each.name]), "shape": Estimate(9.0)}
-        laws.cost = laws.anew = costs
-        return refit(laws.fit, laws.fit(()), named, SHARE, np.inf).base
-
-    @pytest.mark.parametrize("nil", TWO)
-    def test_it_goes_whenever_it_entered(self, laws, nil):
-        (other,) = set(TWO) - {nil}
-        costs = {(): 900.0, TWO: 200.0, (other,): 203.0, (nil,): 900.0}
-        assert self.kept(laws, {nil: 0.04, other: 3.0}, costs).extras == (other,)
-
-    def test_all_of_it_goes(self, laws):
-        costs = dict.fromkeys([(), TWO, TWO[:1], TWO[1:]], 200.0)
-        assert self.kept(laws, dict.fromkeys(TWO, 0.0), costs).extras == ()
-
-    def test_a_small_one_that_is_missed_stays(self, laws):
-        costs = {(): 900.0, TWO: 200.0, TWO[:1]: 205.0, TWO[1:]: 205.0}
-        assert self.kept(laws, dict.fromkeys(TWO, 0.04), costs).extras == TWO
-
-    def test_one_that_has_a_size_is_not_asked(self, laws):
-        """With play in the base a fit takes long, and units put aside judge it."""
-        costs = {(): 900.0, TWO: 200.0, TWO[:1]: 200.0, TWO[1:]: 200.0}
-        assert self.kept(laws, dict.fromkeys(TWO, 0.06), costs).extras == TWO
-
-
-def test_the_base_alone_foretells_from_where_it_stood_along_with_effects(laws, monkeypatch):
-    """From the drawing it may be caught, and anything beside it would seem to foretell more."""
-    laws.cost, laws.anew = {(): 100.0}, {(): 300.0}
-    fit, alone = laws.fit, []
-
-    def judged(fitted, *others):
-        alone.extend([fitted.cost] if not fitted.extras else [])
-        return HeldOut(np.zeros((1, 6)), np.ones(1))
-
-    monkeypatch.setattr(refitting, "unseen", judged)
-    refit(fit, fit(()), entered(*TWO), SHARE, np.inf)
-    assert alone == [100.0]
-
-
-def finding(name, fall):
-    effect, component = name.split("@")
-    return Finding(
-        ((effect, component),), {}, 0.9, 50.0, 1e-3, 1.0, {"s_um": (fall, 0.1)}, "yes", "", ""
-    )
-
-
-def answer(*findings):
-    nothing = Unexplained((), 0.02, "")
-    floor, before, after = {"s_um": 1.0}, {"s_um": 10.0}, {"s_um": 3.0}
-    scope = "this session only"
-    return Diagnosis("effect", "dwell", floor, before, after, (), findings, nothing, (), 0, scope)
-
-
-def test_an_answer_says_what_was_withdrawn():
-    two = (finding("backlash@motor_1", 5.0), finding("creep@joint_1", 2.0))
-    whole = answer(*two)
-    told = withdrawn(whole, [two[0].name])
-    assert told.findings == two[:1]
-    assert told.verdict == "unknown"
-    assert told.after == {"s_um": 5.0}
-    assert told.unexplained.evidence == (
-        "creep@joint_1 with its own law is nothing, or makes the sealed part worse"
-    )
-    assert withdrawn(whole, [each.name for each in two]) is whole
-    assert withdrawn(whole, [two[1].name]).findings == two[1:]
-
-
-def test_an_effect_far_beyond_the_usual_is_told_as_such():
-    (usual,) = sized(answer(finding("backlash@motor_1", 5.0)), [backlash(60.0)]).findings
-    (huge,) = sized(answer(finding("backlash@motor_1", 5.0)), [backlash(2400.0)]).findings
-    assert usual.evidence == ""
-    assert huge.evidence == "; far beyond its usual size: width_mdeg = 2.4e+03"
-
-
-def test_the_furthest_of_several_parameters_is_told():
-    """An axis two millimetres off is no less strange where it is not tilted."""
-    axis = Effect(find_law("axis_misalignment"), "joint_4").with_values({"shift_u_um": 2e3})
-    (told,) = sized(answer(finding(axis.name, 5.0)), [axis]).findings
-    assert told.evidence == "; far beyond its usual size: shift_u_um = 2e+03"

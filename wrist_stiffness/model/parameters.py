@@ -81,6 +81,10 @@ class Parameter:
     mean: float = 0.0
     linear: bool = True
 
+    def usual_sizes(self, value: float) -> float:
+        """Return how many prior standard deviations a value is from the prior mean."""
+        return abs(value - self.mean) / self.scale
+
 
 @dataclass(frozen=True)
 class Estimate:

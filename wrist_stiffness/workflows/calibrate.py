@@ -164,12 +164,12 @@ def calibrate_model(
     again = was_fitted_to(parent, sessions)
     found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
-    save_model(child, output)
     calibrated = Calibrated(found, tuple(sessions.values()), output, "")
-    if calibrated.errors.at_floor:
-        return calibrated
-    mistake = mistake_in(parent, calibrated.sessions, np.random.default_rng(SEED))
-    return replace(calibrated, mistake=mistake)
+    if not calibrated.errors.at_floor:
+        mistake = mistake_in(parent, calibrated.sessions, np.random.default_rng(SEED))
+        calibrated = replace(calibrated, mistake=mistake)
+    save_model(child, output)
+    return calibrated
 
 
 def writable(output: str | Path) -> Path:

@@ -24,19 +24,17 @@ from wrist_stiffness.campaign.searching.contributions import (
 from wrist_stiffness.campaign.searching.fitter import Fitter, Tell, silent
 from wrist_stiffness.campaign.searching.place import INEXACT, Place
 from wrist_stiffness.campaign.searching.possible import possible
-from wrist_stiffness.campaign.searching.refit import (
-    Refitted,
+from wrist_stiffness.campaign.searching.refit import Refitted, foretold, refit
+from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
+from wrist_stiffness.campaign.searching.stepwise import MOST_EXTRAS
+from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
+from wrist_stiffness.campaign.searching.telling import (
     explained,
-    foretold,
-    refit,
     rejudged,
     sized,
     valued,
     withdrawn,
 )
-from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
-from wrist_stiffness.campaign.searching.stepwise import MOST_EXTRAS
-from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.diagnosis import Diagnosis, Settings
 from wrist_stiffness.errors import InputError

@@ -7,23 +7,18 @@ the units put aside worse than the base alone.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.result import FAR
-from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, Walls
-from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import INEXACT
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
-from wrist_stiffness.diagnosis import Diagnosis
-from wrist_stiffness.diagnosis.sealed import HeldOut, bought, sealed_units
+from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.parameters import Parameter
 
 Sessions = tuple[UnitSession, ...]
 
@@ -175,8 +170,8 @@ def _without_nil(
 
 def _size(effect: Effect) -> float:
     """Return the largest size of an effect, in usual ones; infinite for laws that have none."""
-    sizes = [_usual_sizes(effect, p) for p in effect.parameters if p.mean == 0.0]
-    return max(sizes, default=np.inf)
+    lengths = [p for p in effect.parameters if p.mean == 0.0]
+    return max((p.usual_sizes(effect.estimates[p.key].value) for p in lengths), default=np.inf)
 
 
 def _again(fitter: Fitter, fitted: BaseFit, walls: Walls) -> BaseFit:
@@ -186,86 +181,6 @@ def _again(fitter: Fitter, fitted: BaseFit, walls: Walls) -> BaseFit:
 
 def _cost(fitted: BaseFit) -> float:
     return fitted.cost
-
-
-def withdrawn(result: Diagnosis, kept: Collection[str]) -> Diagnosis:
-    """Return an answer without the findings that do not hold, and say so.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        With all its findings.
-    kept : collection of str
-        Names of those that stay.
-    """
-    stay = tuple(each for each in result.findings if each.name in kept)
-    gone = [each.name for each in result.findings if each.name not in kept]
-    if not gone:
-        return result
-    after = {
-        key: error - sum(finding.buys[key][0] for finding in stay)
-        for key, error in result.before.items()
-    }
-    sentences = [result.unexplained.evidence] if result.unexplained.evidence else []
-    sentences += [
-        f"{name} with its own law is nothing, or makes the sealed part worse" for name in gone
-    ]
-    unexplained = replace(result.unexplained, evidence="; ".join(sentences))
-    return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
-
-
-def valued(result: Diagnosis, fitted: BaseFit, whole: Collection[str] = ()) -> Diagnosis:
-    """Return an answer with the parameters of whole fits where slopes do not say them.
-
-    Where a finding stands for a whole fit, and where its own law ends so far from what the slopes
-    said that these do not hold there: a bushing is thirty times as soft, and slopes said seven.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        With its findings.
-    fitted : BaseFit
-        The base along with all of them.
-    whole : collection of str, optional
-        Names of findings of which slopes leave much that their fits explain.
-    """
-    found = []
-    for each in result.findings:
-        values = fitted.values_on_top(each.name)
-        stands_for_a_fit = SHARE in each.parameters or each.name in whole
-        slopes_hold = not stands_for_a_fit and all(
-            abs(values[key][0] - value) < FAR * sigma
-            for key, (value, sigma) in each.parameters.items()
-            if key in values
-        )
-        found.append(each if slopes_hold else replace(each, parameters=values))
-    return replace(result, findings=tuple(found))
-
-
-def sized(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
-    """Return an answer that says of each finding if it is far beyond the usual.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        With its findings.
-    effects : sequence of Effect
-        What was fitted for each of them.
-    """
-    told = []
-    for finding, effect in zip(result.findings, effects, strict=True):
-        by_size = {p.key: _usual_sizes(effect, p) for p in effect.parameters}
-        key = max(by_size, key=lambda each: by_size[each])
-        sentence = finding.evidence
-        if by_size[key] > FAR:
-            value = effect.estimates[key].value
-            sentence += f"; far beyond its usual size: {key} = {value:.3g}"
-        told.append(replace(finding, evidence=sentence))
-    return replace(result, findings=tuple(told))
-
-
-def _usual_sizes(effect: Effect, parameter: Parameter) -> float:
-    return abs(effect.estimates[parameter.key].value - parameter.mean) / parameter.scale
 
 
 def blanked(sessions: Sessions, aside: Mask) -> Sessions:
@@ -313,57 +228,6 @@ def unseen(fitted: BaseFit, sessions: Sessions, aside: Mask, whole: BaseFit) -> 
         step = np.linalg.lstsq(white, -left, rcond=1e-9)[0]
         residual, left = residual + columns @ step, left + white @ step
     return HeldOut(residual[aside], left)
-
-
-def rejudged(result: Diagnosis, stages: Sequence[HeldOut]) -> Diagnosis:
-    """Return an answer with the errors of fits that had not seen the part put aside.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        With as many findings as hold.
-    stages : sequence of HeldOut
-        Before the first of them and after each; none where the errors hold as they are.
-    """
-    if not stages:
-        return result
-    reported = [q for q in QUANTITIES if q.key in result.before]
-    findings = tuple(
-        replace(
-            each,
-            heldout_rmse_ratio=float(np.sqrt(after.energy / before.energy)),
-            buys={q.key: bought(before, after, q) for q in reported},
-        )
-        for each, before, after in zip(result.findings, stages[:-1], stages[1:], strict=True)
-    )
-    return replace(
-        result,
-        before={q.key: stages[0].rmse(q) for q in reported},
-        after={q.key: stages[-1].rmse(q) for q in reported},
-        findings=findings,
-    )
-
-
-def explained(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
-    """Return a rejudged answer whose findings say what their laws explain, not their slopes.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        Rejudged by stages.
-    effects : sequence of Effect
-        What was fitted for each of its findings.
-    """
-    told = [
-        replace(
-            each,
-            evidence=f"{effect.law.sentence.format(place=effect.component)}: its own law explains "
-            f"{100.0 * max(1.0 - each.heldout_rmse_ratio**2, 0.0):.1f} % of what is left without "
-            "it of the part put aside",
-        )
-        for each, effect in zip(result.findings, effects, strict=True)
-    ]
-    return replace(result, findings=tuple(told))
 
 
 def _key(fitted: BaseFit, number: int) -> tuple[str, str, int | None]:

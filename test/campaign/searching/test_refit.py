@@ -1,0 +1,148 @@
+"""Which of what was named stays, and what the stages of its fits are; fits are as is listed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.searching import refit as refitting
+from wrist_stiffness.campaign.searching.refit import refit
+from wrist_stiffness.diagnosis.sealed import HeldOut
+from wrist_stiffness.model.parameters import Estimate, Parameter
+
+SHARE = 0.25
+
+
+@pytest.fixture
+def laws(monkeypatch):
+    """A fitter that leaves much more than noise, and of unseen units less with each effect.
+
+    Other energies of these are listed by names, and costs, `anew` of fits from the drawing.
+    """
+    laws = SimpleNamespace(cost={}, anew={}, energy={}, variance=4.0 * refitting.INEXACT)
+
+    def fit(sessions, extras=(), start=None, beside=False):
+        names = tuple(each.name for each in extras)
+        costs = laws.anew if start is None else laws.cost
+        return SimpleNamespace(
+            extras=names,
+            cost=costs.get(names, 0.0),
+            variance=laws.variance,
+            beyond=lambda: {each.name: each for each in extras},
+            problem=SimpleNamespace(sessions=sessions, table=None),
+        )
+
+    def judge(fitted, sessions, aside, whole):
+        energy = laws.energy.get(fitted.extras, 100.0 / (1 + len(fitted.extras)))
+        return HeldOut(np.zeros((1, 6)), np.array([np.sqrt(energy)]))
+
+    monkeypatch.setattr(refitting, "sealed_units", lambda table, share: None)
+    monkeypatch.setattr(refitting, "blanked", lambda sessions, aside: sessions)
+    monkeypatch.setattr(refitting, "unseen", judge)
+    laws.fit = fit
+    return laws
+
+
+def entered(*names):
+    laws = {name: SimpleNamespace(id=name.split("@")[0]) for name in names}
+    return [SimpleNamespace(name=name, law=law, parameters=()) for name, law in laws.items()]
+
+
+TWO = "backlash@motor_1", "creep@joint_1"
+
+
+def test_what_entered_last_is_withdrawn_first(laws):
+    """The first explained most, and the last was named beside it."""
+    laws.energy = {TWO: 200.0}
+    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf).base
+    assert kept.extras == TWO[:1]
+
+
+def test_what_leaves_more_than_the_base_alone_is_judged_by_unseen_units(laws):
+    """Slopes named it; its own law ends elsewhere, though that is hardly more than noise."""
+    laws.variance = 1.0
+    laws.cost = laws.anew = {(): 100.0, TWO: 120.0}
+    laws.energy = {TWO: 200.0, TWO[:1]: 200.0}
+    assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 100.0).base.extras == ()
+    assert refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, 130.0).base.extras == TWO
+
+
+def test_nothing_is_withdrawn_that_foretells_unseen_units(laws):
+    kept = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf).base
+    assert kept.extras == TWO
+
+
+def test_each_stage_has_one_effect_more(laws):
+    """From these the technician is told what each of them buys."""
+    three = (*TWO, "drift@pose_sensor")
+    told = refit(laws.fit, laws.fit(()), entered(*three), SHARE, np.inf, saw_all=True)
+    assert told.base.extras == three
+    assert [each.energy for each in told.stages] == pytest.approx([100.0, 50.0, 100.0 / 3, 25.0])
+
+
+def test_stages_end_with_what_was_kept(laws):
+    laws.energy = {TWO: 200.0}
+    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf, saw_all=True)
+    assert [each.energy for each in told.stages] == pytest.approx([100.0, 50.0])
+    laws.energy[TWO[:1]] = 200.0
+    told = refit(laws.fit, laws.fit(()), entered(*TWO), SHARE, np.inf, saw_all=True)
+    assert (told.base.extras, told.stages) == ((), ())
+
+
+@pytest.mark.parametrize(("cost", "anew"), [(300.0, 500.0), (500.0, 300.0)])
+def test_a_base_that_nothing_was_named_of_is_fitted_from_both_its_starts(laws, cost, anew):
+    """What is not named may have drawn it along, or out of a wrong flange's hold."""
+    laws.cost, laws.anew = {(): cost}, {(): anew}
+    found = laws.fit((), entered(*TWO))
+    again = refit(laws.fit, found, [], SHARE, np.inf).base
+    assert again.extras == ()
+    assert again.cost == 300.0
+
+
+class TestWhatComesToNothing:
+    """Play of nothing was named: along with it the base had found out of a wrong flange's hold."""
+
+    FIRST, SECOND = TWO
+
+    def kept(self, laws, sizes, costs):
+        """Return what is kept of two effects, of sizes in usual ones; their shape is no size."""
+        size, shape = Parameter("size", -9.0, 9.0, 2.0), Parameter("shape", 0.0, 9.0, 2.0, mean=5.0)
+        named = entered(*TWO)
+        for each in named:
+            each.parameters = (size, shape)
+            each.estimates = {"size": Estimate(2.0 * sizes[each.name]), "shape": Estimate(9.0)}
+        laws.cost = laws.anew = costs
+        return refit(laws.fit, laws.fit(()), named, SHARE, np.inf).base
+
+    @pytest.mark.parametrize("nil", TWO)
+    def test_it_goes_whenever_it_entered(self, laws, nil):
+        (other,) = set(TWO) - {nil}
+        costs = {(): 900.0, TWO: 200.0, (other,): 203.0, (nil,): 900.0}
+        assert self.kept(laws, {nil: 0.04, other: 3.0}, costs).extras == (other,)
+
+    def test_all_of_it_goes(self, laws):
+        costs = dict.fromkeys([(), TWO, TWO[:1], TWO[1:]], 200.0)
+        assert self.kept(laws, dict.fromkeys(TWO, 0.0), costs).extras == ()
+
+    def test_a_small_one_that_is_missed_stays(self, laws):
+        costs = {(): 900.0, TWO: 200.0, TWO[:1]: 205.0, TWO[1:]: 205.0}
+        assert self.kept(laws, dict.fromkeys(TWO, 0.04), costs).extras == TWO
+
+    def test_one_that_has_a_size_is_not_asked(self, laws):
+        """With play in the base a fit takes long, and units put aside judge it."""
+        costs = {(): 900.0, TWO: 200.0, TWO[:1]: 200.0, TWO[1:]: 200.0}
+        assert self.kept(laws, dict.fromkeys(TWO, 0.06), costs).extras == TWO
+
+
+def test_the_base_alone_foretells_from_where_it_stood_along_with_effects(laws, monkeypatch):
+    """From the drawing it may be caught, and anything beside it would seem to foretell more."""
+    laws.cost, laws.anew = {(): 100.0}, {(): 300.0}
+    fit, alone = laws.fit, []
+
+    def judged(fitted, *others):
+        alone.extend([fitted.cost] if not fitted.extras else [])
+        return HeldOut(np.zeros((1, 6)), np.ones(1))
+
+    monkeypatch.setattr(refitting, "unseen", judged)
+    refit(fit, fit(()), entered(*TWO), SHARE, np.inf)
+    assert alone == [100.0]
