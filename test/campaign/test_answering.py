@@ -24,7 +24,7 @@ LITTLE, MORE = 0.5 * MUCH, 2.0 * MUCH
 
 def finding(*names):
     members = tuple(tuple(name.split("@")) for name in names)
-    return Finding(members, {}, 0.1, 50.0, 0.001, 1.0, {}, "yes", "", "")
+    return Finding(members, {}, 0.1, 50.0, 0.001, 1.0, {"s_um": (1.0, 0.1)}, "yes", "", "")
 
 
 def answer(verdict, *names, share=0.0, after=3.0):
@@ -293,12 +293,12 @@ def test_where_more_is_named_beside_whole_laws_nothing_is_settled():
 class TestWhatDoesNotHold:
     """Slopes between four poses named a bracket and a gear: with their laws worse than nothing."""
 
-    def judged(self, search, *held):
+    def judged(self, search, *held, variance=1.0):
         """Return the answer where only effects that are listed hold with their own laws."""
 
         def judge(place, result):
             kept = [name for name in names(result) if name in held]
-            return SimpleNamespace(base=SimpleNamespace(extras=tuple(kept), variance=1.0))
+            return SimpleNamespace(base=SimpleNamespace(extras=tuple(kept), variance=variance))
 
         return _judged(search, search.ask, judge)
 
@@ -313,6 +313,14 @@ class TestWhatDoesNotHold:
         where, result, judged = self.judged(search, DELAY, AXIS)
         assert where is search.places["quick"]
         assert names(result) == list(judged.base.extras) == [DELAY]
+
+    @pytest.mark.parametrize(("variance", "begun"), [(1.0, False), (2.0 * INEXACT, True)])
+    def test_they_are_not_asked_where_what_holds_leaves_no_more_than_noise(self, variance, begun):
+        """Friction held and explained; axes of a sensor that mopped up behind it did not hold."""
+        search = Asked(answer("effect", AXIS, DELAY), answer("none"), found=[AXIS])
+        search.by_law = None
+        self.judged(search, AXIS, variance=variance)
+        assert ("thorough" in search.begun) == begun
 
     def test_they_are_not_asked_again_where_a_whole_fit_does_not_hold(self):
         quick = answer("unknown", AXIS, share=MORE)

@@ -74,6 +74,7 @@ class Wrist:
             residual=residual,
             strain=cost,
             strained=cost in self.strained,
+            unit_price=float(np.log(NUMBERS)),
             variance=cost / NUMBERS,
         )
 

@@ -67,7 +67,8 @@ def test_an_answer_says_what_was_withdrawn():
     assert told.verdict == "unknown"
     assert told.after == {"s_um": 5.0}
     assert told.unexplained.evidence == (
-        "creep@joint_1 with its own law is nothing, or makes the sealed part worse"
+        "creep@joint_1 with its own law explains no more than chance, "
+        "or makes the sealed part worse"
     )
     assert withdrawn(whole, [each.name for each in two]) is whole
     assert withdrawn(whole, [two[1].name]).findings == two[1:]

@@ -135,6 +135,11 @@ class BaseFit:
         return float(np.sum(self.z[self.tolerances] ** 2))
 
     @property
+    def unit_price(self) -> float:
+        """Sum of squares that each further parameter must explain (BIC, Schwarz 1978)."""
+        return float(np.log(self.problem.table.measured.sum()))
+
+    @property
     def strained(self) -> bool:
         """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
         return bool(chi2.sf(self.strain, np.count_nonzero(self.tolerances)) < 0.05)

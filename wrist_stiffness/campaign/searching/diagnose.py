@@ -138,7 +138,7 @@ def diagnose_sessions(
     parts = contributions(suspected, {each.name for each in kept})
     parts = ranked([*parts, *possible(suspected, search.catalogue)])
     observed = base.left(with_extras=False)
-    if kept and len(kept) == len(named) and result.verdict == "unknown":
+    if kept and result.verdict == "unknown":
 
         def by_laws(found: Diagnosis) -> Diagnosis:
             if judged.stages:
@@ -164,7 +164,8 @@ def _judged(
 ) -> tuple[Place, Diagnosis, Refitted]:
     """Return the answer of a search, where it was found, and what of it holds with its own laws.
 
-    Slopes that mislead name what does not hold: then whole fits are asked.
+    Slopes that mislead name what does not hold: then whole fits are asked, where the rest of what
+    they named leaves more than noise.
     """
     place, result = _answered(search, ask)
     judged = judge(place, result)
@@ -175,7 +176,8 @@ def _judged(
             if again.base.cost < judged.base.cost:
                 return *other, again
     held = judged.base.extras
-    if len(held) == len(result.findings) or place.fits:
+    explains = bool(held) and judged.base.variance < INEXACT
+    if len(held) == len(result.findings) or explains or place.fits:
         return place, result, judged
     other = _whole(search.thorough(), search, ask)
     if other is None or not _says_more(other[1], withdrawn(result, held)):

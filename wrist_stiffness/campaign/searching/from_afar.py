@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.fitter import Fitter
@@ -86,8 +84,7 @@ def _usual(more: WristCandidate) -> Effect:
 
 
 def _added(begun: Reached, more: WristCandidate, base: BaseFit) -> Reached:
-    freedom = len(more.law.parameters(more.place))
-    price = freedom * float(np.log(base.problem.table.measured.sum()))
+    price = len(more.law.parameters(more.place)) * base.unit_price
     return replace(begun, base=base, prices={**begun.prices, more.name: price})
 
 

@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, Walls
 from wrist_stiffness.campaign.searching.fitter import Fitter
-from wrist_stiffness.campaign.searching.place import INEXACT
+from wrist_stiffness.campaign.searching.place import EXACT, INEXACT
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
 from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
@@ -22,12 +23,9 @@ from wrist_stiffness.model.effect import Effect
 
 Sessions = tuple[UnitSession, ...]
 
-NIL = 0.05
-"""Of its usual size: an effect that ends below it has led the base somewhere and is none itself."""
 
-MISSED = 4.0
-"""Sum of squares, in units of the noise, that is left more without an effect that is there: two
-standard deviations of one parameter."""
+CHANCE = 0.01
+"""That as many parameters of nothing explain as much: what explains no more does not stay."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +55,10 @@ def refit(
 ) -> Refitted:
     """Fit the base along with as much of what was named as holds.
 
-    What comes to nothing goes first: along with play that is none a base may find out of a wrong
-    flange's hold.  Where the laws leave much more than noise, or more than the base alone, what
-    entered last is taken out for as long as the units put aside come out worse with the effects
-    than without.
+    What explains too little goes first: along with play that is none a base may find out of a
+    wrong flange's hold.  Where the laws leave much more than noise, or more than the base alone,
+    what entered last is taken out for as long as the units put aside come out worse with the
+    effects than without.
 
     Parameters
     ----------
@@ -77,7 +75,7 @@ def refit(
     saw_all : bool
         Whether fits to all units chose what was named: then it is judged however little it leaves.
     """
-    fitted, kept = _without_nil(fitter, _along(fitter, base, named), named)
+    fitted, kept = _worth_it(fitter, base, _along(fitter, base, named), named, first_cost)
     exact = fitted.variance < INEXACT and fitted.cost < first_cost
     if not kept or (exact and not saw_all):
         return Refitted(fitted)
@@ -152,26 +150,35 @@ def _alone(fitter: Fitter, sessions: Sessions, start: BaseFit) -> BaseFit:
     return min((fitter(sessions, (), each) for each in (None, start)), key=_cost)
 
 
-def _without_nil(
-    fitter: Fitter, fitted: BaseFit, named: Sequence[Effect]
+def _worth_it(
+    fitter: Fitter, base: BaseFit, fitted: BaseFit, named: Sequence[Effect], first_cost: float
 ) -> tuple[BaseFit, list[Effect]]:
-    """Take out effects that have no size, where nothing is missed without them."""
+    """Take out effects that explain no more than chance, the last first.
+
+    By the likelihood ratio (Wilks 1938).  Beside another of its own law an effect must explain
+    more than that law, which is not exact, leaves of the other one.
+    """
     kept = list(named)
-    for effect in named:
+    for effect in reversed(named):
         found = fitted.beyond()
-        if _size(found[effect.name]) > NIL:
-            continue
-        others = [each for name, each in found.items() if name != effect.name]
-        less = fitter(fitted.problem.sessions, others, fitted)
-        if less.cost < fitted.cost + MISSED:
+        others = [found[each.name] for each in kept if each is not effect]
+        less = _less(fitter, base, fitted, others)
+        least = float(chi2.isf(CHANCE, len(effect.parameters)))
+        if any(each.law.id == effect.law.id for each in others):
+            least = max(least, EXACT**2 * (first_cost - less.cost))
+        if less.cost - fitted.cost < least:
             fitted, kept = less, [each for each in kept if each is not effect]
     return fitted, kept
 
 
-def _size(effect: Effect) -> float:
-    """Return the largest size of an effect, in usual ones; infinite for laws that have none."""
-    lengths = [p for p in effect.parameters if p.mean == 0.0]
-    return max((p.usual_sizes(effect.estimates[p.key].value) for p in lengths), default=np.inf)
+def _less(fitter: Fitter, base: BaseFit, fitted: BaseFit, others: Sequence[Effect]) -> BaseFit:
+    """Fit along with fewer effects from a fit with more; the search's own may have come further."""
+    sessions = fitted.problem.sessions
+    if not others:
+        return _alone(fitter, sessions, fitted)
+    less = fitter(sessions, others, fitted)
+    same = {each.name for each in others} == set(base.extras)
+    return min(less, base, key=_cost) if same else less
 
 
 def _again(fitter: Fitter, fitted: BaseFit, walls: Walls) -> BaseFit:

@@ -97,11 +97,6 @@ class Screen:
     def _whiten(self, values: Array) -> Array:
         return self._base.whiten(values) / self._root
 
-    @property
-    def _unit_price(self) -> float:
-        """Sum of squares that a shape parameter costs (BIC)."""
-        return float(np.log(self._base.problem.table.measured.sum()))
-
     def leaders(
         self, candidates: Sequence[WristCandidate]
     ) -> list[tuple[float, WristCandidate, tuple[float, ...]]]:
@@ -115,7 +110,7 @@ class Screen:
                 ),
                 key=lambda pair: pair[0],
             )
-            found.append((best[0] - len(best[1]) * self._unit_price, candidate, best[1]))
+            found.append((best[0] - len(best[1]) * self._base.unit_price, candidate, best[1]))
         return sorted(found, key=lambda each: -each[0])
 
     def fitted(self, candidate: WristCandidate, shape: tuple[float, ...], value: float) -> Fitted:

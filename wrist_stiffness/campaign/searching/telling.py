@@ -39,7 +39,8 @@ def withdrawn(result: Diagnosis, kept: Collection[str]) -> Diagnosis:
     }
     sentences = [result.unexplained.evidence] if result.unexplained.evidence else []
     sentences += [
-        f"{name} with its own law is nothing, or makes the sealed part worse" for name in gone
+        f"{name} with its own law explains no more than chance, or makes the sealed part worse"
+        for name in gone
     ]
     unexplained = replace(result.unexplained, evidence="; ".join(sentences))
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
