@@ -50,6 +50,13 @@ def test_what_is_named_is_far_beyond_the_usual_where_what_is_added_is(sizes):
     assert told == added(sizes * USUAL) == (sizes > 3.0)
 
 
+def test_the_sentence_has_the_value_of_the_list_below_it():
+    """Slopes and laws agree within their uncertainty, and a reader sees one number."""
+    effect = Effect(find_law("drive_compliance"), "motor_1").with_values({KEY: 40.2 * USUAL})
+    (finding,) = sized(diagnosed(40.0 * USUAL), [effect]).findings
+    assert finding.evidence.endswith(f"{KEY} = {40.0 * USUAL:.3g}")
+
+
 @pytest.mark.parametrize(("whole", "told"), [(520.0, 500.0), (540.0, 540.0), (2000.0, 2000.0)])
 def test_where_slopes_do_not_hold_the_law_says_the_value(whole, told):
     """A bushing 35 times as soft read 7 from its slopes, beside a sentence that knew better."""

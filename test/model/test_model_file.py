@@ -181,6 +181,11 @@ def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
         ("[12.1, 0.4]", "[12.1]", "is not a list of 2 finite numbers"),
         ("[12.1, 0.4]", "[.nan, 0.1]", "is not a list of 2 finite numbers"),
         ("[12.1, 0.4]", "much", "clearance_um: 'much' is not a finite number"),
+        (
+            "[12.1, 0.4]",
+            "1e1",
+            "clearance_um: '1e1' is not a finite number: YAML takes it for a text, write 10.0",
+        ),
         ("effects:\n", "effects: 3\nx:\n", "3 is not a list"),
         ("component: joint_3\n", "component: joint_3\n  color: red\n", "unknown key color"),
         ("- effect: joint_clearance", "- 7\n- effect: joint_clearance", r"effects\[0\]: 7 is not"),

@@ -135,7 +135,9 @@ class Block:
         """Return a finite number times `scale`; the limits are in the file's unit."""
         value = self.take(key)
         if not _is_number(value):
-            raise self._error(f"{self.place}.{key}: {_short(value)} is not a finite number")
+            raise self._error(
+                f"{self.place}.{key}: {_short(value)} is not a finite number{_as_number(value)}"
+            )
         if value <= above:
             raise self._error(f"{self.place}.{key}: {value} is not above {above:g}")
         if value < at_least:
@@ -223,6 +225,20 @@ def _is_number(value: Any) -> bool:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= float(np.finfo(float).max)
+
+
+def _as_number(value: Any) -> str:
+    """Return how YAML 1.1 writes a number that it reads as a text, as `1e6`; empty for no number.
+
+    It wants a point and the sign of the exponent (https://yaml.org/type/float.html).
+    """
+    try:
+        number = float(value) if isinstance(value, str) else np.nan
+    except ValueError:
+        return ""
+    if not np.isfinite(number):
+        return ""
+    return f": YAML takes it for a text, write {yaml.safe_dump(number).split()[0]}"
 
 
 def _is_row(value: Any, size: int) -> bool:

@@ -86,12 +86,14 @@ def sized(result: Diagnosis, effects: Sequence[Effect]) -> Diagnosis:
     """
     told = []
     for finding, effect in zip(result.findings, effects, strict=True):
-        values = effect.estimates
-        by_size = {p.key: p.usual_sizes(values[p.key].value) for p in effect.parameters}
+        # What is told of a finding below its sentence, and of the rest what was fitted.
+        values = {key: each.value for key, each in effect.estimates.items()}
+        values |= {k: v for k, (v, _) in finding.parameters.items() if k in values}
+        by_size = {p.key: p.usual_sizes(values[p.key]) for p in effect.parameters}
         key = max(by_size, key=lambda each: by_size[each])
         sentence = finding.evidence
         if by_size[key] > FAR:
-            sentence += f"; far beyond its usual size: {key} = {values[key].value:.3g}"
+            sentence += f"; far beyond its usual size: {key} = {values[key]:.3g}"
         told.append(replace(finding, evidence=sentence))
     return replace(result, findings=tuple(told))
 
