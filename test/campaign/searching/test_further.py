@@ -124,6 +124,30 @@ def test_what_was_fitted_along_and_not_named_is_asked_for_again(wrist):
     assert set(place.fits) == {FRICTION}
 
 
+@pytest.mark.parametrize("fitted", [False, True])
+def test_play_is_fitted_from_wall_to_wall_before_anything_is_sought_beside_it(wrist, fitted):
+    """Alone in the next minimum it would leave what friction then seems to explain."""
+    wrist.left = wrist.leaves(alone=9000, p=5000, fp=1500)
+    wrist.promised[PLAY] = 4000
+    wrist.beside = wrist.leaves(p=0.9 * INEXACT * NUMBERS)
+    search = Search(wrist, ())
+    assert search.found == {PLAY}
+    # Along with what rubs, or by its slopes: in neither fit the base was alone beside the play.
+    fits = {PLAY: wrist.reached(PLAY, FRICTION).base} if fitted else {}
+    wrist.done.clear()
+    assert search.further([PLAY], fits) is None
+    assert not any(FRICTION in names for names, _, _ in wrist.done)
+
+
+def test_play_that_was_fitted_so_is_not_fitted_again(wrist):
+    wrist.left = wrist.leaves(alone=9000, p=5000, fp=1500)
+    search = Search(wrist, ())
+    fit = wrist.reached(PLAY).base
+    wrist.done.clear()
+    assert search.further([PLAY], {PLAY: fit}).base is fit
+    assert {names for names, _, _ in wrist.done} == {frozenset((PLAY, FRICTION))}
+
+
 def test_beside_play_and_what_rubs_nothing_is_sought_from_afar(wrist):
     """With both in the base each fit takes ten seconds or more."""
     wrist.left = wrist.leaves(alone=9000, p=8000, fp=5000, fpq=1000)

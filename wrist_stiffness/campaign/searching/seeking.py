@@ -165,7 +165,7 @@ class Search:
             Whole fits that were found already, by what was named last.
         """
         begun = self._named(names, fits)
-        if begun is not None and not fits:
+        if begun is not None and not any(begun.base is each for each in fits.values()):
             begun = self._from_wall_to_wall(begun)
         if begun is None or begun.base.cost < INEXACT * begun.base.problem.table.measured.sum():
             return None
