@@ -158,6 +158,15 @@ def test_beside_play_and_what_rubs_nothing_is_sought_from_afar(wrist):
     assert not wrist.done
 
 
+@pytest.mark.parametrize(("left", "found"), [(710, False), (700, True)])
+def test_what_the_law_of_what_was_found_may_leave_is_no_further_play(wrist, left, found):
+    """An encoder that explained 19,100 may leave a hundredth, were its law wrong by a tenth."""
+    wrist.left = wrist.leaves(alone=20000, b=900, bp=850)
+    wrist.beside = wrist.leaves(bp=left)
+    place = Search(wrist, ()).further([BACKLASH], {})
+    assert (place is not None) == found
+
+
 def test_play_that_explains_nothing_beside_what_was_named_is_no_answer(wrist):
     wrist.left = wrist.leaves(alone=1000, b=500, bp=480)
     search = Search(wrist, ())

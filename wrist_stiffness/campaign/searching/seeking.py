@@ -208,12 +208,14 @@ class Search:
         return self._side_by_side(begun, self._trials(begun, tried))
 
     def _side_by_side(self, begun: Reached, trials: Mapping[str, Reached]) -> Place | None:
-        """Return the place of fits that explain anything beside what was found; None without."""
+        """Return the place of fits that explain more than laws leave of what was found, or None."""
         worthy = {name: each for name, each in trials.items() if each.total < begun.total}
-        if not worthy:
-            return None
         if not begun.astray:
             self._finish(worthy)
+        least = begun.least - WORTH
+        worthy = {n: each for n, each in worthy.items() if begun.total - each.total > least}
+        if not worthy:
+            return None
         known = self.beside(begun.base).candidates
         return replace(_as_they_are(begun, known, worthy), known=True)
 
