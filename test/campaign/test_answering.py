@@ -52,6 +52,7 @@ class Asked:
         self.doubtful = strains.get("doubtful", False)
         self.explained = strains.get("explained", False)
         self.rough = strains.get("rough", False)
+        self.first_cost, self.walls = 1000.0, strains.get("walls")
         self.places = {
             "quick": place(*found),
             "thorough": place(fits=[AXIS]) if thorough else None,
@@ -72,6 +73,9 @@ class Asked:
         self.begun.append("further")
         self.fits.append(fits)
         return None if fits else self.places["further"]
+
+    def from_wall_to_wall(self, names):
+        return self.walls if names == [PLAY] else None
 
     def beside(self, base):
         place = self.places["further" if self.begun[-1] == "further" else "thorough"]
@@ -239,6 +243,21 @@ def test_where_very_much_is_left_play_is_sought_beside_what_was_named_first(play
     assert search.begun.count("further") == (2 if play else 1)
     assert names(result) == ([DELAY, PLAY] if play else [DELAY])
     assert where == ("further" if play else "quick")
+
+
+@pytest.mark.parametrize(
+    ("named", "cost", "stands"),
+    [(PLAY, 900.0 * MUCH, True), (PLAY, 1100.0 * MUCH, False), (DELAY, 0.0, False)],
+)
+def test_play_fitted_from_wall_to_wall_stands_for_what_slopes_left(named, cost, stands):
+    """Of 590,000 slopes left a quarter, in the next minimum play left half, and here 3,600."""
+    fit = SimpleNamespace(cost=cost, extras=(PLAY,))
+    quick = answer("unknown", named, share=MORE)
+    search = Asked(quick, rough=True, found=[named], walls=fit)
+    where, result = _answered(search, search.ask)
+    assert result is quick
+    assert ("thorough" in search.begun) != stands
+    assert where.fits == ({PLAY: fit} if stands else {})
 
 
 @pytest.mark.parametrize("rough", [True, False])

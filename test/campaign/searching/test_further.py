@@ -137,6 +137,8 @@ def test_play_is_fitted_from_wall_to_wall_before_anything_is_sought_beside_it(wr
     wrist.done.clear()
     assert search.further([PLAY], fits) is None
     assert not any(FRICTION in names for names, _, _ in wrist.done)
+    assert search.from_wall_to_wall([PLAY]).cost == 0.9 * INEXACT * NUMBERS
+    assert search.from_wall_to_wall([PLAY, FRICTION]) is None
 
 
 def test_play_that_was_fitted_so_is_not_fitted_again(wrist):

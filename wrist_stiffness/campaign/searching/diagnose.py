@@ -203,6 +203,11 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
         further = _furthered(search, ask, place, result)
         if further[1] is not result:
             return further
+        names = [each.name for each in result.findings]
+        fit = search.from_wall_to_wall(names)
+        if fit is not None and fit.cost < MUCH * search.first_cost:
+            # From there slopes may leave much, which the fit does not.
+            return replace(place, fits=dict.fromkeys(names, fit)), result
     if doubted or result.verdict == "none":
         # What presses the base takes up whole, within its tolerances: then nothing seems missing.
         whole = search.thorough() if doubted else search.thorough(PRESSING)

@@ -60,6 +60,7 @@ class Search:
 
     def __init__(self, fitter: Fitter, sessions: Sessions) -> None:
         self._fitter = fitter
+        self._walls: dict[frozenset[str], BaseFit] = {}
         self._begin(self._fitter(sessions))
         explained = self._first.base.cost - self._reached.base.cost
         if self._first.base.cost - self._alone.base.cost > CAUGHT * explained > 0.0:
@@ -187,7 +188,20 @@ class Search:
             return begun
         sessions, extras = begun.base.problem.sessions, list(begun.effects.values())
         base = self._fitter(sessions, extras, begun.base, beside=True, walls="rounded first")
-        return min(begun, replace(begun, base=base), key=lambda each: each.total)
+        if base.cost > begun.base.cost:
+            return begun
+        self._walls[frozenset(base.extras)] = base
+        return replace(begun, base=base)
+
+    def from_wall_to_wall(self, names: Collection[str]) -> BaseFit | None:
+        """Return the fit along with what was named, if play in it was fitted from wall to wall.
+
+        Parameters
+        ----------
+        names : collection of str
+            What was named, and nothing else.
+        """
+        return self._walls.get(frozenset(names))
 
     def by_law(self, names: Collection[str], members: Collection[str]) -> Place | None:
         """Fit what slopes do not tell apart one by one with the whole base, beside what was named.
