@@ -52,7 +52,7 @@ class Asked:
         self.doubtful = strains.get("doubtful", False)
         self.explained = strains.get("explained", False)
         self.rough = strains.get("rough", False)
-        self.first_cost, self.walls = 1000.0, strains.get("walls")
+        self.first_cost, self.end = 1000.0, strains.get("end")
         self.places = {
             "quick": place(*found),
             "thorough": place(fits=[AXIS]) if thorough else None,
@@ -74,8 +74,8 @@ class Asked:
         self.fits.append(fits)
         return None if fits else self.places["further"]
 
-    def from_wall_to_wall(self, names):
-        return self.walls if names == [PLAY] else None
+    def ended(self, names):
+        return self.end if names == [PLAY] else None
 
     def beside(self, base):
         place = self.places["further" if self.begun[-1] == "further" else "thorough"]
@@ -249,15 +249,25 @@ def test_where_very_much_is_left_play_is_sought_beside_what_was_named_first(play
     ("named", "cost", "stands"),
     [(PLAY, 900.0 * MUCH, True), (PLAY, 1100.0 * MUCH, False), (DELAY, 0.0, False)],
 )
-def test_play_fitted_from_wall_to_wall_stands_for_what_slopes_left(named, cost, stands):
+def test_play_fitted_to_its_end_stands_for_what_slopes_left(named, cost, stands):
     """Of 590,000 slopes left a quarter, in the next minimum play left half, and here 3,600."""
     fit = SimpleNamespace(cost=cost, extras=(PLAY,))
     quick = answer("unknown", named, share=MORE)
-    search = Asked(quick, rough=True, found=[named], walls=fit)
+    search = Asked(quick, rough=True, found=[named], end=fit)
     where, result = _answered(search, search.ask)
     assert result is quick
     assert ("thorough" in search.begun) != stands
-    assert where.fits == ({PLAY: fit} if stands else {})
+    assert where.fits == ({PLAY: fit} if named == PLAY else {})
+
+
+def test_play_that_stands_for_itself_begins_where_it_was_fitted_to_its_end():
+    """The fit that found it had a joint in it that rubs, and was not named."""
+    fit = SimpleNamespace(cost=9.0, extras=(PLAY,))
+    quick, more = answer("unknown", share=1.0), answer("effect", PLAY)
+    search = Asked(quick, further=more, beside=answer("none"), rough=True, end=fit)
+    where, result = _answered(search, search.ask)
+    assert names(result) == [PLAY]
+    assert where.fits == {PLAY: fit}
 
 
 @pytest.mark.parametrize("rough", [True, False])

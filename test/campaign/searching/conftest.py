@@ -50,6 +50,10 @@ class Wrist:
     def candidate(name):
         return candidate(name)
 
+    @staticmethod
+    def led(names, start):
+        """Return what is left of fits from elsewhere, where that is not as is listed."""
+
     def tell(self, text):
         """Nobody listens."""
 
@@ -59,7 +63,7 @@ class Wrist:
         self.done.append((names, start, walls if walls == "rounded" else beside))
         how = self.beside if beside else self.afresh if start is None else {}
         how = self.rounded if walls == "rounded" else how
-        return self.base(how.get(names, self.left[names]), extras)
+        return self.base(self.led(names, start) or how.get(names, self.left[names]), extras)
 
     def base(self, cost, extras=()):
         table = SimpleNamespace(measured=np.ones(NUMBERS, dtype=bool))

@@ -137,8 +137,8 @@ def test_play_is_fitted_from_wall_to_wall_before_anything_is_sought_beside_it(wr
     wrist.done.clear()
     assert search.further([PLAY], fits) is None
     assert not any(FRICTION in names for names, _, _ in wrist.done)
-    assert search.from_wall_to_wall([PLAY]).cost == 0.9 * INEXACT * NUMBERS
-    assert search.from_wall_to_wall([PLAY, FRICTION]) is None
+    assert search.ended([PLAY]).cost == 0.9 * INEXACT * NUMBERS
+    assert search.ended([PLAY, FRICTION]) is None
 
 
 def test_play_that_was_fitted_so_is_not_fitted_again(wrist):
@@ -147,7 +147,21 @@ def test_play_that_was_fitted_so_is_not_fitted_again(wrist):
     fit = wrist.reached(PLAY).base
     wrist.done.clear()
     assert search.further([PLAY], {PLAY: fit}).base is fit
-    assert {names for names, _, _ in wrist.done} == {frozenset((PLAY, FRICTION))}
+    assert not any(names == {PLAY} and start is fit for names, start, _ in wrist.done)
+
+
+def test_play_alone_is_fitted_from_where_more_beside_it_led(wrist):
+    """What led out of the next minimum may be no more: from there play alone leaves as little."""
+    wrist.left = wrist.leaves(alone=9000, p=1000, fp=500, gp=490)
+    search = Search(wrist, ())
+    fit = wrist.reached(PLAY).base
+
+    def leaving(names, start):
+        return 510 if names == {PLAY} and start is not None and FRICTION in start.extras else None
+
+    wrist.led = leaving
+    assert search.further([PLAY], {PLAY: fit}) is None
+    assert search.ended([PLAY]).cost == 510
 
 
 def test_beside_play_and_what_rubs_nothing_is_sought_from_afar(wrist):

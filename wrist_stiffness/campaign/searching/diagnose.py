@@ -197,24 +197,19 @@ def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
     if doubted and search.explained and not (strained or others):
         # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
         return replace(place, fits=dict.fromkeys(search.found, place.base)), result
-    sought = search.rough
-    if sought:
+    if search.rough:
         # So much is left that what no slope shows stands beside what was named, not in its place.
-        further = _furthered(search, ask, place, result)
-        if further[1] is not result:
-            return further
-        names = [each.name for each in result.findings]
-        fit = search.from_wall_to_wall(names)
-        if fit is not None and fit.cost < MUCH * search.first_cost:
-            # From there slopes may leave much, which the fit does not.
-            return replace(place, fits=dict.fromkeys(names, fit)), result
+        place, further = _furthered(search, ask, place, result)
+        little = MUCH * search.first_cost
+        if further is not result or any(fit.cost < little for fit in place.fits.values()):
+            return place, further
     if doubted or result.verdict == "none":
         # What presses the base takes up whole, within its tolerances: then nothing seems missing.
         whole = search.thorough() if doubted else search.thorough(PRESSING)
         other = _whole(whole, search, ask)
         if other is not None and _says_more(other[1], result):
             return other
-    return (place, result) if sought else _furthered(search, ask, place, result)
+    return (place, result) if search.rough else _furthered(search, ask, place, result)
 
 
 def _by_law(search: Search, ask: Ask, result: Diagnosis) -> tuple[Place, Diagnosis] | None:
@@ -259,7 +254,9 @@ def _furthered(
         fitted = [each for each in result.findings if each.name in beside.base.extras]
         place, result = beside, _together(replace(result, findings=tuple(fitted)), more)
         fits = {name: beside.fits[name] for name in found}
-    return place, result
+    names = [each.name for each in result.findings]
+    end = search.ended(names)
+    return place if end is None else replace(place, fits=dict.fromkeys(names, end)), result
 
 
 def _whole(place: Place | None, search: Search, ask: Ask) -> tuple[Place, Diagnosis] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from wrist_stiffness.campaign.searching.base_fit import BaseFit
+from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit
 from wrist_stiffness.campaign.searching.candidates import Point, WristCandidate
 from wrist_stiffness.campaign.searching.screening import Screen
 from wrist_stiffness.model.effect import Effect
@@ -92,6 +92,11 @@ class Reached:
     def astray(self) -> bool:
         """Whether so much is left that what is missing is sought from afar."""
         return self.base.cost > ASTRAY * float(self.base.problem.table.measured.sum())
+
+    @property
+    def loose(self) -> bool:
+        """Whether a pin has play in it."""
+        return any(each.law.id in LOOSE for each in self.effects.values())
 
     @property
     def gave_way(self) -> bool:
