@@ -123,6 +123,16 @@ class TestWhatExplainsTooLittle:
     def test_all_of_it_goes(self, laws):
         assert self.kept(laws, *TWO, [200.0, 200.0], alone=206.0) == ()
 
+    def test_what_the_base_alone_left_from_the_drawing_counts_too(self, laws):
+        """From where the effect had led the base may be caught, and it would seem to be missed."""
+        (one,) = entered(TWO[0])
+        one.parameters = (None,)
+        laws.cost = {TWO[:1]: 200.0, (): 900.0}
+        laws.anew = laws.cost | {(): 203.0}
+        searched = laws.fit((), [one], laws.fit(()))
+        alone = refit(laws.fit, searched, [one], SHARE, 203.0).base
+        assert (alone.extras, alone.cost) == ((), 203.0)
+
     def test_what_chance_hardly_explains_stays(self, laws):
         """One parameter explains 6.6 of nothing in one of a hundred, thirteen 27.7."""
         assert self.kept(laws, *TWO, [207.0, 207.0]) == TWO

@@ -166,17 +166,17 @@ def _worth_it(
         least = float(chi2.isf(CHANCE, len(effect.parameters)))
         if any(each.law.id == effect.law.id for each in others):
             least = max(least, EXACT**2 * (first_cost - less.cost))
-        if less.cost - fitted.cost < least:
-            fitted, kept = less, [each for each in kept if each is not effect]
+        # The base alone was fitted from the drawing already.
+        left = less.cost if others else min(less.cost, first_cost)
+        if left - fitted.cost < least:
+            fitted = less if less.cost == left else fitter(less.problem.sessions)
+            kept = [each for each in kept if each is not effect]
     return fitted, kept
 
 
 def _less(fitter: Fitter, base: BaseFit, fitted: BaseFit, others: Sequence[Effect]) -> BaseFit:
     """Fit along with fewer effects from a fit with more; the search's own may have come further."""
-    sessions = fitted.problem.sessions
-    if not others:
-        return _alone(fitter, sessions, fitted)
-    less = fitter(sessions, others, fitted)
+    less = fitter(fitted.problem.sessions, others, fitted)
     same = {each.name for each in others} == set(base.extras)
     return min(less, base, key=_cost) if same else less
 
