@@ -7,7 +7,7 @@ the units put aside worse than the base alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.stats import chi2
 
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, Walls
 from wrist_stiffness.campaign.searching.fitter import Fitter
+from wrist_stiffness.campaign.searching.from_afar import STICKING
 from wrist_stiffness.campaign.searching.place import EXACT, INEXACT
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
@@ -26,6 +27,11 @@ Sessions = tuple[UnitSession, ...]
 
 CHANCE = 0.01
 """That as many parameters of nothing explain as much: what explains no more does not stay."""
+
+
+RUBBED = 0.2
+"""Share of its size within which friction is taken to be right: what sticks before it slips differs
+from wrist to wrist, and cables or axes of a sensor mop up what is left of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,25 +159,39 @@ def _alone(fitter: Fitter, sessions: Sessions, start: BaseFit) -> BaseFit:
 def _worth_it(
     fitter: Fitter, base: BaseFit, fitted: BaseFit, named: Sequence[Effect], first_cost: float
 ) -> tuple[BaseFit, list[Effect]]:
-    """Take out effects that explain no more than chance, the last first.
+    """Take out effects that explain no more than chance or the others' laws leave, the last first.
 
-    By the likelihood ratio (Wilks 1938).  Beside another of its own law an effect must explain
-    more than that law, which is not exact, leaves of the other one.
+    By the likelihood ratio (Wilks 1938).  What a law that is not exact leaves of an effect looks
+    like more of the same law elsewhere, and where something rubs like anything.
     """
     kept = list(named)
-    for effect in reversed(named):
+    while kept:
         found = fitted.beyond()
-        others = [found[each.name] for each in kept if each is not effect]
-        less = _less(fitter, base, fitted, others)
-        least = float(chi2.isf(CHANCE, len(effect.parameters)))
-        if any(each.law.id == effect.law.id for each in others):
-            least = max(least, EXACT**2 * (first_cost - less.cost))
-        # The base alone was fitted from the drawing already.
-        left = less.cost if others else min(less.cost, first_cost)
-        if left - fitted.cost < least:
-            fitted = less if less.cost == left else fitter(less.problem.sessions)
-            kept = [each for each in kept if each is not effect]
+        less = {
+            each.name: _less(fitter, base, fitted, [found[o.name] for o in kept if o is not each])
+            for each in kept
+        }
+        fall = {name: fit.cost - fitted.cost for name, fit in less.items()}
+        if len(kept) == 1:
+            # The base alone was fitted from the drawing already.
+            fall[kept[0].name] = min(fall[kept[0].name], first_cost - fitted.cost)
+        idle = [e for e in kept if fall[e.name] < _least(e, [o for o in kept if o is not e], fall)]
+        if not idle:
+            break
+        last = idle[-1]
+        kept = [each for each in kept if each is not last]
+        fitted = less[last.name] if kept else _alone(fitter, fitted.problem.sessions, fitted)
     return fitted, kept
+
+
+def _least(effect: Effect, others: Sequence[Effect], fall: Mapping[str, float]) -> float:
+    """Return what an effect must explain beside others, each of which explains that much."""
+    shares = {
+        each.name: RUBBED if each.law.id in STICKING else EXACT * (each.law.id == effect.law.id)
+        for each in others
+    }
+    inexact = sum(share**2 * fall[name] for name, share in shares.items())
+    return max(float(chi2.isf(CHANCE, len(effect.parameters))), inexact)
 
 
 def _less(fitter: Fitter, base: BaseFit, fitted: BaseFit, others: Sequence[Effect]) -> BaseFit:
