@@ -39,7 +39,7 @@ ENOUGH, NEARLY = 3e-3, 3e-2
 
 SMALLEST_STEP = 1.0 / 16.0
 
-ROUNDED_N = (1.0, 0.3)
+ROUNDED_N = (1.0, 0.3, 0.1, 0.03)
 """Forces within which a pin goes from wall to wall, before the fit with the law as it is: from one
 wall to the other the sum of squares has a minimum for every pin that turns over, and steps end in
 the next one (graduated non-convexity, Blake and Zisserman 1987)."""
