@@ -347,12 +347,14 @@ def _says_more(one: Diagnosis, other: Diagnosis) -> bool:
 def _with_all(fitter: Fitter, base: BaseFit, named: Sequence[Effect], final: BaseFit) -> BaseFit:
     """Return the base fitted along with what the search found and what was named.
 
-    Where that is what was named alone, this fit is known.
+    Where that is what was named alone, or where more effects end in a higher minimum, it is the fit
+    of what was named.
     """
     more = [each for each in named if each.name not in base.extras]
     if {*base.extras, *(each.name for each in more)} == set(final.extras):
         return final
-    return fitter(base.problem.sessions, [*base.beyond().values(), *more], base) if more else base
+    whole = fitter(base.problem.sessions, [*base.beyond().values(), *more], base) if more else base
+    return min(final, whole, key=lambda each: each.cost)
 
 
 def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
