@@ -25,7 +25,7 @@ AT_REST = (
     *("link_stiffness", "bushing_stiffness", "drive_compliance", "mount_compliance", "gravity"),
     *("joint_clearance", "flange_contact", "bushing_hardening", "axis_misalignment"),
     *("thermal_expansion", "thermal_softening", "load_scale", "load_misalignment"),
-    *("load_point", "drift"),
+    *("load_point", "load_cross_talk", "drift"),
 )
 """Effects whose laws need no motion: those that the exact path can hide."""
 

@@ -1,6 +1,7 @@
 """Laws of what the model is told and of what the pose sensor says."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -25,6 +26,28 @@ def same(model, effect, said, true):
 def test_sensor_that_reads_too_much(model, make):
     effect = make.effect("load_scale@load_sensor", scale_percent=25.0)
     assert same(model, effect, make.rest(POSE, 1.25 * TRUE), make.rest(POSE, TRUE))
+
+
+def test_axes_that_read_one_another(model, make):
+    """A sensor with a wrong calibration matrix; the gain of fz is load_scale's."""
+    rng = np.random.default_rng(4)
+    full_scale = np.repeat([1.0, 0.01], 3)
+    talk = 0.05 * rng.normal(size=(6, 6)) * full_scale[:, None] / full_scale
+    taken = np.eye(6) - np.linalg.inv(np.eye(6) + talk)
+    scale = 1.0 / (1.0 - taken[2, 2]) - 1.0
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    units = {"ff": ("percent", 100.0), "fm": ("N_per_Nm", 1.0), "mf": ("Nmm_per_N", 1e3)}
+    units["mm"] = units["ff"]
+    values = {}
+    for (i, axis), (j, source) in product(enumerate(axes), enumerate(axes)):
+        name, factor = units[axis[0] + source[0]]
+        values[f"{axis}_from_{source}_{name}"] = factor * (taken[i, j] + (i == j) * -taken[2, 2])
+    del values["fz_from_fz_percent"]
+    crossed = make.effect("load_cross_talk@load_sensor", **values)
+    scaled = make.effect("load_scale@load_sensor", scale_percent=100.0 * scale)
+    said = TRUE + talk @ TRUE
+    told = model.with_effects(crossed, scaled).batch(make.rest(POSE, said)).twist
+    assert np.allclose(told, model.batch(make.rest(POSE, TRUE)).twist, rtol=1e-9, atol=1e-18)
 
 
 def test_sensor_that_is_not_tared(model, make):

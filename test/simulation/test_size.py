@@ -29,7 +29,7 @@ SAMPLES = [
         ("time_delay", "motor_2", "plain"),
         ("cable_wrench", "platform", "rubbing"),
         ("drift", "pose_sensor", "daily"),
-        ("load_scale", "load_sensor", "cross_talk"),
+        ("load_cross_talk", "load_sensor", "plain"),
     )
 ]
 WANTED = 3.0

@@ -117,9 +117,8 @@ CATALOGUE: dict[str, Entry] = {
         ("platform",), ("smooth", "rubbing"), "N/m", 2.0, 500.0, makers.cable_wrench
     ),
     "load_bias": Entry(("load_sensor",), ("constant", "warm_up"), "N", 0.02, 5.0, makers.load_bias),
-    "load_scale": Entry(
-        ("load_sensor",), ("scale", "cross_talk"), "-", 0.03, 20.0, makers.load_scale
-    ),
+    "load_scale": Entry(("load_sensor",), ("scale",), "-", 0.03, 20.0, makers.load_scale),
+    "load_cross_talk": Entry(("load_sensor",), ONE, "-", 0.01, 5.0, makers.load_cross_talk),
     "load_misalignment": Entry(
         ("load_sensor",),
         ONE,

@@ -229,14 +229,18 @@ def load_bias(d: Draw) -> Law:
 
 
 def load_scale(d: Draw) -> Law:
-    """Return a scale, with or without cross-talk."""
-    matrix = (1.0 + d.magnitude) * np.eye(6)
-    if d.form == "cross_talk":
-        talk = d.rng.normal(size=(6, 6)) * d.magnitude / 4.0
-        # Moments are a hundredth of forces in size: cross-talk is relative to full scale.
-        scale = np.repeat([1.0, 0.01], 3)
-        matrix = matrix + talk * scale[:, None] / scale
-    return LoadMatrix(matrix)
+    """Return one gain for all axes."""
+    return LoadMatrix((1.0 + d.magnitude) * np.eye(6))
+
+
+def load_cross_talk(d: Draw) -> Law:
+    """Return a calibration matrix that is off by the magnitude at random, relative to full scale.
+
+    Moments are a hundredth of forces in size.
+    """
+    scale = np.repeat([1.0, 0.01], 3)
+    talk = d.rng.normal(size=(6, 6)) * d.magnitude * scale[:, None] / scale
+    return LoadMatrix(np.eye(6) + talk)
 
 
 def measured(law: type[MeasurementFrame] | type[TargetMounting]) -> Callable[[Draw], Law]:

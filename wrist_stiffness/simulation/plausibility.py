@@ -27,6 +27,7 @@ LARGEST: dict[str, tuple[float, str]] = {
     "cable_wrench": (50.0, "a hose, not a cable"),
     "load_bias": (0.5, "half of the rated force is seen at rest"),
     "load_scale": (0.3, "another sensor's calibration sheet"),
+    "load_cross_talk": (0.1, "a tenth of full scale on the wrong axis: the cable is torn"),
     "load_misalignment": (0.2, "11 deg are seen by eye"),
     "load_point": (0.03, "as far off as the sensor is long"),
     "measurement_frame": (1e-2, "seen by eye"),

@@ -1,4 +1,7 @@
-"""`load_bias`, `load_scale`, `load_misalignment`, `load_point`: the sensor reads another wrench."""
+"""Load sensors that read another wrench.
+
+`load_bias`, `load_scale`, `load_cross_talk`, `load_misalignment`, `load_point`.
+"""
 
 from __future__ import annotations
 
