@@ -26,10 +26,11 @@ help:
 demo: $(READY)
 	$(RUN) wrist_stiffness.cli.demo -o demo
 
-# The workers share the cores: threads of their own below them would only get in the way.
+# The workers share the cores: threads of their own below them would only get in the way.  Who is
+# done takes over from others.
 test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(RUN) pytest -n $(TESTERS) $(PYTEST_ARGS) test
+	$(RUN) pytest -n $(TESTERS) --dist worksteal $(PYTEST_ARGS) test
 
 lint: $(READY)
 	$(RUN) ruff check .

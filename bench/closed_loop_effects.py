@@ -57,6 +57,7 @@ HIDDEN = (
     *("gravity@platform:mass", "cable_wrench@platform:smooth", "inertia@platform:plain"),
     *("thermal_expansion@link_1:linear", "thermal_softening@joint_1:exponential"),
     *("load_bias@load_sensor:constant", "load_scale@load_sensor:scale"),
+    "load_cross_talk@load_sensor:plain",
     *("load_misalignment@load_sensor:plain", "load_point@load_sensor:frame"),
     *("time_delay@load_sensor:plain", "time_delay@motor_1:plain"),
     *("time_delay@pose_sensor:plain", "drift@pose_sensor:linear"),

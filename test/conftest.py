@@ -8,3 +8,8 @@ os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 90))
 worker = os.environ.get("PYTEST_XDIST_WORKER")
 if worker is not None:
     os.environ["ROS_DOMAIN_ID"] = str(int(os.environ["ROS_DOMAIN_ID"]) + int(worker[2:]) % 11)
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the documents: they take the longest, and at the end one worker would be alone."""
+    items.sort(key=lambda item: "test_readme.py::test_commands" not in item.nodeid)

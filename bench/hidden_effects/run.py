@@ -33,7 +33,7 @@ from types import FrameType
 from typing import Any
 
 from bench_wrist import OWN, READING, TRUTH, code_version
-from cases import Case, full_cases, quick_cases, stage_of
+from cases import TINY, Case, full_cases, quick_cases, stage_of
 from ceiling import knows_the_laws
 from diagnosis_core import diagnosis_core
 from dictionary import Dictionary, design_of, dictionary
@@ -93,6 +93,9 @@ FILES = {
 
 LONGEST_S = 1800
 """A riddle or an answer that takes longer is given up."""
+
+LONG = ("knows_the_laws", "told_the_name")
+"""They fit for minutes: of the quick part only the smallest effect is asked them."""
 
 RESTARTS = 5
 """Of the pool, after a process was killed from outside."""
@@ -160,9 +163,10 @@ def _without(case: Case, solver: str, why: str, text: str) -> dict[str, Any]:
     }
 
 
-def asked(case: Case, solvers: Sequence[str]) -> list[str]:
+def asked(case: Case, solvers: Sequence[str], quick: bool = False) -> list[str]:
     """Return those of the solvers that are asked this case."""
-    return [name for name in solvers if name not in SAMPLED or case.asked(name)]
+    names = [name for name in solvers if name not in SAMPLED or case.asked(name)]
+    return [name for name in names if name not in LONG or case.size == TINY] if quick else names
 
 
 class time_limit:
@@ -234,10 +238,11 @@ def main() -> int:
         for case in (quick_cases() if arguments.quick else full_cases())
         if arguments.only in case.key and stage_of(case) in stages
     ]
+    to_ask = [(case, asked(case, solvers, arguments.quick)) for case in cases]
     todo = [
         (case, missing)
-        for case in cases
-        if (missing := [name for name in asked(case, solvers) if name not in done[case.key]])
+        for case, names in to_ask
+        if (missing := [name for name in names if name not in done[case.key]])
     ][: arguments.most]
     print(f"{len(todo)} of {len(cases)} cases to do, results in {path}", flush=True)
     run(todo, path, arguments)

@@ -1,18 +1,15 @@
 """The whole way: a session of the virtual cell, or a recording, to a named effect."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
-RECORDINGS = Path(__file__).parents[1] / "data"
 SECONDS = 120.0
 
 
@@ -61,14 +58,6 @@ def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, in_the_cell
     # A hidden encoder count is 4 mdeg, and two minutes have some ten dwells for each side.
     assert error < 5.0
     assert found.diagnosis.after["phi_mdeg"] < 0.5 * found.diagnosis.before["phi_mdeg"]
-
-
-@pytest.mark.slow
-def test_a_recording_of_something_outside_the_catalogue_is_unknown(model):
-    session = read_session(RECORDINGS / "wrist_d.mcap", model.table)
-    found = answer(model, session).diagnosis
-    assert found.verdict == "unknown"
-    assert found.findings == ()
 
 
 def test_no_session_is_refused(model):

@@ -70,6 +70,7 @@ def by_name(found):
     return {(p.effect, p.key): p for p in found.parameters}
 
 
+@pytest.mark.slow
 def test_parameters_planted_in_the_virtual_cell_are_recovered(model):
     softer, zero = 0.4, np.radians(0.05)
     session = simulated(
@@ -113,6 +114,7 @@ def test_registrations_of_a_millimetre_are_recovered_to_the_noise(model):
     assert found.arrived
 
 
+@pytest.mark.slow
 def test_three_of_a_thousand_lie_beyond_three_sigma(model):
     """Chi square of all errors over twenty seeds; parameters are drawn from their priors."""
     free = (

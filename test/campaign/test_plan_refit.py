@@ -109,6 +109,7 @@ def test_a_rival_leaves_what_the_first_one_left(model, noise, earlier, first, va
     assert after < 0.3 * before
 
 
+@pytest.mark.slow
 def test_a_plan_ends_where_half_of_what_may_be_is_settled(model, noise, earlier, monkeypatch):
     """The rarest values would take many times as long; the next plan knows whether they hold."""
     monkeypatch.setattr(pool, "POOL", 10)
@@ -128,6 +129,7 @@ def test_a_plan_ends_where_half_of_what_may_be_is_settled(model, noise, earlier,
     assert any(np.mean(d >= RESOLVED) < 0.5 for d in told[-2])
 
 
+@pytest.mark.slow
 def test_what_was_asked_is_open_however_settled_it_is_reckoned(model, noise, earlier, monkeypatch):
     """Where no law is quite right, earlier data are reckoned to tell more than they did.
 

@@ -62,10 +62,12 @@ def longer(model):
         patch.undo()
 
 
+@pytest.mark.slow
 def test_the_duration_is_kept_and_used(longer):
     assert 22.0 * 60.0 < longer.timeline.duration_s <= 25.0 * 60.0
 
 
+@pytest.mark.slow
 def test_the_shortest_plan_is_arranged_twice_at_most(model, monkeypatch):
     """Without visits only the warm-up can be drawn again, which may always be too long."""
     lasted, arranged = [], planning._Pool.arranged
@@ -182,6 +184,7 @@ def test_warm_up_reference_poses_holds_and_zero_loads(longer):
             assert sorted(loaded) == [False, True], number
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_plan_and_another_one_another(model):
     plans = [
         plan(model, rivals(), conditions(model, minutes=5.0, seed=seed, in_motion=False)).timeline

@@ -103,6 +103,7 @@ def test_what_fits_to_all_units_chose_is_judged_however_little_it_leaves(
     assert sorted(energies, reverse=True) == energies
 
 
+@pytest.mark.slow
 def test_errors_that_are_told_are_of_fits_that_had_not_seen_the_part(model, lost_motion):
     """Two micrometres more, there alone, are as much more of error: no fit took them up."""
     late, more = np.arange(400) >= 300, 2e-6 * np.array([0.0, 1.0, 0.0])

@@ -133,6 +133,7 @@ def test_two_joints_hold_a_pin_in_a_stream_as_in_a_recording(model, make):
         assert np.all(np.abs(found.twist - wanted) <= 1e-12 * np.abs(at_once).max(axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("loose", "clearance_um", "joint", "coefficient"),
     [("joint_4", 5.0, "joint_3", 0.05), ("joint_1", 5.0, "joint_4", 0.2)],

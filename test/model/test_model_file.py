@@ -310,7 +310,8 @@ CATALOGUE = """
     platform_compliance gravity joint_clearance flange_contact bushing_hardening joint_friction
     backlash encoder_offset encoder_eccentricity transmission_error axis_misalignment
     thermal_expansion thermal_softening creep cable_wrench load_bias load_scale
-    load_cross_talk load_misalignment load_point measurement_frame target_mounting drift time_delay inertia
+    load_cross_talk load_misalignment load_point measurement_frame target_mounting drift time_delay
+    inertia
 """
 
 

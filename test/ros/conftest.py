@@ -1,5 +1,6 @@
 """Live nodes in this process, with a probe beside them; every wait ends at a deadline."""
 
+import gc
 import time
 import warnings
 from collections import defaultdict
@@ -106,6 +107,17 @@ class Graph:
 
         self.until(look, f"diagnostic of {name}")
         return found[-1]
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left():
+    """Free the nodes of a test at its end.
+
+    Their participants live until the collector comes, at any moment of another test; beside live
+    ones in one process Fast DDS may then wait for itself for ever.
+    """
+    yield
+    gc.collect()
 
 
 @pytest.fixture

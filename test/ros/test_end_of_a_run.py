@@ -111,6 +111,7 @@ class Run:
         self.answers.publish(self._message_type(header=header))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("topic", "message_type"),
     [
@@ -128,6 +129,7 @@ def test_a_run_ends_when_its_last_sample_is_answered(graph, monkeypatch, topic, 
         run.spin(np.inf)
 
 
+@pytest.mark.slow
 def test_a_run_waits_but_not_for_ever(graph, monkeypatch):
     monkeypatch.setattr(cell_simulator, "LONGEST_ANSWER_S", QUIET_S)
     run = Run(graph, "/pose_error_predicted", PoseWithCovarianceStamped)
@@ -137,6 +139,7 @@ def test_a_run_waits_but_not_for_ever(graph, monkeypatch):
     assert run.quiet_s > 0.5 * QUIET_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gone", [False, True], ids=["hangs", "hangs for so long that it is gone"])
 @pytest.mark.parametrize("answered", [0, 10])
 def test_a_run_says_who_fell_silent(graph, monkeypatch, capsys, answered, gone):
@@ -163,6 +166,7 @@ def test_a_run_says_who_fell_silent(graph, monkeypatch, capsys, answered, gone):
     assert asked - answered - 5 <= silence <= missing
 
 
+@pytest.mark.slow
 def test_a_run_of_which_a_node_is_held_up_for_less_than_a_second_is_sound(graph, capsys):
     run = Run(graph, "/pose_error_predicted", PoseWithCovarianceStamped)
     heard, answered = graph.heard["/joint_states"], [0]
@@ -179,6 +183,7 @@ def test_a_run_of_which_a_node_is_held_up_for_less_than_a_second_is_sound(graph,
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_run_does_not_wait_for_ever_for_a_corrector_that_hangs(graph, monkeypatch, capsys):
     monkeypatch.setattr(cell_simulator, "LONGEST_SWITCHING_S", QUIET_S)
     hung = rclpy.create_node("angle_corrector", context=graph.context)  # Nobody runs it.

@@ -71,6 +71,7 @@ def largest_told(scale, start):
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", FIRST + SAMPLES, ids=lambda h: f"{h.effect}-{h.component}")
 def test_asked_size_is_in_the_data(start, scale, wrist):
     """What cannot be as large as wanted says how large it can be, and that is in the data."""

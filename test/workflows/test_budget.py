@@ -65,6 +65,7 @@ def test_load_out_of_range_draws_nothing(table, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_four_pictures_that_show_something(table, tmp_path):
     pictures = draw_maps(table, tmp_path, Push.of_millimetres([0.0, 2.0, 0.0], [20.0, 0.0, -18.0]))
     assert [path.name for path in pictures] == [

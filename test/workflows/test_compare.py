@@ -49,6 +49,7 @@ def compared(with_backlash, tmp_path_factory):
     return "\n".join(lines), values, (folder / "b.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_hidden_backlash_is_the_first_thing_that_is_told(compared):
     _, values, _ = compared
     first = values["models"][0]["depends_on"][0]

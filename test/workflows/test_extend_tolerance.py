@@ -68,6 +68,7 @@ def extended(model, name, path, output):
     return extend_model(model, CatalogueEffect(name), Recordings([path], {}), output, RUN).extension
 
 
+@pytest.mark.slow
 def test_a_soft_bushing_is_added_at_its_size_and_the_error_falls(recorded, tmp_path):
     path, day = recorded
     held_back = calibrate(load_model(SHIPPED), [day])
@@ -84,6 +85,7 @@ def test_a_soft_bushing_is_added_at_its_size_and_the_error_falls(recorded, tmp_p
     assert "load_scale@load_sensor" in {before.effect for before, _ in found.base_moved}
 
 
+@pytest.mark.slow
 def test_what_was_added_stays_when_the_same_recording_is_fitted_again(recorded, tmp_path):
     path, _ = recorded
     soft, more = tmp_path / "soft.yaml", tmp_path / "more.yaml"
@@ -97,6 +99,7 @@ def test_what_was_added_stays_when_the_same_recording_is_fitted_again(recorded, 
         extended(more, SOFT, path, tmp_path / "twice.yaml")
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_was_only_calibrated_may_still_be_added(recorded, tmp_path):
     path, _ = recorded
     mine, soft = tmp_path / "mine.yaml", tmp_path / "soft.yaml"
@@ -125,6 +128,7 @@ def test_what_is_set_up_anew_is_no_finding(recorded, tmp_path, name):
     assert not Path(tmp_path / "none.yaml").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "gap_um"), [("backlash@motor_1", 1.5), ("axis_misalignment@joint_3", 30.0)]
 )

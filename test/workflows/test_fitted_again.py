@@ -86,6 +86,7 @@ def test_another_day_is_new_knowledge(tmp_path, recorded):
     assert farthest[1] < 0.7 * farthest[0]
 
 
+@pytest.mark.slow
 def test_what_stood_in_for_an_effect_gives_way_to_it(tmp_path, recorded):
     day = Recordings([recorded(1)], {})
     once = tmp_path / "once.yaml"

@@ -108,6 +108,7 @@ def performed(model, timeline, path):
     return path
 
 
+@pytest.mark.slow
 def test_what_was_recorded_before_calibrates_but_leaves_open_what_is_asked(files, alone, tmp_path):
     """The plan was to settle it and has been performed, yet the diagnosis asks again."""
     model, first = alone

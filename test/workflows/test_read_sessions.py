@@ -54,6 +54,7 @@ def test_a_replay_and_an_import_of_a_recording_are_no_further_sessions(tmp_path,
     ]
 
 
+@pytest.mark.slow
 def test_a_model_is_known_to_be_fitted_to_a_replay_of_its_recording(tmp_path, table):
     """Else what it found there would count twice: as knowledge, and as data."""
     model = load_model(SHIPPED)

@@ -76,6 +76,7 @@ def test_a_small_change_of_any_law_is_seen(tmp_path, old):
     assert changes[0].changed > 20
 
 
+@pytest.mark.slow
 def test_the_command_says_what_changed_where_and_by_how_much(tmp_path, capsys):
     command = ["replay", str(RECORDING), "--model", str(MODELS["effects"]), "-o"]
     told = ["--parameters", str(PARAMETERS), "--against", str(FOLDER / "effects.mcap")]
