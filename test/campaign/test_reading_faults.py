@@ -179,8 +179,9 @@ def test_swapped_motors_are_refused_and_named(tmp_path, campaign, table):
         ([-1.0, 1.0], "the sign of motor 1 turned"),
         ([1.0, -1.0], "the sign of motor 2 turned"),
         (np.degrees([1.0, 1.0]), "angles taken as degrees"),
+        (np.radians([1.0, 1.0]), "the angles of a table's _deg columns taken as radians"),
     ],
-    ids=["sign of 1", "sign of 2", "degrees"],
+    ids=["sign of 1", "sign of 2", "degrees", "radians"],
 )
 def test_angles_of_a_wrong_sign_or_unit_are_named(tmp_path, campaign, table, factor, change):
     campaign.with_loads().with_poses()

@@ -69,6 +69,28 @@ def test_an_existing_recording_is_replaced_only_on_request(
     assert hidden_in(tmp_path) == []
 
 
+@FORMS
+@pytest.mark.parametrize("keep", [False, True])
+def test_of_two_writers_of_one_recording_the_later_one_is_told(
+    tmp_path, name, keep, timeline, written, mcap_of, hidden_in
+):
+    path, other = tmp_path / name, written(tmp_path / f"other_{name}", timeline(5))
+    first = mcap_of(other).read_bytes()
+
+    def be_overtaken():
+        with RecordingWriter(path, keep_partial=keep) as writer:
+            writer.write("/covariates/a", Float64(1.0), 1)
+            other.rename(path)
+
+    with pytest.raises(RecordingError, match="another program has written it meanwhile"):
+        be_overtaken()
+    assert mcap_of(path).read_bytes() == first
+    # What was live comes only once.
+    kept = [each for each in tmp_path.iterdir() if each != path]
+    assert [len(list(open_recording(each).messages())) for each in kept] == [1] * keep
+    assert hidden_in(tmp_path) == []
+
+
 def test_a_failed_replacement_keeps_the_old_recording(tmp_path, timeline, written, hidden_in):
     path = written(tmp_path / "bag", timeline(5))
 

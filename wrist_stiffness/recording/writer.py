@@ -6,6 +6,7 @@ import os
 import shutil
 from collections import Counter
 from contextlib import suppress
+from errno import EEXIST
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -270,7 +271,10 @@ class RecordingWriter:
         if self._is_folder:
             text = yaml.dump(self._metadata(), Dumper=_PlainDumper, sort_keys=False)
             (self._partial / METADATA_FILE).write_text(text, encoding="utf-8")
-        if self._is_folder and self.path.exists():
+        there = self.path.exists()
+        if there and not self._overwrite:
+            raise FileExistsError(EEXIST, "another program has written it meanwhile")
+        if there and self._is_folder:
             # A folder cannot replace another in one step; the old one steps aside first.
             replaced = self._partial.with_suffix(".replaced")
             self.path.rename(replaced)

@@ -97,6 +97,7 @@ def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
         ("the sign of motor 2 turned", measured, theta * [1.0, -1.0]),
         ("both signs turned", measured, -theta),
         ("angles taken as degrees", measured, np.radians(theta)),
+        ("the angles of a table's _deg columns taken as radians", measured, np.degrees(theta)),
         ("quaternions taken in the order w x y z", w_first.as_matrix(), theta),
         ("the rotations taken from base to platform", np.swapaxes(measured, 1, 2), theta),
     )
