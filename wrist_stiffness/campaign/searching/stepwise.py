@@ -5,8 +5,10 @@ After each the earlier ones must still pay, and at the end each must be the best
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
+from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import WORTH, Candidates, Reached
 from wrist_stiffness.campaign.searching.screening import Fitted
@@ -23,6 +25,10 @@ base took up of one of them shows only then."""
 
 MOST_TRIED = 3
 """So many candidates are fitted with the whole base before a step is given up."""
+
+BROAD = 30
+"""A law of so many constants (cross-talk of a load sensor) takes up a part of all that is missing:
+beside an effect that was found it is not fitted, and only slopes may name it."""
 
 MOST_EXTRAS = 3
 """With each the next fit takes longer; more are hardly told apart in a recording of minutes."""
@@ -54,7 +60,7 @@ def extended(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reache
 def _one_more(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reached | None:
     """Add the effect that gains most with its own law, if it pays."""
     screen = reached.screen()
-    leaders = screen.leaders([each for each in candidates if each.name not in reached.prices])
+    leaders = screen.leaders([e for e in candidates if _may_follow(e, reached.prices)])
     least = reached.least
     chosen = [each for each in leaders if each[0] > max(least, LEADING * leaders[0][0])]
     fits = [screen.fitted(each, shape, value) for value, each, shape in chosen[:MOST_FITTED]]
@@ -71,6 +77,10 @@ def _one_more(fitter: Fitter, reached: Reached, candidates: Candidates) -> Reach
     return None
 
 
+def _may_follow(candidate: WristCandidate, found: Collection[str]) -> bool:
+    return not found or (candidate.name not in found and len(candidate.usual) < BROAD)
+
+
 def _thinned(fitter: Fitter, reached: Reached) -> Reached:
     """Take out effects that do not pay any more beside the newest."""
     for name in list(reached.prices)[:-1]:
@@ -85,7 +95,7 @@ def _contested(fitter: Fitter, reached: Reached, name: str, candidates: Candidat
     """Give the place of one effect to another where that explains more beside all the others."""
     screen = reached.screen(without=name)
     others = reached.prices.keys() - {name}
-    value, best, shape = screen.leaders([e for e in candidates if e.name not in others])[0]
+    value, best, shape = screen.leaders([e for e in candidates if _may_follow(e, others)])[0]
     if best.name == name or value < WORTH:
         return reached
     rival = screen.fitted(best, shape, value)
