@@ -1,5 +1,8 @@
 """A fault far beyond its usual size is fitted at its size, and nothing else takes it up."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,4 +59,15 @@ def test_the_tare_does_not_take_up_what_the_prior_holds_back(extension):
 
 def test_the_size_beyond_the_usual_is_said(extension):
     (far,) = (text for text in extension.warnings if "x its usual size" in text)
-    assert far.count("shift_") > 1
+    assert far.count("_per_h is ") > 1
+
+
+def test_of_many_sizes_beyond_the_usual_the_furthest_are_named(extension):
+    """A law of 35 constants, all off, had a line of 29 sizes."""
+    (one,) = (p for p in extension.own if p.key == "shift_x_um_per_h")
+    many = [replace(one, key=f"a_{n}_um", value=100 * n * one.value) for n in range(1, 9)]
+    told = replace(extension)
+    vars(told)["parameters"] = (*extension.parameters, *many)
+    (far,) = (text for text in told.warnings if "x its usual size" in text)
+    assert re.findall(r"a_\d", far) == ["a_8", "a_7", "a_6"]
+    assert re.search(r"its usual size \(\d+ more are far off\): ", far)

@@ -45,6 +45,9 @@ MOST_WIDENINGS, MOST_WIDENED = 4, 100.0
 SIGNIFICANT = 2.0
 """Uncertainties that tell something from nothing."""
 
+MOST_FAR = 3
+"""So many parameters far beyond their usual size are named, the furthest first."""
+
 
 @dataclass(frozen=True, eq=False)
 class Extension:
@@ -122,6 +125,7 @@ class Extension:
         bounded = [each for each in self.own if each.at_bound and each.value != 0.0]
         untold = [each for each in self.own if not (each.at_bound or each.excited)]
         far = [each for each in self.own if each.far and not each.at_bound]
+        far.sort(key=lambda each: -abs(each.moved))
         if bounded:
             keys = ", ".join(each.key for each in bounded)
             out.append(f"on its bound: {keys}; the data ask for what cannot be")
@@ -129,9 +133,10 @@ class Extension:
             keys = ", ".join(each.key for each in untold)
             out.append(f"not told by these recordings: {keys}; needs {law.excited_by}")
         if far:
-            sizes = ", ".join(f"{each.key} is {abs(each.moved):.1f} x" for each in far)
+            sizes = ", ".join(f"{each.key} is {abs(each.moved):.1f} x" for each in far[:MOST_FAR])
+            more = f" ({len(far) - MOST_FAR} more are far off)" if len(far) > MOST_FAR else ""
             check = law.check.replace("{place}", place)
-            out.append(f"{sizes} its usual size: {check}")
+            out.append(f"{sizes} its usual size{more}: {check}")
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
