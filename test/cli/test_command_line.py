@@ -138,6 +138,21 @@ def test_wrong_use_is_one_line_that_names_it(argv, named, capsys):
     assert named in err
 
 
+@pytest.mark.parametrize(
+    ("argv", "told"),
+    [
+        (["compare", "a.mcap", "--modle", "b.yaml"], "--modle b.yaml; did you mean --model? "),
+        (["table", "show", "--zzz"], "--zzz "),
+    ],
+)
+def test_an_unknown_option_is_told_by_its_own_command(argv, told, capsys):
+    with pytest.raises(SystemExit):
+        main(argv)
+    command = " ".join(argv[:-1] if argv[0] == "table" else argv[:1])
+    expected = f"unrecognized arguments: {told}(see 'wrist-stiffness {command} --help')"
+    assert capsys.readouterr().err == f"wrist-stiffness: error: {expected}\n"
+
+
 @pytest.mark.parametrize("number", ["-3", "-.5", "-1e-6", "-2.5E+3"])
 def test_a_negative_number_is_no_option(number):
     seen = []

@@ -2,7 +2,8 @@
 
 import argparse
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from typing import Any, NoReturn
 
 from wrist_stiffness.errors import InputError
@@ -45,6 +46,18 @@ class OneLineParser(argparse.ArgumentParser):
         super().__init__(*arguments, **options)
         self.register("action", None, _StoreOnce)
         self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Refuse what the command itself does not know: argparse would leave it to the program."""
+        found, left = super().parse_known_args(args, namespace)
+        if left:
+            alike = [get_close_matches(each, self._option_string_actions, 1) for each in left]
+            meant = " or ".join(name for names in alike for name in names)
+            advice = f"; did you mean {meant}?" if meant else ""
+            self.error(f"unrecognized arguments: {' '.join(left)}{advice}")
+        return found, left
 
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one line on stderr."""
