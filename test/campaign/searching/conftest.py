@@ -120,6 +120,7 @@ def effect(name, size=None):
 def candidate(name, **whole):
     return SimpleNamespace(
         name=name,
+        usual=np.ones(1),
         law=effect(name).law,
         place=effect(name).component,
         effect_of=lambda values: effect(name, values.get(PARAMETER.key)),

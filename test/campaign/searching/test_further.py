@@ -2,6 +2,7 @@
 
 import pytest
 
+from wrist_stiffness.campaign.searching.from_afar import SMALL
 from wrist_stiffness.campaign.searching.place import ASTRAY, INEXACT
 from wrist_stiffness.campaign.searching.seeking import Search
 
@@ -66,6 +67,33 @@ def test_play_begins_with_its_usual_size_beside_what_was_found(wrist):
     easy = [n for n, (_, _, walls) in enumerate(wrist.done) if walls == "rounded"]
     assert [wrist.sizes[n] for n in easy] == [{BACKLASH: None, FRICTION: None, PLAY: 1.0}]
     assert [wrist.done[n][1] for n in easy] == [fit]
+
+
+@pytest.mark.parametrize(("from_usual", "sizes"), [(7000, [1.0, SMALL]), (4500, [1.0])])
+def test_play_that_ended_higher_than_without_it_begins_once_more_from_little(
+    wrist, from_usual, sizes
+):
+    wrist.left = wrist.leaves(alone=9000, b=5000, bp=4000)
+    wrist.rounded = wrist.leaves(bp=from_usual)
+    search = Search(wrist, ())
+    wrist.done.clear(), wrist.sizes.clear()
+    assert search.further([BACKLASH], {})
+    easy = [n for n, (_, _, walls) in enumerate(wrist.done) if walls == "rounded"]
+    assert [wrist.sizes[n][PLAY] for n in easy] == sizes
+
+
+def test_what_was_named_stands_where_the_search_was_lowest_with_it(wrist):
+    """Without what came after it, and was not named, a fit ended in a higher minimum."""
+    wrist.left = wrist.leaves(alone=9000, b=2000, d=8000, bd=300, bp=250)
+    lowest = wrist.left[frozenset({BACKLASH})]
+    after = []
+    wrist.led = lambda names, start: (
+        4 * lowest if after and names == {BACKLASH} and start is not None else None
+    )
+    search = Search(wrist, ())
+    assert search.found == {BACKLASH, DELAY}
+    after.append(True)
+    assert search._named([BACKLASH], {}).base.cost == lowest
 
 
 def test_what_rounded_walls_promise_and_the_law_does_not_keep_is_no_answer(wrist):

@@ -46,6 +46,15 @@ def whole(monkeypatch):
     return SimpleNamespace(costs=costs, done=done)
 
 
+def test_a_law_of_very_many_constants_follows_nothing():
+    """It takes up a part of all that is missing."""
+    few, many = (SimpleNamespace(name=name, usual=[1.0] * n) for name, n in (("a", 21), ("b", 35)))
+    assert stepwise._may_follow(many, {})
+    assert stepwise._may_follow(few, {"c": PRICE})
+    assert not stepwise._may_follow(many, {"c": PRICE})
+    assert not stepwise._may_follow(few, {"a": PRICE})
+
+
 def test_leaders_whose_laws_keep_nothing_end_the_search(whole):
     reached = promising(play=-3.0, cable=WORTH - 1.0)
     assert stepwise._one_more(None, reached, ()) is None

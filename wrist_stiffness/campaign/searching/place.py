@@ -67,11 +67,14 @@ class Reached:
         What the freedom of each of them costs, by its name.
     first : float
         Sum of squares that the base alone left.
+    steps : tuple of BaseFit
+        Fits on the way, before each effect that was added.
     """
 
     base: BaseFit
     prices: Mapping[str, float]
     first: float
+    steps: tuple[BaseFit, ...] = ()
 
     @property
     def least(self) -> float:

@@ -259,7 +259,10 @@ class Search:
             return None
         for name in [each for each in begun.prices if each not in names]:
             begun = without_one(self._fitter, begun, name)
-        return begun
+        # The search may have been lower with the same effects than where a further one led it.
+        passed = [each for each in begun.steps if set(each.extras) == begun.prices.keys()]
+        base = min([begun.base, *passed], key=lambda each: each.cost)
+        return replace(begun, base=base)
 
     def _trials(self, begun: Reached, tried: Sequence[WristCandidate]) -> dict[str, Reached]:
         """Fit candidates one by one, with the whole base and what it has."""

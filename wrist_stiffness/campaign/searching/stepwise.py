@@ -128,7 +128,12 @@ def with_one_more(
     extras = [reached.effects[name] for name in prices] + [added.effect]
     sessions = reached.base.problem.sessions
     base = fitter(sessions, extras, reached.base)
-    found = replace(reached, base=base, prices={**prices, added.candidate.name: added.price})
+    found = replace(
+        reached,
+        base=base,
+        prices={**prices, added.candidate.name: added.price},
+        steps=(*reached.steps, reached.base),
+    )
     if found.rough:
         afresh = replace(found, base=fitter(sessions, extras))
         found = min(found, afresh, key=lambda each: each.total)
