@@ -13,6 +13,8 @@ from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.workflows.fit_report import plus_minus
 from wrist_stiffness.workflows.simulate import simulate_recording
 
+LOAD = ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")
+
 
 def recorded(folder, session, seconds, **settings):
     """Write a session of the virtual wrist on a day of its own."""
@@ -67,22 +69,37 @@ def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, ca
 
 
 @pytest.mark.slow
-def test_what_is_left_asks_for_wrong_signs_and_units(tmp_path, capsys):
-    """Positions in metres where millimetres belong: no effect is missing, and none would help."""
-    day, table, wrong = recorded(tmp_path, 0, 60.0), tmp_path / "day.csv", tmp_path / "wrong.csv"
+@pytest.mark.parametrize(
+    ("columns", "factor", "base", "words"),
+    [
+        (("x_mm", "y_mm", "z_mm"), 1e-3, "exact", "with positions times 1000 the error falls"),
+        (LOAD, -1.0, "wrong", "with the load's sign turned the error falls"),
+    ],
+    ids=["metres", "sign"],
+)
+def test_what_is_left_asks_for_wrong_signs_and_units(
+    tmp_path, capsys, columns, factor, base, words
+):
+    """No effect is missing, and none would help.
+
+    A load of the wrong sign hides behind axes that are off their drawing, and once these are
+    fitted behind parts that the same fit made as stiff as they can be.
+    """
+    day = recorded(tmp_path, 0, 90.0, base=base)
+    table, wrong = tmp_path / "day.csv", tmp_path / "wrong.csv"
     assert main(["export", str(day), "-o", str(table)]) == 0
     with table.open() as rows, wrong.open("w") as out:
         reader = csv.DictReader(rows)
         writer = csv.DictWriter(out, reader.fieldnames)
         writer.writeheader()
         for row in reader:
-            writer.writerow(row | {key: float(row[key]) / 1e3 for key in ("x_mm", "y_mm", "z_mm")})
+            writer.writerow(row | {key: factor * float(row[key]) for key in columns})
     assert main(["import", str(wrong), "-o", str(tmp_path / "wrong")]) == 0
     output, told = tmp_path / "mine.yaml", tmp_path / "mine.json"
     fit = ["--fit", str(tmp_path / "wrong"), "-o", str(output), "--json", str(told)]
     assert main(["calibrate", *fit]) == 0
     mistake = json.loads(told.read_text())["set_up_mistake"]
-    assert "with positions times 1000 the error falls" in mistake
+    assert words in mistake
     text = capsys.readouterr().out
     assert mistake in text
     assert text.index("an effect is missing") < text.index(mistake)

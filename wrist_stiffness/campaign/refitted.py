@@ -31,6 +31,9 @@ A gap is free here by the prior of its law, tens of micrometres: a calibration d
 wrist stands there.  A diagnosis, and the fit of what it names, hold it to what shims leave
 (`fitting.free_effects`), because a flange that stands otherwise is a fault to be named."""
 
+ANSWERS_LOAD = frozenset({"link_stiffness", "bushing_stiffness", "load_scale"})
+"""Those of the tolerances that say how much a load does."""
+
 TOLERATED = frozenset(law for law, _ in BUILT)
 """Laws of the wrist's tolerances: what they do within their priors is no finding."""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.refitted import AXES, BUILT, GAPS, SET_UP, TOLERATED
+from wrist_stiffness.campaign.refitted import ANSWERS_LOAD, AXES, BUILT, GAPS, SET_UP, TOLERATED
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
@@ -151,3 +151,14 @@ def unfitted(model: ErrorModel) -> ErrorModel:
             or all(estimate.sigma == 0.0 for estimate in effect.estimates.values())
         )
     )
+
+
+def answering_as(model: ErrorModel, fitted: ErrorModel) -> ErrorModel:
+    """Return a fitted model that answers a load as the model before the fit did.
+
+    Under a load of the wrong sign or unit a fit makes every part so stiff that no load does
+    anything; then none that is put right would do anything either.
+    """
+    kept = [effect for effect in fitted.effects if effect.law.id not in ANSWERS_LOAD]
+    own = [effect for effect in model.effects if effect.law.id in ANSWERS_LOAD]
+    return fitted.with_effects(*kept, *own)
