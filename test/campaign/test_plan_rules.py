@@ -10,7 +10,7 @@ from wrist_stiffness.campaign.planning.information import MeasurementNoise
 from wrist_stiffness.campaign.planning.loads_file import Actuator, Weight
 from wrist_stiffness.campaign.planning.plan import Conditions, plan
 from wrist_stiffness.campaign.planning.question import between, effect_named
-from wrist_stiffness.campaign.planning.timeline import PEAK, Pace
+from wrist_stiffness.campaign.planning.timeline import PEAK, Pace, Visit, run_through
 from wrist_stiffness.errors import InputError, LoadRangeError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.backlash import Backlash
@@ -253,3 +253,13 @@ def test_nothing_to_separate_is_refused():
     lonely = effect_named("backlash@motor_1").with_values({"width_mdeg": 10.0})
     with pytest.raises(InputError, match="leaves nothing to separate"):
         between([[lonely]], [], generator())
+
+
+@pytest.mark.parametrize("speed_deg_per_s", [30.0, 200.0, 3000.0])
+def test_time_rises_however_fast_the_motors_are(model, speed_deg_per_s):
+    """What is sampled just before an observed moment lies after the one observed before it."""
+    pace = Pace(np.radians(speed_deg_per_s), 2.0, True)
+    visit = Visit(np.array([0.3, -0.2]), np.array([1.0, 1.0]))
+    timeline = run_through([visit], model.table.workspace, pace, np.zeros(2))
+    assert np.all(np.diff(timeline.block.time) >= 0.0)
+    assert timeline.moving.sum() == 3

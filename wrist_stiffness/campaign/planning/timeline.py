@@ -31,6 +31,9 @@ SEEN_IN_MOVES = (0.25, 0.5, 0.75)
 BEFORE_S = 0.01
 """A sample so long before shows the laws the acceleration [s]."""
 
+BEFORE_SHARE = 0.1
+"""Of a fast move's time that is the longest: it lies between two that are observed."""
+
 LONG_HOLD = (0.03, 0.1, 0.3, 1.0)
 """Parts of a hold of `LONG_S` or more at which it counts as measured."""
 
@@ -288,9 +291,10 @@ class _Clock:
             return
         start, way, begin = self._theta, target - self._theta, self._time_s
         seen = number is not None and self._pace.in_motion
+        before = min(BEFORE_S / duration, BEFORE_SHARE)
         for part in SEEN_IN_MOVES if seen else (0.5,):
-            for back in (BEFORE_S / duration, 0.0) if seen else (0.0,):
-                u = max(part - back, 0.0)
+            for back in (before, 0.0) if seen else (0.0,):
+                u = part - back
                 self._time_s = begin + u * duration
                 blend = u**3 * (10.0 + u * (6.0 * u - 15.0))
                 rate = 30.0 * u**2 * (1.0 - u) ** 2 / duration
