@@ -224,6 +224,13 @@ def test_bad_model_files_give_one_line(tmp_path, old, new, text):
         ("def (", "cannot be run"),
         (OWN.replace('    check = "look"\n', ""), "Twist does not define check"),
         (OWN.replace('id = "twist"', 'id = "twist@z"'), "effect 'twist@z': a name has letters"),
+        ("raise SystemExit(3)", "cannot be run: it ends the program"),
+        (
+            OWN.replace('stage = "geometry"', 'stage = "geometri"'),
+            "stage 'geometri' of Twist is not",
+        ),
+        (OWN.replace("return (Parameter(", "return (Parametre("), "NameError: name 'Parametre'"),
+        (OWN.replace("10.0, 1.0)", "10.0, 0.0)"), "turn_mdeg: scale = 0.0 is not above 0"),
     ],
 )
 def test_bad_law_files_give_one_line(tmp_path, own, text):
@@ -234,7 +241,10 @@ def test_bad_law_files_give_one_line(tmp_path, own, text):
 @pytest.mark.parametrize(
     ("body", "text"),
     [
-        ("return 1 / 0, None", "twist@platform: ZeroDivisionError: division by zero"),
+        (
+            "return 1 / 0, None",
+            "twist@platform: ZeroDivisionError: division by zero \\(own.py, line",
+        ),
         ("return Contribution(wrench=np.zeros((2, 6))), None", r"wrench has shape \(2, 6\)"),
         ("return Contribution(both=np.full((1, 6), np.nan)), None", "both is not finite"),
         ("return None, None", "twist@platform: AttributeError"),

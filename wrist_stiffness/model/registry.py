@@ -10,7 +10,7 @@ from pkgutil import iter_modules
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model import effects
-from wrist_stiffness.model.law import Law, require_id
+from wrist_stiffness.model.law import STAGES, Law, require_id
 
 ENTRY_POINTS = "wrist_stiffness.effects"
 """Group in which another package offers its own `Law` classes."""
@@ -86,7 +86,25 @@ def law_of(found: object, place: str) -> Law:
         raise InputError(f"{place}: {found.__name__} does not define {missing}")
     law = found()
     require_id(law.id)
+    if law.stage not in STAGES:
+        raise InputError(
+            f"{place}: stage {law.stage!r} of {found.__name__} is not one of {', '.join(STAGES)}"
+        )
+    _require_parameters(law, place)
     return law
+
+
+def _require_parameters(law: Law, place: str) -> None:
+    """Refuse parameters that no fit can begin with."""
+    for component in law.places:
+        try:
+            scales = {each.key: each.scale for each in law.parameters(component)}
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            raise InputError(f"{place}: parameters({component!r}): {said}") from error
+        for key, scale in scales.items():
+            if not scale > 0.0:
+                raise InputError(f"{place}: {key}: scale = {scale} is not above 0")
 
 
 def law_from_file(reference: str, folder: Path) -> Law:
@@ -119,8 +137,9 @@ def law_from_file(reference: str, folder: Path) -> Law:
     module = util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise InputError(f"{reference}: cannot be run: {error}") from error
+    except (Exception, SystemExit) as error:
+        told = "it ends the program" if isinstance(error, SystemExit) else error
+        raise InputError(f"{reference}: cannot be run: {told}") from error
     if not hasattr(module, name):
         raise InputError(f"{reference}: {path.name} has no class {name}")
     law = law_of(getattr(module, name), reference)

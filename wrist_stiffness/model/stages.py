@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from traceback import extract_tb
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -335,8 +337,15 @@ def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contributio
     except WristError as error:
         raise InputError(f"{effect.name}: {error}") from error
     except Exception as error:
-        raise InputError(f"{effect.name}: {type(error).__name__}: {error}") from error
+        told = f"{effect.name}: {type(error).__name__}: {error}"
+        raise InputError(told + _line_in(effect.law.file, error)) from error
     return added, state
+
+
+def _line_in(file: Path | None, error: Exception) -> str:
+    """Return which line of a user's own file an error came through last, empty for none."""
+    lines = [at.lineno for at in extract_tb(error.__traceback__) if Path(at.filename) == file]
+    return f" ({file.name}, line {lines[-1]})" if file is not None and lines else ""
 
 
 def _first_order(effect: Effect, added: Contribution) -> tuple[str, ...]:
