@@ -8,7 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.formula import DEEPEST, FUNCTIONS, LONGEST, Formula
+from wrist_stiffness.model.block import Load
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula import (
+    DEEPEST,
+    FUNCTIONS,
+    LONGEST,
+    Formula,
+    UndefinedFormulaError,
+)
+from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
 
 NAMES = ("fx", "theta_1", "k")
 
@@ -96,6 +107,14 @@ def test_endless_formulas_are_refused():
 def test_the_term_that_is_undefined_is_named_with_its_signals(text, words):
     values = {"fx": -0.5, "theta_1": 0.25, "k": 0.5}
     assert Formula(text, NAMES).undefined(values).startswith(words)
+
+
+def test_parameters_of_an_undefined_term_are_told_in_their_units():
+    law = FormulaLaw("own", "frame", np.eye(6)[2], "gap_um / (fz - fz)", (), ("gap_um",))
+    effect = Effect(law, "frame").with_values({"gap_um": 2.0})
+    model = load_model(shipped_file("config/palmieri2015_model.yaml")).with_effects(effect)
+    with pytest.raises(UndefinedFormulaError, match=r"fz = -?\S+, gap_um = 2(,|$)"):
+        model.predict(np.zeros(2), Load(np.array([0, 0, -1.0, 0, 0, 0])))
 
 
 def test_undefined_values_are_not_finite_and_not_loud():

@@ -6,12 +6,15 @@ import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
+
+NO_UNITS: Mapping[str, float] = MappingProxyType({})
 
 
 class UndefinedFormulaError(InputError):
@@ -137,13 +140,15 @@ class Formula:
         with np.errstate(all="ignore"):
             return np.asarray(_value(self._tree, values), dtype=float)
 
-    def undefined(self, values: Mapping[str, float]) -> str:
+    def undefined(self, values: Mapping[str, float], per_si: Mapping[str, float] = NO_UNITS) -> str:
         """Return the term that makes the formula undefined for one sample, and its variables.
 
         Parameters
         ----------
         values : dict of str to float
             At least the `names`.
+        per_si : dict of str to float, optional
+            By what those are told larger whose name ends in a unit.
 
         Returns
         -------
@@ -163,7 +168,11 @@ class Formula:
         used = sorted({node.id for node in ast.walk(term) if isinstance(node, ast.Name)})
         # Stamps count from 1970: six digits of them say nothing.
         digits = {"time": ".3f"}
-        told = [f"{n} = {values[n]:{digits.get(n, '.6g')}}" for n in used if n in values]
+        told = [
+            f"{n} = {values[n] * per_si.get(n, 1.0):{digits.get(n, '.6g')}}"
+            for n in used
+            if n in values
+        ]
         text = ast.get_source_segment(self.text, term) or self.text
         return f"{text} has no finite value" + (f" for {', '.join(told)}" if told else "")
 

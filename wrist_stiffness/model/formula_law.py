@@ -11,7 +11,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula import FUNCTIONS, Formula, UndefinedFormulaError
 from wrist_stiffness.model.law import Contribution, Law, require_id
-from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.parameters import Parameter, si_factor
 from wrist_stiffness.model.places import LIMB
 from wrist_stiffness.model.situation import Situation
 
@@ -116,7 +116,8 @@ class FormulaLaw(Law):
             there = {
                 name: float(np.broadcast_to(v, len(size))[row]) for name, v in variables.items()
             }
-            told = f"{self.id}: {self.formula.undefined(there)}"
+            per_si = {key: 1.0 / si_factor(key) for key in self._keys}
+            told = f"{self.id}: {self.formula.undefined(there, per_si)}"
             raise UndefinedFormulaError(told, float(at.block.time[row]))
         return at.screw(place, np.outer(size, self.direction)), None
 
