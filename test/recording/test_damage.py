@@ -195,7 +195,7 @@ METADATA = "rosbag2_bagfile_information: {{storage_identifier: {}, relative_file
         ),
         ({"a.mcap": ""}, "is empty"),
         ({"a.mcap": "\x89MCAP"}, "does not begin as an MCAP file"),
-        ({"a.mcap": "time,angle\n0,1\n"}, "does not begin as an MCAP file"),
+        ({"a.mcap": "time,angle\n0,1\n"}, "does not begin as an MCAP file$"),
     ],
 )
 def test_what_is_no_recording_is_one_clear_error(tmp_path, files, message):
@@ -207,3 +207,10 @@ def test_what_is_no_recording_is_one_clear_error(tmp_path, files, message):
     with pytest.raises(RecordingError, match=message) as caught:
         open_recording(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_table_given_as_a_recording_is_told_how_it_becomes_one(tmp_path):
+    table = tmp_path / "cmm.csv"
+    table.write_text("time_s,motor_1_deg\n0,1\n")
+    with pytest.raises(RecordingError, match="'wrist-stiffness import' makes one of a table"):
+        open_recording(table)

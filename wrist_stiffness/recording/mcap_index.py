@@ -119,7 +119,11 @@ class _Walk:
         if size == 0:
             raise RecordingError(f"{self.path} is empty: no recording")
         if self.stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise RecordingError(f"{self.path} is no recording: it does not begin as an MCAP file")
+            hint = "; 'wrist-stiffness import' makes one of a table"
+            raise RecordingError(
+                f"{self.path} is no recording: it does not begin as an MCAP file"
+                + (hint if self.path.suffix.lower() == ".csv" else "")
+            )
         damage = self._walk(size)
         if damage and self.chunk_spans:
             # The cut may have taken a part of the last chunk's index.
