@@ -287,6 +287,14 @@ def test_lost_motion_shows_in_repeats_from_any_side_only():
     assert repeatability(by_side(observations))["s_um"] == pytest.approx(2 * np.sqrt(3), rel=0.15)
 
 
+def test_one_gauge_repeats_as_well_as_that_gauge():
+    """Axes that it does not see have no scatter of their own, least of all a metre."""
+    everything = repeated(np.random.default_rng(11), 0.0)
+    gauge = everything.with_values(everything.values * [np.nan, np.nan, 1, np.nan, np.nan, np.nan])
+    assert list(repeatability(gauge)) == ["s_um"]
+    assert repeatability(gauge)["s_um"] < repeatability(everything)["s_um"]
+
+
 def test_uncertainty_of_an_error_is_its_scatter_over_repetitions():
     draws = [sizes(table(rng))["s_um"] for rng in np.random.default_rng(12).spawn(60)]
     scatter = np.std([each.rms for each in draws], ddof=1)
