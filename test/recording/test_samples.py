@@ -210,7 +210,7 @@ def test_payloads_that_cannot_be_decoded_are_a_fault(tmp_path):
         (
             ("/joint_states", 1, joint_state(1, (1.0,), ("elbow",))),
             {},
-            "/joint_states never names motor_1_joint and motor_2_joint together",
+            "motor_1_joint and motor_2_joint together; its first message names elbow: say --joint",
         ),
         (
             ("/load_estimate", 1, Float64(1.0)),

@@ -177,6 +177,7 @@ def read_samples(
         if collector and collector.counts and not rows:
             raise RecordingError(
                 f"{recording.path}: {collector.topic} never names {' and '.join(joints)} together"
+                f"{_first_names(recording, collector.topic)}"
             )
         return _made(JointSamples, rows, position=(2,), velocity=(2,), effort=(2,))
 
@@ -207,6 +208,15 @@ def read_samples(
         notes=tuple(of(names.RECORDING_NOTES).get("text", np.empty(0, np.str_)).tolist()),
         faults=tuple(fault for name in sorted(collectors) for fault in collectors[name].faults()),
     )
+
+
+def _first_names(recording: Recording, topic: str) -> str:
+    """Return which joints the first message of a topic names, for whoever has other names."""
+    for _, _, message in recording.messages([topic]):
+        if isinstance(message, JointState):
+            named = ", ".join(message.name) or "none"
+            return f"; its first message names {named}: say --joint twice, motor 1 first"
+    return ""
 
 
 _Kind = TypeVar("_Kind")
