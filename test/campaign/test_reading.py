@@ -184,6 +184,28 @@ def test_temperatures_and_covariates_are_held(tmp_path, campaign, complete, tabl
     assert any("not finite" in remark for remark in session.remarks)
 
 
+def test_a_thermometer_of_no_place_is_told(campaign, complete, table, tmp_path):
+    complete.with_temperature("link1", campaign.joint_ns[0], 20.0)
+    (remark,) = read_session(complete.written(tmp_path / "bag"), table).remarks
+    assert "temperatures of 'link1': the wrist has no such place; known are link_1" in remark
+
+
+@pytest.mark.parametrize(("reading", "said"), [(293.15, True), (80.0, False)])
+def test_kelvin_in_the_place_of_degrees_is_asked_for(
+    tmp_path, campaign, complete, table, reading, said
+):
+    complete.with_temperature("motor_1", campaign.joint_ns[0], reading)
+    session = read_session(complete.written(tmp_path / "bag"), table)
+    asked = "temperatures of motor_1 go up to 293.1 degC: are they in K?"
+    assert session.remarks == ((asked,) if said else ())
+
+
+def test_where_the_frame_of_a_tracker_can_be_told_is_said(tmp_path, campaign, table):
+    campaign.with_joints().with_loads("ft").with_poses()
+    with pytest.raises(FrameError, match="--parameters FILE can tell where"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
 def covariance_message(header, pose, variance):
     return PoseWithCovarianceStamped(
         header, PoseWithCovariance(pose, tuple(np.diag(variance).ravel().tolist()))

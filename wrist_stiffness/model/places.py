@@ -22,5 +22,8 @@ and moves no slide."""
 BODY = {**CARRIER, "motor_1": "frame", "motor_2": "frame", "frame": "frame", "platform": "platform"}
 """The body in which a place is at home and with which its directions turn."""
 
+THERMOMETERS = (*BODY, "ambient")
+"""Of what a temperature may be said."""
+
 MOTOR_JOINT = {"motor_1": "joint_1", "motor_2": "joint_5"}
 """The joint that carries what a motor carries."""

@@ -17,7 +17,7 @@ from wrist_stiffness.model.block import Load, Sample
 from wrist_stiffness.model.budget import Budget, budget
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.places import BODY
+from wrist_stiffness.model.places import THERMOMETERS
 
 QUATERNION_TOLERANCE = 1e-3
 """A typed quaternion is made unit if its length is this close to 1."""
@@ -27,8 +27,6 @@ FARTHEST_MM = 100.0
 
 WITHIN = 2.0
 """A rest up to so many standard uncertainties of the prediction is explained."""
-
-TEMPERATURES = (*BODY, "ambient")
 
 UM, MDEG = 1e6, 180e3 / np.pi
 
@@ -151,9 +149,9 @@ def explain(
         If the model cannot be read, or a value is out of range.
     """
     for name in temperatures or {}:
-        if name not in TEMPERATURES:
+        if name not in THERMOMETERS:
             raise InputError(
-                f"temperature of {name!r}: no such place; known are {', '.join(TEMPERATURES)}"
+                f"temperature of {name!r}: no such place; known are {', '.join(THERMOMETERS)}"
             )
     error_model = load_model(model)
     sample = Sample(

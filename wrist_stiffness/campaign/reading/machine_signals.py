@@ -17,6 +17,7 @@ from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.places import THERMOMETERS
 from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSamples, WrenchSamples
 
 JOINT_GAP_S = 0.5
@@ -36,6 +37,9 @@ STILL_RAD = float(np.radians(0.05))
 SPEED_WINDOW_S = 0.025
 """Half the time over which a speed is taken from dense angles [s]: short against a move, and long
 enough that one encoder count in it is a slow speed."""
+
+HOT_DEGC = 150.0
+"""No bushing lives to be hotter, and whoever sends kelvin is far above it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,14 +174,15 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
             raise InputError(nothing)
     told = _told_speeds(samples.joints, read)
     fault = "" if told is None else fault_of(told, angles)
+    temperatures = _slow(samples.temperatures)
     return MachineSignals(
         angles,
         _speeds(angles) if told is None or fault else told,
         loads,
         on_platform,
-        _slow(samples.temperatures),
+        temperatures,
         _slow(samples.covariates),
-        (*_said(wild, len(read), held_s), *filter(None, [fault])),
+        (*_said(wild, len(read), held_s), *filter(None, [fault]), *_doubted(temperatures)),
     )
 
 
@@ -191,6 +196,23 @@ def _said(wild: int, states: int, held_s: float) -> tuple[str, ...]:
         )
     if wild:
         remarks.append(f"{wild} of {states} joint states are wild: left out")
+    return tuple(remarks)
+
+
+def _doubted(temperatures: Mapping[str, Signal]) -> tuple[str, ...]:
+    """Return what is odd about temperatures: whose they are, and their unit."""
+    remarks = []
+    if foreign := [name for name in temperatures if name not in THERMOMETERS]:
+        remarks.append(
+            f"temperatures of {', '.join(map(repr, foreign))}: the wrist has no such place; known "
+            f"are {', '.join(THERMOMETERS)}"
+        )
+    highest = {name: float(signal.values.max()) for name, signal in temperatures.items()}
+    if hot := [name for name, value in highest.items() if value > HOT_DEGC]:
+        remarks.append(
+            f"temperatures of {', '.join(hot)} go up to {max(highest.values()):.4g} degC: are they "
+            "in K?"
+        )
     return tuple(remarks)
 
 

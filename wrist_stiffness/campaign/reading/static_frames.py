@@ -46,12 +46,13 @@ class KnownFrames:
     @property
     def hints(self) -> tuple[str, ...]:
         """What may be the reason where a frame is not known."""
+        told = (*self.remarks, "--parameters FILE can tell where a sensor's frame stands")
         if not self.elsewhere:
-            return self.remarks
+            return told
         names = ", ".join(self.elsewhere[:MOST_NAMED])
         more = ", ..." if len(self.elsewhere) > MOST_NAMED else ""
         return (
-            *self.remarks,
+            *told,
             f"{TF_STATIC} ties these to one another but not to {BASE_FRAME} or {PLATFORM_FRAME}: "
             f"{names}{more}",
         )
