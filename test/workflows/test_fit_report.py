@@ -15,7 +15,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.fit_report import told_lines, tolerances, untold_lines
+from wrist_stiffness.workflows.fit_report import told_lines, tolerances, untold_lines, used_lines
 
 
 def test_what_is_not_told_stands_under_what_to_record():
@@ -47,3 +47,16 @@ def test_what_is_not_told_stands_under_what_to_record():
     shimmed = replace(found.parameters[-1], value=-36.0, prior=-35.0, usual=10.0)
     assert tolerances(shimmed) == "0.1 x its usual size from -35"
     assert tolerances(replace(shimmed, prior=0.0)) == "3.6 x its usual size"
+
+
+def test_rests_that_nothing_measured_are_not_counted():
+    """They tell the way between two poses, and motion is what is left of the units."""
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    block = Block(2.0 * np.arange(30), np.linspace([-0.5, 0.3], [0.5, -0.2], 30), np.zeros((30, 6)))
+    rotation = np.array(model.table.mechanism.forward(block.theta).platform)
+    shift = np.zeros((30, 3))
+    shift[1::2], rotation[1::2] = np.nan, np.nan
+    session = MeasuredSession("s", block, shift, rotation, np.diag(np.repeat([1e-6, 1e-5], 3) ** 2))
+    free = (free_all(Effect(find_law("encoder_offset"), "motor_1")),)
+    found = fit(FitProblem(model, (as_units(model, session),), free))
+    assert used_lines([session], found)[0].startswith("s: 15 rests and 0 half seconds in motion")

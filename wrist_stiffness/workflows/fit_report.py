@@ -79,7 +79,7 @@ class Errors:
 def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
     """Tell what the fit saw, and what of the recordings could not be used."""
     table = found.problem.table
-    dwells = sum(int(each.cut.dwell.sum()) for each in found.problem.sessions)
+    dwells = sum(int((each.cut.dwell & each.measured).sum()) for each in found.problem.sessions)
     lost = found.lost + sum(each.lost for each in found.problem.sessions)
     lines = [
         f"{', '.join(session.name for session in sessions)}: {dwells} rests and "
