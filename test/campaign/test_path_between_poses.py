@@ -6,6 +6,8 @@ from wrist_stiffness.campaign.observing import observe
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.export_csv import export_csv
+from wrist_stiffness.workflows.import_csv import import_csv
 
 
 def test_each_pose_measured_at_rest_is_a_unit_and_knows_its_approach(tmp_path, campaign, table):
@@ -35,3 +37,12 @@ def test_each_pose_measured_at_rest_is_a_unit_and_knows_its_approach(tmp_path, c
     observed = observe(model, [read_session(path, table)]).observations
     assert len(observed.values) == 8
     np.testing.assert_array_equal(observed.covariates["approach_1"], [1, -1] * 4)
+
+    # The table of the measured poses says so as well: it is what people edit and import again.
+    exported = export_csv(path, tmp_path / "poses.csv", table)
+    assert (exported.rows, exported.turns > 0) == (8, True)
+    import_csv(tmp_path / "poses.csv", tmp_path / "again")
+    again = observe(model, [read_session(tmp_path / "again", table)]).observations
+    np.testing.assert_array_equal(again.covariates["approach_1"], [1, -1] * 4)
+    export_csv(tmp_path / "again", tmp_path / "twice.csv", table)
+    assert (tmp_path / "twice.csv").read_bytes() == (tmp_path / "poses.csv").read_bytes()

@@ -11,7 +11,8 @@ DESCRIPTION = """\
 Write the measured poses of a recording as a table, one row each, with the motor angles, the load at
 O in wrist_base, the temperatures and the covariates that belong to it. 'wrist-stiffness import
 --help' explains the columns. The numbers are those of the recording: importing the table gives them
-again to the bit. No outlier is left out and no clock is put right."""
+again to the bit. No outlier is left out and no clock is put right. Where poses are far apart, rows
+without a measured value tell the way between them, which friction and backlash remember."""
 
 EPILOG = """\
 example, a recording with other names and a load sensor with a frame of its own:
@@ -30,9 +31,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     parser.add_argument("recording", help="rosbag2 folder with MCAP storage, or a .mcap file")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv", help="the table")
-    parser.add_argument(
-        "--table", help="lookup table of the wrist; only loads that turn with the platform need it"
-    )
+    parser.add_argument("--table", help="lookup table of the wrist (default: the shipped one)")
     add_recording_options(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace an existing table")
     parser.add_argument("--json", metavar="FILE", help="write the summary here as well")
@@ -56,12 +55,18 @@ def _run(arguments: argparse.Namespace) -> int:
         overwrite=arguments.overwrite,
         progress=Progress("rows"),
     )
-    print(f"{exported.path}: {exported.rows} measured poses")
+    turns = f", {exported.turns} rows of the way between them" if exported.turns else ""
+    print(f"{exported.path}: {exported.rows} measured poses{turns}")
     for remark in exported.remarks:
         print(f"  {remark}")
     if arguments.json:
         write_json(
             arguments.json,
-            {"table": str(exported.path), "rows": exported.rows, "remarks": exported.remarks},
+            {
+                "table": str(exported.path),
+                "rows": exported.rows,
+                "turns": exported.turns,
+                "remarks": exported.remarks,
+            },
         )
     return EXIT_DONE

@@ -31,7 +31,7 @@ from wrist_stiffness.campaign.reading.pose_track import (
     measured_components,
 )
 from wrist_stiffness.campaign.reading.refusals import require_topics
-from wrist_stiffness.campaign.reading.session import notes_of
+from wrist_stiffness.campaign.reading.session import notes_of, path_stamps
 from wrist_stiffness.campaign.reading.signals import Stamps
 from wrist_stiffness.campaign.reading.static_frames import frames_of
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
@@ -61,12 +61,15 @@ class Exported:
         The table.
     rows : int
         Measured poses in it.
+    turns : int
+        Rows without a measured value: where the wrist or its load turned back between poses.
     remarks : tuple of str
         What was left out of it.
     """
 
     path: Path
     rows: int
+    turns: int
     remarks: tuple[str, ...]
 
 
@@ -83,7 +86,8 @@ def export_csv(
     """Write the measured poses of a recording with the signals that belong to them as a table.
 
     The numbers are those of the recording, in shortest form: importing the table gives them again
-    to the bit.  Nothing is taken for an outlier and no clock is put right.
+    to the bit.  Nothing is taken for an outlier and no clock is put right.  Where poses are far
+    apart, rows without a measured value tell the way that friction and play remember.
 
     Parameters
     ----------
@@ -92,7 +96,8 @@ def export_csv(
     output : path
         CSV file.
     table : Table
-        Of the wrist: turns loads that are measured on the platform into F.
+        Of the wrist: turns loads that are measured on the platform into F, and knows how small a
+        swing of a motor is the chatter of a count.
     remaps : mapping, optional
         Actual by standard topic name.
     settings : StreamSettings, optional
@@ -132,7 +137,11 @@ def export_csv(
     remarks = (*known.remarks, *unknown)
     if not usable.any():
         raise InputError(f"{source.path}: no measured pose can be used: {'; '.join(remarks)}")
-    time_ns, measured = time_ns[usable], measured[usable]
+    pose_ns = time_ns[usable]
+    way_ns = path_stamps(machine, pose_ns, table, settings.load_age_limit_s)
+    time_ns = np.union1d(pose_ns, way_ns)
+    seen = np.full((len(time_ns), measured.shape[1]), np.nan)
+    seen[np.searchsorted(time_ns, pose_ns)] = measured[usable]
     block = machine.at(time_ns)
     load = block.load
     if block.load_on_platform:
@@ -147,7 +156,7 @@ def export_csv(
     values = {
         **dict(zip(MOTORS, block.theta.T, strict=True)),
         **dict(zip(LOAD, load.T, strict=True)),
-        **dict(zip(names or marker_columns(markers), measured.T, strict=True)),
+        **dict(zip(names or marker_columns(markers), seen.T, strict=True)),
         **{columns.temperatures[name]: value for name, value in block.temperatures.items()},
         **{columns.covariates[name]: value for name, value in block.covariates.items()},
     }
@@ -159,7 +168,7 @@ def export_csv(
         remarks = (f"the recording is damaged: {source.damage}", *remarks)
     if len(samples.frame_poses.time_ns):
         remarks = (*remarks, "the frame's poses have no columns: its motion stays in")
-    return Exported(output, len(time_ns), remarks)
+    return Exported(output, len(pose_ns), len(time_ns) - len(pose_ns), remarks)
 
 
 def _require_place(output: Path, overwrite: bool) -> None:

@@ -202,7 +202,7 @@ def session_of(
         remarks.append(
             "the load never changes: what the load does and what is always there look the same"
         )
-    path_ns = _path(machine, time_ns, table, load_age_limit_s)
+    path_ns = path_stamps(machine, time_ns, table, load_age_limit_s)
     all_ns = np.union1d(time_ns, path_ns)
     rows = np.searchsorted(all_ns, time_ns)
     session = MeasuredSession(
@@ -218,10 +218,25 @@ def session_of(
     return session
 
 
-def _path(
+def path_stamps(
     machine: MachineSignals, time_ns: Stamps, table: Table, load_age_limit_s: float
 ) -> Stamps:
-    """Return the stamps that tell the way to the first pose and between poses far apart."""
+    """Return the stamps that tell the way to the first pose and between poses far apart.
+
+    Parameters
+    ----------
+    machine : MachineSignals
+        Angles and loads.
+    time_ns : (n,) int64
+        Stamps of measured poses, rising [ns].
+    table, load_age_limit_s
+        As in `read_session`.
+
+    Returns
+    -------
+    (p,) int64
+        Where angles or load turned back [ns].
+    """
     start = max(machine.angles.time_ns[0], machine.loads.time_ns[0])
     far = time_ns[0] - start > GAP_S * NANOSECONDS
     time_ns = np.append(start, time_ns) if far else time_ns
