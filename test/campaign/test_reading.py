@@ -237,6 +237,27 @@ def test_a_huge_variance_says_not_measured(tmp_path, complete, table, variance, 
     assert in_part == (measured == [1, 1, 1, 0, 0, 0] and variance[4] < 1.0)
 
 
+@pytest.mark.parametrize("stated", [4e-12, 0.0], ids=["stated", "not stated"])
+def test_what_most_poses_did_not_measure_says_nothing_of_the_others(
+    tmp_path, complete, table, stated
+):
+    """So the rows of a table are that only tell the way: their variance is no noise of 1 km."""
+    rng = np.random.default_rng(5)
+    complete.entries = [
+        (topic, stamp, covariance_message(m.header, m.pose, np.full(6, variance)))
+        if isinstance(m, PoseStamped)
+        else (topic, stamp, m)
+        for topic, stamp, m in complete.entries
+        for variance in [1e6 if rng.random() < 0.7 else stated]
+    ]
+    session = read_session(complete.written(tmp_path / "bag"), table)
+    assert 0.2 < session.measured.all(axis=1).mean() < 0.4
+    if stated:
+        np.testing.assert_allclose(np.diag(session.covariance), stated)
+    else:
+        assert session.covariance is None
+
+
 def test_poses_of_a_mapped_frame_are_turned_into_F(tmp_path, campaign, table):
     turn = Rotation.from_euler("xyz", [40.0, -25.0, 70.0], degrees=True).as_matrix()
     origin = np.array([1.2, -0.4, 0.3])

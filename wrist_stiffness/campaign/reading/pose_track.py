@@ -186,13 +186,17 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
 
 
 def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
-    """Return the typical covariance that messages state, None where they state none."""
+    """Return the typical covariance that messages state, None where they state none.
+
+    Of each component by those that measured it: most rows of a table may only tell the way.
+    """
     told = np.isfinite(covariance).all(axis=(1, 2))
     if not told.any():
         return None
-    typical: Array = np.median(covariance[told], axis=0)
-    ever = measured[told].any(axis=0)
-    typical = typical * np.outer(ever, ever)
+    both = measured[told][:, :, None] & measured[told][:, None, :]
+    seen, ever = both.any(axis=0), measured[told].any(axis=0)
+    typical: Array = np.zeros(seen.shape)
+    typical[seen] = np.nanmedian(np.where(both, covariance[told], np.nan)[:, seen], axis=0)
     return typical if np.all(np.diag(typical)[ever] > 0.0) else None
 
 
