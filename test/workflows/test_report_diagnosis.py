@@ -136,11 +136,11 @@ def test_nothing_missing_is_said_first(observations):
 
 
 def test_unknown_tells_on_what_it_depends(observations):
-    rest = Unexplained(("humidity", "T_link_1"), 0.31, "the conditions predict it")
+    rest = Unexplained(("humidity", "T_link_1", "speed_2"), 0.31, "the conditions predict it")
     page = page_of(replace(RESULT, verdict="unknown", unexplained=rest), observations)
     assert "check it on the machine before you add it" in page
     assert "Not explained by any known effect: 31 % of the structure above the noise." in page
-    assert "It depends on humidity, T_link_1." in page
+    assert "It depends on humidity, T_link_1, speed of motor 2." in page
     assert "Missing in the model" in page
 
 

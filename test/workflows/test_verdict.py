@@ -4,9 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from wrist_stiffness.campaign.comparing.conditions import FORCES, MOMENTS, OWN
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.diagnosis.result import Unexplained
-from wrist_stiffness.workflows.verdict import correction_of, unexplained_share
+from wrist_stiffness.workflows.verdict import (
+    CONDITIONS,
+    conditions_in_words,
+    correction_of,
+    unexplained_share,
+)
 
 GROWTH = Finding(
     (("thermal_expansion", "platform"),), {}, 0.5, 50.0, 0.01, 1.0, {}, "no", "it grows", ""
@@ -46,3 +52,9 @@ def test_why_nothing_can_be_corrected_is_told_apart():
     assert "in the instrument" in correction_of(drift)
     assert "its signal" in correction_of(replace(GROWTH, compensable="needs_signal"))
     assert correction_of(replace(GROWTH, compensable="yes")) == "the nodes can correct it"
+
+
+def test_conditions_are_told_in_words_and_what_the_user_named_by_its_name():
+    told = conditions_in_words(("approach_2", "held_s", "clamp_bar", "T_link_1"))
+    assert told == "approach direction of motor 2, hold time, clamp_bar, T_link_1"
+    assert set(CONDITIONS) == {*OWN, *FORCES, *MOMENTS}

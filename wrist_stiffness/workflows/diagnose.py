@@ -30,6 +30,7 @@ from wrist_stiffness.workflows.read_sessions import (
 from wrist_stiffness.workflows.verdict import (
     PROVEN,
     class_of,
+    conditions_in_words,
     correction_of,
     unexplained_share,
     verdict_lines,
@@ -88,7 +89,7 @@ class Diagnosed:
             out += ["", f"not explained: {unexplained_share(result)}"]
             out.append(f"  {result.unexplained.evidence}")
             if result.unexplained.depends_on:
-                out.append(f"  it depends on {', '.join(result.unexplained.depends_on)}")
+                out.append(f"  it depends on {conditions_in_words(result.unexplained.depends_on)}")
         if result.not_excited:
             out += ["", "these recordings cannot show:"]
             out += [f"  {names}: {needs}" for needs, names in _needs(result).items()]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from wrist_stiffness.campaign.noise_floor import WITH_WANDER, over_floor
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.registry import find_law
@@ -12,6 +14,25 @@ PROVEN = {
     "possible": "possible, a guess from usual sizes",
 }
 """What is said of parts of a wrist that are no tolerances, by their kind."""
+
+CONDITIONS = {
+    "time_s": "time in the session",
+    "held_s": "hold time",
+    "loaded_at_rest": "load put on at rest or carried",
+    "force": "size of the force",
+    "moment": "size of the moment",
+    **{f"theta_{motor}": f"angle of motor {motor}" for motor in (1, 2)},
+    **{f"approach_{motor}": f"approach direction of motor {motor}" for motor in (1, 2)},
+    **{f"speed_{motor}": f"speed of motor {motor}" for motor in (1, 2)},
+    **{f"f{axis}": f"force along {axis}" for axis in "xyz"},
+    **{f"m{axis}": f"moment about {axis}" for axis in "xyz"},
+}
+"""Conditions in words; temperatures and covariates are told by the names that they came with."""
+
+
+def conditions_in_words(names: Iterable[str]) -> str:
+    """Return on what something depends, as a list for a technician."""
+    return ", ".join(CONDITIONS.get(name, name) for name in names)
 
 
 def verdict_lines(result: Diagnosis) -> list[str]:

@@ -34,6 +34,7 @@ from wrist_stiffness.workflows.report.parts import (
 from wrist_stiffness.workflows.verdict import (
     PROVEN,
     class_of,
+    conditions_in_words,
     correction_of,
     unexplained_share,
     verdict_lines,
@@ -153,7 +154,7 @@ def _verdict(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, 
     if result.verdict == "unknown":
         lines.append(f"Not explained by any known effect: {unexplained_share(result)}.")
         if result.unexplained.depends_on:
-            lines.append(f"It depends on {', '.join(result.unexplained.depends_on)}.")
+            lines.append(f"It depends on {conditions_in_words(result.unexplained.depends_on)}.")
     return tuple(lines)
 
 
@@ -251,9 +252,8 @@ def _remains(result: Diagnosis) -> tuple[Part, ...]:
     text = f"{unexplained_share(result)}: {rest.evidence}."
     parts: list[Part] = [Text(typeset(text[0].upper() + text[1:]))]
     if rest.depends_on:
-        parts.append(
-            Text(f"Conditions that predict it, strongest first: {', '.join(rest.depends_on)}.")
-        )
+        told = conditions_in_words(rest.depends_on)
+        parts.append(Text(f"Conditions that predict it, strongest first: {told}."))
     return tuple(parts)
 
 
