@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -217,6 +217,6 @@ def _shown(value: float, digits: int) -> str:
     return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.{digits}g}"
 
 
-def remarks_of(sessions: Sequence[MeasuredSession] | Any) -> tuple[str, ...]:
+def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
     """Return what the sessions say of themselves, each with its session's name."""
     return tuple(f"{session.name}: {remark}" for session in sessions for remark in session.remarks)
