@@ -17,14 +17,13 @@ from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.model_file import file_sha256, load_model
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import remarks_of
 from wrist_stiffness.workflows.fit_report import TITLES, plus_minus
-from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.provenance import Provenance, Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
     read_sessions,
-    recording_sha256,
+    sha256_by_name,
     was_fitted_to,
 )
 from wrist_stiffness.workflows.verdict import (
@@ -175,7 +174,7 @@ def diagnose_recordings(
     if _leaves_much(answer.diagnosis):
         tell("asking for wrong signs, units and names")
         mistake = mistake_in(known, list(sessions.values()), rng)
-    hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
+    hashes = sha256_by_name(sessions)
     return Diagnosed(
         answer,
         tuple(hashes),
