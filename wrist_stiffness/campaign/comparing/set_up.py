@@ -108,7 +108,7 @@ def refit_set_up(
     tuple of SetUp
         One for each session.
     """
-    ends = np.cumsum([len(each.cut.dwell) for each in observed.sessions])
+    ends = np.cumsum([len(each) for each in observed.sessions])
     parts = np.split(observed.predicted, ends[:-1])
     free = np.ones(len(PLAUSIBLE), dtype=bool)
     for effect in calibrated:
