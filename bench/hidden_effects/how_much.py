@@ -1,0 +1,136 @@
+"""How much of an ordinary wrist must be known to come near its floor on another day.
+
+    python bench/hidden_effects/how_much.py --processes 2
+
+Nothing is diagnosed here.  The simulation's own laws are told the largest of what hides, exactly;
+or all of it, each magnitude wrong by chance.  So no diagnosis that names as many effects, or
+finds their sizes no better, can be expected below.  Each answer is calibrated and judged as those
+of the solvers are.  Lines are kept in results/how_much.jsonl; a second start does what is missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_wrist import TRUTH, code_version
+from cases import Case, full_cases
+from dictionary import design_of, dictionary
+from observe import Riddle, observe, pose_riddle
+from score import HeldOut, floor
+
+from wrist_stiffness.cli.progress import Progress
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+
+LARGEST = (0, 1, 2, 3, 5, 8, 12)
+"""So many effects are told, exactly."""
+
+WRONG = (0.0, 0.01, 0.03, 0.1, 0.3)
+"""Standard deviations of the relative error of every magnitude, all effects told."""
+
+
+def version() -> str:
+    """Return the digest of the truth and of how it is judged."""
+    return code_version(TRUTH, ("cases.py", "observe.py", "score.py", "how_much.py"))
+
+
+def ask(case: Case, folder: Path) -> list[dict[str, Any]]:
+    """Return a line for each thing that is told; one line that says so without an equilibrium."""
+    try:
+        riddle = pose_riddle(case)
+    except InputError as error:
+        return [{"key": case.key, "version": version(), "told": "", "error": str(error)}]
+    words = dictionary(design_of(case), False, folder)
+    held = HeldOut(riddle, words)
+    least = floor(case.bare, words)
+    # Largest by what each does alone to the second day.
+    size = [held.contribution(part) for part in riddle.parts.values()]
+    ordered = [riddle.hidden[place] for place in np.argsort(size)[::-1]]
+    told = {f"largest {count}": tuple(ordered[:count]) for count in LARGEST}
+    rng = np.random.default_rng(case.seed)
+    chance = rng.standard_normal(len(riddle.hidden))
+    for share in WRONG:
+        factors = np.exp(share * chance)
+        told[f"all, wrong by {share:.0%}"] = tuple(
+            replace(each, magnitude=each.magnitude * float(factor))
+            for each, factor in zip(riddle.hidden, factors, strict=True)
+        )
+    lines = []
+    for name, effects in told.items():
+        line = {"key": case.key, "version": version(), "told": name}
+        try:
+            one, two = explained(riddle, effects)
+        except InputError as error:
+            lines.append(line | {"error": str(error)})
+            continue
+        error = held.error(riddle.train.residual - one, riddle.test.residual - two)
+        lines.append(line | {"after": float(error / least)})
+    return lines
+
+
+def explained(riddle: Riddle, effects: tuple[HiddenEffect, ...]) -> list[np.ndarray]:
+    """Return what some effects do together to both days, (u, 6) each, without noise."""
+    if not effects:
+        return [np.zeros_like(day.residual) for day in riddle.bare]
+    return [
+        observe(riddle.case, effects, session, riddle.bare_days[session]).units.residual
+        - riddle.bare[session].residual
+        for session in (0, 1)
+    ]
+
+
+def table(lines: Sequence[dict[str, Any]]) -> str:
+    """Return medians and ranges in Markdown, in the order in which things are told."""
+    names = [*(f"largest {n}" for n in LARGEST), *(f"all, wrong by {s:.0%}" for s in WRONG)]
+    rows = ["| told | wrists | error after, median | least | most |", "|---|---|---|---|---|"]
+    for name in names:
+        found = [line["after"] for line in lines if line["told"] == name and "after" in line]
+        if found:
+            rows.append(
+                f"| {name} | {len(found)} | {np.median(found):.2f} "
+                f"| {min(found):.2f} | {max(found):.2f} |"
+            )
+    return "\n".join(rows)
+
+
+def main() -> None:
+    """Ask what is missing and print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    path = arguments.output / "how_much.jsonl"
+    kept = path.read_text().splitlines() if path.exists() else []
+    lines = [line for line in map(json.loads, kept) if line["version"] == version()]
+    done = {line["key"] for line in lines}
+    wrists = [case for case in full_cases() if case.main and case.ordinary]
+    todo = [case for case in wrists if case.key not in done]
+    progress = Progress("wrists")
+    with ProcessPoolExecutor(arguments.processes) as pool, path.open("a") as out:
+        futures = [pool.submit(ask, case, arguments.output) for case in todo]
+        for number, future in enumerate(as_completed(futures)):
+            found = future.result()
+            out.write("".join(json.dumps(line) + "\n" for line in found))
+            out.flush()
+            lines += found
+            progress(number + 1, len(todo))
+    print(table(lines))
+
+
+if __name__ == "__main__":
+    main()
