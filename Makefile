@@ -26,9 +26,7 @@ help:
 demo: $(READY)
 	$(RUN) wrist_stiffness.cli.demo -o demo
 
-# The workers share the cores: threads of their own below them would only get in the way.  Who is
-# done takes over from others.
-test: export OPENBLAS_NUM_THREADS = 1
+# Who is done takes over from others.
 test: $(READY)
 	$(RUN) pytest -n $(TESTERS) --dist worksteal $(PYTEST_ARGS) test
 

@@ -1,5 +1,9 @@
 import os
 
+# Before anything loads numpy.  Workers share the cores: threads of their own below them wait for
+# each other: on a busy machine a test of half a second was not done after a minute.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Every worker has a ROS domain of its own, so that tests with live nodes do not hear each other.
 # Workers inherit the variables of the process that started them. Domains above 101 clash with
 # ports that Linux hands out.

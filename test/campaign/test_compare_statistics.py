@@ -82,6 +82,8 @@ def test_backlash_is_told_as_a_gap_that_grows_with_the_load():
     gap, growth = found.statements
     # 2 * 1.6 um between both sides; two groups of 200 units with 1 um each: 0.1 um.
     assert gap.condition.name == "approach of motor 2"
+    # No chance of 999 comes near, and fast and slow conditions are asked apart: twice 1 in 1000.
+    assert gap.p_value == pytest.approx(0.002)
     (change,) = gap.changes
     assert change.size == pytest.approx(3.2, abs=4 * change.uncertainty)
     assert change.uncertainty == pytest.approx(0.1, rel=0.4)
@@ -120,6 +122,27 @@ def test_each_kind_of_condition_is_found_first_with_its_size(change, name, size)
     (shift,) = (each for each in first.changes if each.quantity == "s")
     assert shift.size == pytest.approx(size, abs=4 * shift.uncertainty)
     assert shift.uncertainty < 0.3 * size
+
+
+def test_of_a_wave_only_the_part_that_was_seen_is_told():
+    """A motor that turns by 0.8 rad either way goes through little of a cosine once a turn."""
+    found = told(table(np.random.default_rng(15), lambda c: along(2, 50e-6 * np.cos(c["theta_2"]))))
+    first = found.statements[0]
+    assert first.condition.name == "angle of motor 2, once a turn"
+    (shift,) = (each for each in first.changes if each.quantity == "s")
+    assert shift.size == pytest.approx(0.5 * 50.0 * (1.0 - np.cos(0.8)), rel=0.05)
+
+
+def test_a_temperature_is_felt_late_by_its_time_constant():
+    observations = table(np.random.default_rng(16))
+    step = (observations.times >= 300.0).astype(float)
+    asked, _ = conditions(
+        replace(observations, covariates={**observations.covariates, "T_link_1": step})
+    )
+    (late,) = (each for each in asked if each.name == "temperature of link 1, 5 min late")
+    after = observations.times - 300.0
+    expected = np.where(after < 0.0, 0.0, -np.exp(-(after + 3.0) / 300.0))
+    assert late.columns[:, 0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_of_a_condition_that_is_constant_but_for_rounding_nothing_is_asked():

@@ -69,6 +69,14 @@ def test_what_is_put_aside_cannot_move_the_fit(model, days):
     assert after.rms["s_um"] > 3.0 * before.rms["s_um"]
 
 
+def test_the_wrist_of_the_first_day_foretells_the_second(model):
+    """Its registration is fitted anew; a link twice as soft is not, and leaves noise alone."""
+    soft = Effect(find_law("link_stiffness"), "link_1").with_values({"flexibility_percent": 100.0})
+    days = [session_of(model.with_effects(soft), seed) for seed in (0, 1)]
+    after = found(model, days)
+    assert after.rms["s_um"] == pytest.approx(np.sqrt(3.0), rel=0.15)
+
+
 def test_what_is_not_put_aside_moves_it(model):
     honest = session_of(model, 0)
     before = found(model, [honest])

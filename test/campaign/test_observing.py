@@ -70,6 +70,12 @@ def test_a_pose_held_twice_is_a_replicate(model, session):
     assert labels[0] == labels[2] == -1
 
 
+def test_a_pose_held_under_another_load_is_no_replicate(model, session):
+    session.block.load[session.block.time > 8.5, 2] = -0.5
+    found = observe(model, [session])
+    assert (found.observations.replicate == -1).all()
+
+
 def test_a_lost_beam_in_a_dwell_is_left_out(model, session):
     shift = session.shift + 1e-7 * np.random.default_rng(1).normal(size=session.shift.shape)
     shift[5] += 1e-3

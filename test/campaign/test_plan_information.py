@@ -29,8 +29,9 @@ from wrist_stiffness.campaign.planning.question import (
     commissioning,
     effect_named,
 )
+from wrist_stiffness.campaign.planning.rivals import LEAST_WHITE, Rivals
 from wrist_stiffness.campaign.planning.signatures import plausible, signatures
-from wrist_stiffness.campaign.planning.timeline import Pace, Visit, run_through
+from wrist_stiffness.campaign.planning.timeline import LOAD_RAMP_S, Pace, Visit, run_through
 from wrist_stiffness.campaign.planning.truths import after_data, as_asked
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
@@ -367,3 +368,29 @@ def test_a_recorded_session_is_the_experiment_that_was_performed(model, timeline
         end = max(d.time_s + d.hold_s for d in timeline.dwells if d.visit is visit)
         own = (found.block.time[found.rows] > begin) & (found.block.time[found.rows] < end)
         assert len(set(found.visit[own & ~found.moving])) == 1
+
+
+@pytest.mark.parametrize("change_s", [0.1, 7.0])
+def test_a_load_changes_as_slowly_as_its_source_says_and_no_faster_than_a_hand(model, change_s):
+    """At rest it is put on after one dwell and taken off after another."""
+    load = replace(LOAD, change_s=change_s)
+    pose, pace = np.radians([10.0, 5.0]), Pace(np.radians(30.0), 2.0, True)
+    visit = Visit(pose, np.ones(2), load)
+    found = run_through([visit], model.table.workspace, pace, np.zeros(2))
+    empty, full = (each.time_s for each in found.dwells)
+    lasts = max(change_s, LOAD_RAMP_S)
+    assert full - empty == pytest.approx(pace.dwell_s + lasts)
+    assert found.ends[0] - full == pytest.approx(visit.hold_s + lasts)
+
+
+@pytest.mark.parametrize("count", [0.5, 0.99])
+def test_the_noise_of_a_dwell_is_its_floor_less_the_hidden_count(model, count):
+    """A quarter at least of a rotation's floor is white: a count may be hidden in less of it."""
+    table, mechanism = model.table, model.table.mechanism
+    jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
+    hidden = np.sum(jacobian**2) * table.geometry.limits.encoder_step**2 / 12.0
+    shift, square = 2e-6, hidden / count
+    noise = Rivals((), (), (shift, float(np.sqrt(square)))).noise(table)
+    assert np.sum(noise.white[:3] ** 2) == pytest.approx(shift**2)
+    white = max(1.0 - count, LEAST_WHITE) * square
+    assert np.sum(noise.white[3:] ** 2) == pytest.approx(white)

@@ -53,6 +53,13 @@ def test_a_constant_count_stays_exactly_that_count():
     np.testing.assert_array_equal(signal.interpolated(at), np.full((3, 1), 0.1))
 
 
+def test_messages_in_any_order_are_put_into_that_of_their_stamps():
+    """As two publishers, or a network, mix them; of equal stamps the last one received counts."""
+    found = in_order(np.array([30, 10, 20, 10]), np.array([[3.0], [1.0], [2.0], [1.5]]))
+    assert found.time_ns.tolist() == [10, 20, 30]
+    assert found.values.tolist() == [[1.5], [2.0], [3.0]]
+
+
 def speeds(campaign, time_ns):
     """Return the motors' speeds (n, 2) at stamps."""
     late, early = (campaign.theta(time_ns + ns) for ns in (MILLISECOND, -MILLISECOND))
@@ -119,7 +126,7 @@ def test_sparse_angles_tell_no_speeds(tmp_path, campaign, table):
 
 
 def test_the_load_is_the_one_that_the_nodes_would_use():
-    """Stamps in any order, some equal, some too old: held against the nodes' own history."""
+    """Some stamps are equal, some too old: held against the nodes' own history."""
     rng = np.random.default_rng(2)
     stamps = rng.integers(1, 50, 30) * SECOND // 10
     # The nodes' history forgets all where the clock jumps back: this test is not about that.

@@ -74,6 +74,15 @@ def test_a_count_that_flickers_while_the_load_comes_on_is_a_stand():
     assert loaded[-1] >= 0
 
 
+def test_a_motor_at_rest_has_no_speed_however_its_count_flickers():
+    block = session()
+    told = np.full_like(block.theta, 0.02)
+    found = cut_all(replace(block, theta_dot=told))
+    resting = found.dwell[found.unit] & (found.unit >= 0)
+    assert (found.block.theta_dot[resting] == 0.0).all()
+    assert (found.block.theta_dot[~resting & (found.unit >= 0)] == 0.02).all()
+
+
 def moving_times(block, found):
     return [block.time[found.label == u] for u in np.flatnonzero(~found.dwell)]
 

@@ -11,10 +11,10 @@ import sys
 from pathlib import Path
 
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import compare
 from wrist_stiffness.workflows.pictures.dependence import draw_against
 from wrist_stiffness.workflows.pictures.errors import Bars, draw_bars
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 from wrist_stiffness.workflows.report.parts import against, unit_of
 

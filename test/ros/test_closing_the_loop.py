@@ -30,8 +30,8 @@ from wrist_stiffness.ros.qos import NOTES_QOS
 from wrist_stiffness.ros.recorder import Recorder
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.extend import CatalogueEffect, extend_model
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 
 pytestmark = pytest.mark.slow

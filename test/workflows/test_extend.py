@@ -19,7 +19,6 @@ from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.instrument import instrument
 from wrist_stiffness.workflows import extend as workflow
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.extend import (
     CatalogueEffect,
     FileEffect,
@@ -27,6 +26,7 @@ from wrist_stiffness.workflows.extend import (
     direction_of,
     extend_model,
 )
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 from wrist_stiffness.workflows.replay import replay
 

@@ -13,8 +13,9 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows import calibrate, extend
-from wrist_stiffness.workflows.calibrate import Run, calibrate_model
+from wrist_stiffness.workflows.calibrate import calibrate_model
 from wrist_stiffness.workflows.extend import CatalogueEffect, extend_model
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 
 SHIPPED = shipped_file("config/palmieri2015_model.yaml")

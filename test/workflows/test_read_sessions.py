@@ -13,7 +13,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter, open_recording, topics
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.calibrate import Run
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
     measured_sha256,

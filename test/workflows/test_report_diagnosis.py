@@ -15,9 +15,8 @@ from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations
 from wrist_stiffness.diagnosis.result import NotExcited, Unexplained
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows import diagnose
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.diagnose import Diagnosed
-from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.provenance import Provenance, Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 from wrist_stiffness.workflows.report.diagnosis_report import report_of_diagnosis, shown_by
 from wrist_stiffness.workflows.report.page import html_of

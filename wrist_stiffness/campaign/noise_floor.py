@@ -23,7 +23,6 @@ SOURCES = {
 }
 """Where a floor may come from, in words."""
 
-
 AT_THE_FLOOR = 1.15
 """An error up to so many times the noise floor is called noise."""
 
@@ -75,12 +74,7 @@ class NoiseFloor:
 
     def rms(self, observations: Observations) -> dict[str, float]:
         """Root mean square of each quantity, by its key, in the unit of its report."""
-        mean = np.sum(self.variance * observations.measured, axis=0)
-        mean = mean / np.maximum(observations.measured.sum(axis=0), 1)
-        return {
-            q.key: float(np.sqrt(mean[list(q.components)].sum())) * q.per_si
-            for q in observations.reported
-        }
+        return observations.rms(self.variance)
 
 
 def noise_floor(observations: Observations) -> NoiseFloor:

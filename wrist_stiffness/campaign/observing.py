@@ -96,7 +96,8 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     InputError
         If no unit was measured.
     """
-    ends = np.cumsum([len(each.cut.dwell) for each in sessions])
+    units = [len(each) for each in sessions]
+    ends = np.cumsum(units)
     parts = np.split(predicted, ends[:-1])
     values = np.concatenate(
         [each.residual(part) for each, part in zip(sessions, parts, strict=True)]
@@ -113,7 +114,7 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         _covariates(sessions),
         covariance,
         np.concatenate([each.mean(each.block.time) for each in sessions]),
-        np.repeat(np.arange(len(sessions)), [len(each.cut.dwell) for each in sessions]),
+        np.repeat(np.arange(len(sessions)), units),
         _replicates(model, sessions, theta),
         np.concatenate([each.samples for each in sessions]),
         QUANTITIES,
@@ -121,7 +122,7 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         shared=None if covariance is None else counts,
     )
     row = np.where(used, np.cumsum(used) - 1, -1)
-    starts = ends - [len(each.cut.dwell) for each in sessions]
+    starts = ends - units
     labels = tuple(
         np.where(each.cut.label >= 0, row[start + each.cut.label], -1)
         for each, start in zip(sessions, starts, strict=True)
@@ -176,7 +177,7 @@ def _replicates(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Arr
     labels = []
     number, start = 0, 0
     for each in sessions:
-        units = len(each.cut.dwell)
+        units = len(each)
         pose, load = theta[start : start + units], each.mean(each.block.load)
         range_ = np.repeat([np.linalg.norm(load[:, i : i + 3], axis=1).max() for i in (0, 3)], 3)
         own = np.full(units, -1)

@@ -60,6 +60,10 @@ class UnitSession:
     white: Array
     wander: Array
 
+    def __len__(self) -> int:
+        """Return the number of units."""
+        return len(self.cut.dwell)
+
     @cached_property
     def measured(self) -> Mask:
         """Units of which anything was measured, (u,); only these are in the table."""
@@ -97,7 +101,7 @@ class UnitSession:
     def mean(self, values: Array) -> Array:
         """Return the means over units (u, ...) of values at the kept moments (k, ...)."""
         flat = values.reshape(len(values), -1)
-        used, units = self.cut.unit >= 0, len(self.cut.dwell)
+        used, units = self.cut.unit >= 0, len(self)
         weighted = flat[used] * self.cut.weight[used, None]
         sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
         return np.asarray(np.stack(sums, axis=1).reshape(units, *values.shape[1:]), dtype=float)

@@ -117,7 +117,7 @@ def diagnose(
     return Diagnosis(
         verdict,
         "sample" if observations.samples is None else "dwell",
-        _floor(evidence),
+        training.rms(evidence.noise.variance(training)),
         {q.key: stages[0].rmse(q) for q in observations.reported},
         {q.key: stages[-1].rmse(q) for q in observations.reported},
         _absorbed(evidence, kept),
@@ -257,16 +257,6 @@ def _unexplained(
     sentences += [f"{name} fitted here makes the sealed part worse" for name in broken]
     sentences += doubts
     return Unexplained(flexible.depends_on, float(share), "; ".join(sentences))
-
-
-def _floor(evidence: Evidence) -> dict[str, float]:
-    measured = evidence.observations.measured
-    variance = evidence.noise.variance(evidence.observations)
-    variance = np.sum(variance * measured, axis=0) / np.maximum(measured.sum(axis=0), 1)
-    return {
-        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
-        for q in evidence.observations.reported
-    }
 
 
 def _absorbed(evidence: Evidence, kept: tuple[Entered, ...]) -> tuple[str, ...]:

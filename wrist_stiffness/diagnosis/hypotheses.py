@@ -19,6 +19,9 @@ from wrist_stiffness.diagnosis.projection import (
 from wrist_stiffness.diagnosis.whitening import NoiseModel, Whitener
 from wrist_stiffness.diagnosis.worth import directions_of
 
+SEARCH_STEPS = 8
+"""Evaluations by which a shape is refined along each of its parameters."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
@@ -193,9 +196,6 @@ def refined(evidence: Evidence, hypothesis: Hypothesis, base: Base) -> Hypothesi
             options={"maxiter": SEARCH_STEPS},
         )
     return best
-
-
-SEARCH_STEPS = 8
 
 
 def gain(base: Base, hypothesis: Hypothesis) -> float:

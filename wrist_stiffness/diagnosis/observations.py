@@ -171,6 +171,13 @@ class Observations:
         seen = self.measured.sum(axis=0) > 0
         return tuple(q for q in self.quantities if seen[list(q.components)].any())
 
+    def rms(self, variance: Array) -> dict[str, float]:
+        """Root mean square of each quantity by its key, from variances (n, m) of its components."""
+        mean = np.sum(variance * self.measured, axis=0) / np.maximum(self.measured.sum(axis=0), 1)
+        return {
+            q.key: float(np.sqrt(mean[list(q.components)].sum())) * q.per_si for q in self.reported
+        }
+
     def covariate(self, name: str) -> Array:
         """One condition by name, (n,).
 

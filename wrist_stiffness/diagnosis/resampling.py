@@ -13,6 +13,9 @@ from wrist_stiffness.diagnosis.projection import Base
 RIDGE = 1e-9
 """Keeps a resample solvable in which a parameter is not seen."""
 
+RESAMPLES = 50
+"""Draws of blocks from which a stability is told."""
+
 
 def time_blocks(sessions: Labels, wanted: int) -> Labels:
     """Cut the units into blocks of neighbours that never span two sessions, (n,)."""
@@ -97,6 +100,3 @@ def stability(grams: BlockGrams, inside: Mask, prices: Array, rng: np.random.Gen
     draws = rng.multinomial(grams.n_blocks, np.full(grams.n_blocks, 1 / grams.n_blocks), RESAMPLES)
     chosen = [int(np.argmax(grams.gains(draw.astype(float)) - prices)) for draw in draws]
     return float(np.mean(inside[chosen]))
-
-
-RESAMPLES = 50

@@ -1,4 +1,8 @@
-"""What a diagnosis decides by; every threshold in one place."""
+"""What a diagnosis decides by: thresholds that a caller may set, and those that steps share.
+
+A threshold that one step alone uses stands with that step.  Without a source they are assumed, or
+were kept because the benchmarks, where the answer is known, came out better with them.
+"""
 
 import math
 from dataclasses import dataclass

@@ -16,12 +16,12 @@ UNSEEN_POSES = 400
 UNSEEN_SEED = 20150226
 
 
-def unseen_poses(workspace: Workspace, count: int = UNSEEN_POSES) -> Array:
-    """Return random poses in the map domain that no grid contains, (count, 2) [rad]."""
+def unseen_poses(workspace: Workspace) -> Array:
+    """Return `UNSEEN_POSES` random poses in the map domain that no grid contains, (n, 2) [rad]."""
     rng = np.random.default_rng(UNSEEN_SEED)
     lower, upper = workspace.rectangle
-    poses = rng.uniform(lower, upper, (4 * count, 2))
-    return poses[workspace.domain(poses)][:count]
+    poses = rng.uniform(lower, upper, (4 * UNSEEN_POSES, 2))
+    return poses[workspace.domain(poses)][:UNSEEN_POSES]
 
 
 def interpolation_errors(table: Table) -> dict[str, Any]:

@@ -161,8 +161,8 @@ class Block:
             )
         return np.array(value, dtype=float) * scale
 
-    def rows(self, key: str, scale: float = 1.0, size: int = 3, at_least: int = 1) -> Array:
-        """Return (n, size) finite numbers times `scale`, n not below `at_least`."""
+    def rows(self, key: str, scale: float = 1.0, at_least: int = 1) -> Array:
+        """Return (n, 3) finite numbers times `scale`, n not below `at_least`."""
         value = self.take(key)
         if not isinstance(value, list) or len(value) < at_least:
             found = f"{len(value)} rows" if isinstance(value, list) else _short(value)
@@ -170,9 +170,9 @@ class Block:
                 f"{self.place}.{key}: {found}, needs a list of at least {at_least} rows"
             )
         for i, row in enumerate(value):
-            if not _is_row(row, size):
+            if not _is_row(row, 3):
                 raise self._error(
-                    f"{self.place}.{key}[{i}]: {_short(row)} is not a list of {size} finite numbers"
+                    f"{self.place}.{key}[{i}]: {_short(row)} is not a list of 3 finite numbers"
                 )
         return np.array(value, dtype=float) * scale
 

@@ -76,6 +76,10 @@ def together(a: Array | None, b: Array | None) -> Array | None:
 
 NOTHING = Contribution()
 
+LEFT_OUT = " is missing, left out"
+"""How the warning ends that an effect lacks a signal; the effect's name and the signal go before.
+"""
+
 
 class MissingSignalError(Exception):
     """A law asks for a signal that the samples do not have; the evaluation turns it to a warning.

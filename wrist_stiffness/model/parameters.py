@@ -66,7 +66,8 @@ class Parameter:
     lower, upper : float
         Bounds, both allowed.
     scale : float
-        Prior standard deviation: how large it may be in an ordinary wrist.
+        Prior standard deviation: how large it may be in an ordinary wrist.  Those of the catalogue
+        are assumed.
     mean : float
         Prior mean.
     linear : bool

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.single_motion import exp_one, log_one
+from wrist_stiffness.model.contribution import LEFT_OUT
 
 
 @dataclass(frozen=True)
@@ -114,3 +115,10 @@ class BlockPrediction:
     accepted: NDArray[np.bool_]
     warnings: tuple[str, ...]
     guesses: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)
+
+    def lacks(self, effect: str) -> str:
+        """Return the signal without which an effect, by its name, was left out; empty for none."""
+        for warning in self.warnings:
+            if warning.startswith(f"{effect}: ") and warning.endswith(LEFT_OUT):
+                return warning.removeprefix(f"{effect}: ").removesuffix(LEFT_OUT)
+        return ""

@@ -24,7 +24,12 @@ from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.constants import Constants
-from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
+from wrist_stiffness.model.contribution import (
+    LEFT_OUT,
+    NOTHING,
+    Contribution,
+    MissingSignalError,
+)
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import STAGES
 from wrist_stiffness.model.situation import Situation, lengths
@@ -215,7 +220,7 @@ def _advanced(
         before = state if guess is None else guess.after(state)
         added, after = _advanced_by(effect, at, before)
     except MissingSignalError as missing:
-        lacking = f"{effect.name}: {missing.signal} is missing, left out"
+        lacking = f"{effect.name}: {missing.signal}{LEFT_OUT}"
         return Advanced(effect, at, state, NOTHING, state, (lacking,))
     return Advanced(effect, at, state, added, after, _first_order(effect, added))
 

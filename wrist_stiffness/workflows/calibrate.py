@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,7 @@ from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
 from wrist_stiffness.campaign.fitting.free_effects import answering_as
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.lineage import Step
-from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
+from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.workflows.fit_report import (
     Errors,
     far_lines,
@@ -27,11 +26,10 @@ from wrist_stiffness.workflows.fit_report import (
     untold_lines,
     used_lines,
 )
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
-    measured_sha256,
     read_sessions,
-    recording_sha256,
     was_fitted_to,
 )
 
@@ -39,28 +37,6 @@ Progress = Callable[[int, int], None]
 
 SEED = 0
 """Of the noise floor beside which a mistake shows."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """What the written model says of the run that made it.
-
-    Parameters
-    ----------
-    command : str
-        As it was typed.
-    date : str
-        ISO 8601.
-    """
-
-    command: str
-    date: str
-
-    def step(self, parent: str | Path, recordings: Mapping[Path, MeasuredSession]) -> Step:
-        """Return the step from a parent's file to its child."""
-        hashes = {session.name: recording_sha256(path) for path, session in recordings.items()}
-        measured = {session.name: measured_sha256(session) for session in recordings.values()}
-        return Step(self.command, self.date, file_sha256(parent), hashes, measured)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -19,12 +19,11 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import SOURCES
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
-from wrist_stiffness.workflows.calibrate import Run
-from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.provenance import Provenance, Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
     read_sessions,
-    recording_sha256,
+    sha256_by_name,
     was_fitted_to,
 )
 
@@ -188,7 +187,7 @@ def compare(
     comparison = compare_models(
         loaded, list(sessions.values()), np.random.default_rng(SEED), progress("comparing")
     )
-    hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
+    hashes = sha256_by_name(sessions)
     fitted_here = tuple(name for name, model in loaded if was_fitted_to(model, sessions))
     files = {name: file_sha256(path) for name, path in zip(names, models, strict=True)}
     return Compared(
@@ -217,6 +216,6 @@ def _shown(value: float, digits: int) -> str:
     return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.{digits}g}"
 
 
-def remarks_of(sessions: Sequence[MeasuredSession] | Any) -> tuple[str, ...]:
+def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
     """Return what the sessions say of themselves, each with its session's name."""
     return tuple(f"{session.name}: {remark}" for session in sessions for remark in session.remarks)

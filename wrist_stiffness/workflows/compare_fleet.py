@@ -10,9 +10,9 @@ from typing import Any
 
 from wrist_stiffness.campaign.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.campaign.reading.folder import recordings_in
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import compare
 from wrist_stiffness.workflows.fleet import FleetRow, map_recordings
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 
 

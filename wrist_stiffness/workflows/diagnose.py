@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,14 +17,13 @@ from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.model_file import file_sha256, load_model
-from wrist_stiffness.workflows.calibrate import Run
 from wrist_stiffness.workflows.compare import remarks_of
-from wrist_stiffness.workflows.fit_report import plus_minus
-from wrist_stiffness.workflows.provenance import Provenance
+from wrist_stiffness.workflows.fit_report import TITLES, plus_minus
+from wrist_stiffness.workflows.provenance import Provenance, Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
     read_sessions,
-    recording_sha256,
+    sha256_by_name,
     was_fitted_to,
 )
 from wrist_stiffness.workflows.verdict import (
@@ -176,7 +175,7 @@ def diagnose_recordings(
     if _leaves_much(answer.diagnosis):
         tell("asking for wrong signs, units and names")
         mistake = mistake_in(known, list(sessions.values()), rng)
-    hashes = {session.name: recording_sha256(path) for path, session in sessions.items()}
+    hashes = sha256_by_name(sessions)
     return Diagnosed(
         answer,
         tuple(hashes),
@@ -193,13 +192,12 @@ def _leaves_much(result: Diagnosis) -> bool:
 
 
 def _table(result: Diagnosis) -> list[str]:
-    titles = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
     rows = (
         ("set-up refitted", result.before),
         ("with the findings", result.after),
         ("noise floor", result.noise_floor),
     )
-    out = [f"{'RMS on the part put aside':28}" + "".join(f"{titles[k]:>12}" for k in result.before)]
+    out = [f"{'RMS on the part put aside':28}" + "".join(f"{TITLES[k]:>12}" for k in result.before)]
     return out + [f"  {name:26}" + "".join(f"{row[k]:12.3g}" for k in row) for name, row in rows]
 
 
@@ -211,11 +209,7 @@ def _finding_lines(place: int, finding: Finding) -> list[str]:
     ]
     if finding.check:
         out.append(f"   to be sure: {finding.check}")
-    bought = ", ".join(
-        f"{key.rpartition('_')[0]} {gain:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
-        for key, (gain, error) in finding.buys.items()
-    )
-    out.append(f"   brings {bought}; {correction_of(finding)}")
+    out.append(f"   brings {_sizes(finding.buys)}; {correction_of(finding)}")
     out.append(
         f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
         f"evidence (2 ln Bayes factor) {finding.delta_bic:.3g}"
@@ -234,13 +228,17 @@ def adding_lines(parts: Sequence[Contribution]) -> list[str]:
     if not parts:
         return []
     out = ["", "what adds most to the error, RMS beyond what a new set-up would take up:"]
-    for each in parts:
-        sizes = ", ".join(
-            f"{key.rpartition('_')[0]} {size:.3g} +- {error:.2g} {key.rpartition('_')[2]}"
-            for key, (size, error) in each.sizes.items()
-        )
-        out.append(f"  {each.name}: {sizes} ({PROVEN[each.kind]})")
+    out += [f"  {each.name}: {_sizes(each.sizes)} ({PROVEN[each.kind]})" for each in parts]
     return out
+
+
+def _sizes(sizes: Mapping[str, tuple[float, float]]) -> str:
+    """Return sizes with their uncertainties, by keys such as `s_um`."""
+    parts = []
+    for key, (size, error) in sizes.items():
+        name, _, unit = key.rpartition("_")
+        parts.append(f"{name} {size:.3g} +- {error:.2g} {unit}")
+    return ", ".join(parts)
 
 
 def taken_up_lines(absorbed: Sequence[TakenUp]) -> list[str]:

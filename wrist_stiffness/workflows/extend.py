@@ -21,7 +21,7 @@ from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate, has_unit
 from wrist_stiffness.model.registry import find_law, law_from_file
-from wrist_stiffness.workflows.calibrate import Run, writable
+from wrist_stiffness.workflows.calibrate import writable
 from wrist_stiffness.workflows.fit_report import (
     Errors,
     fit_values,
@@ -31,6 +31,7 @@ from wrist_stiffness.workflows.fit_report import (
     told_lines,
     used_lines,
 )
+from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, was_fitted_to
 
 Progress = Callable[[int, int], None]

@@ -6,11 +6,39 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from wrist_stiffness import __version__
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.model_file import file_sha256
+from wrist_stiffness.workflows.read_sessions import measured_sha256, sha256_by_name
 
 PACKAGES = ("numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a result says of the run that made it.
+
+    Parameters
+    ----------
+    command : str
+        As it was typed.
+    date : str
+        ISO 8601.
+    """
+
+    command: str
+    date: str
+
+    def step(self, parent: str | Path, recordings: Mapping[Path, MeasuredSession]) -> Step:
+        """Return the step from a parent's file to its child."""
+        measured = {session.name: measured_sha256(session) for session in recordings.values()}
+        return Step(
+            self.command, self.date, file_sha256(parent), sha256_by_name(recordings), measured
+        )
 
 
 @dataclass(frozen=True)

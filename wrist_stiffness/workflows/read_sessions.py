@@ -131,6 +131,11 @@ def measured_sha256(session: MeasuredSession) -> str:
     return hashlib.sha256(said.tobytes()).hexdigest()
 
 
+def sha256_by_name(sessions: Mapping[Path, MeasuredSession]) -> dict[str, str]:
+    """Return the SHA-256 of each session's recording by the session's name."""
+    return {session.name: recording_sha256(path) for path, session in sessions.items()}
+
+
 def recording_sha256(path: Path) -> str:
     """Return the SHA-256 of a recording's storage file, or of the checksums of several.
 

@@ -12,7 +12,6 @@ from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values
 from wrist_stiffness.mechanism.yaml_block import read_yaml
 from wrist_stiffness.workflows.budget import PER_AXIS, Push, budget
@@ -119,15 +118,13 @@ class MapSummary:
     domain_max: dict[str, float]
 
 
-def summarise(table: Table, poses: Array | None = None) -> MapSummary:
-    """Return the statistics of Tables 1 and 2 for a table.
+def summarise(table: Table) -> MapSummary:
+    """Return the statistics of Tables 1 and 2 for a table, on a fine grid over the map.
 
     Parameters
     ----------
     table : Table
         The lookup.
-    poses : (n, 2) float, optional
-        Motor angles [rad]; a fine grid over the map if None.
 
     Returns
     -------
@@ -135,7 +132,7 @@ def summarise(table: Table, poses: Array | None = None) -> MapSummary:
         In micrometres and hundredths of a degree.
     """
     workspace = table.workspace
-    poses = workspace.grid(101) if poses is None else poses
+    poses = workspace.grid(101)
     values = table.map_spline(poses) * np.array([MICRO] * 4 + [CENTIDEGREES])
     inside = values[workspace.operative(poses)]
     names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_1e-2deg"]

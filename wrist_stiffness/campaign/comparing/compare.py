@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, sizes
 from wrist_stiffness.campaign.comparing.headroom import held_out_process
 from wrist_stiffness.campaign.comparing.sentences import tell
-from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
+from wrist_stiffness.campaign.comparing.set_up import without_set_up
 from wrist_stiffness.campaign.comparing.wiring import told_mistake
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
+from wrist_stiffness.campaign.fitting.problem import Progress, silent
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
-from wrist_stiffness.campaign.observing import Observed, predict_units, tabulate
+from wrist_stiffness.campaign.observing import Observed
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 
-Progress = Callable[[int, int], None]
 Prepared = tuple[Observed, Observations, tuple[str, ...]]
 
 
@@ -29,7 +29,7 @@ def compare_models(
     models: Sequence[tuple[str, ErrorModel]],
     sessions: Sequence[MeasuredSession],
     rng: np.random.Generator,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
 ) -> Comparison:
     """Say how far models are off from measured sessions, where and under which condition.
 
@@ -118,15 +118,12 @@ def _prepared(
     model: ErrorModel, cuts: tuple[UnitSession, ...], calibrated: Sequence[str]
 ) -> Prepared:
     """Return what a model leaves, what the set-up leaves of that, and where this stands."""
-    predicted = np.concatenate([predict_units(model, each) for each in cuts])
-    observed = tabulate(model, cuts, predicted)
-    units = observed.observations.n_units
-    if units < FEWEST_UNITS:
+    observed, refitted, set_ups = without_set_up(model, cuts, calibrated)
+    if refitted.n_units < FEWEST_UNITS:
         raise InputError(
-            f"{units} dwells and moments are too few to compare with, it needs {FEWEST_UNITS}"
+            f"{refitted.n_units} dwells and moments are too few to compare with, it needs "
+            f"{FEWEST_UNITS}"
         )
-    set_ups = refit_set_up(model, observed, calibrated)
-    refitted = observed.observations.with_values(refitted_values(observed, set_ups))
     return observed, refitted, tuple(each.sentence for each in set_ups)
 
 

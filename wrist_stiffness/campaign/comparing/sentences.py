@@ -275,17 +275,31 @@ def tell(observations: Observations, floor: NoiseFloor, rng: np.random.Generator
             p_value = min(1.0, FAMILIES * each.p_value)
             twins = _twins(condition, asked, constant)
             statements.append(Statement(condition, changes, p_value, each.fall / total, twins))
-    told = {each.condition.topic for each in statements if each.share >= LEAST_SHARE}
-    minor = {each.condition.topic for each in statements} - told
-    told |= minor
-    statements = [each for each in statements if each.share >= LEAST_SHARE]
-    too_short = dict.fromkeys(e.name if e.topic in told else e.topic for e in too_slow)
+    chance_of = list(zip(asked, chances.tolist(), strict=True))
+    return _by_topic(statements, chance_of, not_varied, too_slow)
+
+
+def _by_topic(
+    statements: Sequence[Statement],
+    asked: Sequence[tuple[Condition, float]],
+    not_varied: tuple[str, ...],
+    too_slow: Sequence[Condition],
+) -> Told:
+    """Sort out what is told, only named, or ruled out, each topic once.
+
+    Of conditions that entered as statements, of all that were asked with their chances (NaN for
+    none), and of those that were not asked as the recordings are too short.
+    """
+    worth = [each for each in statements if each.share >= LEAST_SHARE]
+    entered = {each.condition.topic for each in statements}
+    minor = entered - {each.condition.topic for each in worth}
+    too_short = dict.fromkeys(e.name if e.topic in entered else e.topic for e in too_slow)
     silent: dict[str, float] = {}
-    for condition, p_value in zip(asked, chances.tolist(), strict=True):
-        if condition.topic not in told | too_short.keys() and np.isfinite(p_value):
+    for condition, p_value in asked:
+        if condition.topic not in entered | too_short.keys() and np.isfinite(p_value):
             silent[condition.topic] = min(p_value, silent.get(condition.topic, 1.0))
     return Told(
-        tuple(sorted(statements, key=lambda each: -each.share)),
+        tuple(sorted(worth, key=lambda each: -each.share)),
         tuple(sorted(minor)),
         silent,
         not_varied,

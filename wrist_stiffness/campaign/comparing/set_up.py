@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.observing import Observed
+from wrist_stiffness.campaign.observing import Observed, predict_units, tabulate
 from wrist_stiffness.campaign.unit_session import UnitSession
-from wrist_stiffness.diagnosis.observations import Mask
+from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
@@ -108,7 +108,7 @@ def refit_set_up(
     tuple of SetUp
         One for each session.
     """
-    ends = np.cumsum([len(each.cut.dwell) for each in observed.sessions])
+    ends = np.cumsum([len(each) for each in observed.sessions])
     parts = np.split(observed.predicted, ends[:-1])
     free = np.ones(len(PLAUSIBLE), dtype=bool)
     for effect in calibrated:
@@ -117,6 +117,27 @@ def refit_set_up(
         _refit(model, session, predicted, free)
         for session, predicted in zip(observed.sessions, parts, strict=True)
     )
+
+
+def without_set_up(
+    model: ErrorModel, sessions: tuple[UnitSession, ...], calibrated: Sequence[str]
+) -> tuple[Observed, Observations, tuple[SetUp, ...]]:
+    """Return what a model leaves of units, what a set-up fitted anew leaves of that, and the fit.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Predicts.
+    sessions : tuple of UnitSession
+        In the order of time.
+    calibrated : sequence of str
+        As in `refit_set_up`.
+    """
+    predicted = np.concatenate([predict_units(model, each) for each in sessions])
+    observed = tabulate(model, sessions, predicted)
+    set_ups = refit_set_up(model, observed, calibrated)
+    left = observed.observations.with_values(refitted_values(observed, set_ups))
+    return observed, left, set_ups
 
 
 def refitted_values(observed: Observed, set_ups: Sequence[SetUp]) -> Array:

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import sizes
-from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
-from wrist_stiffness.campaign.observing import predict_units, tabulate
+from wrist_stiffness.campaign.comparing.set_up import without_set_up
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.model.block import Block
@@ -183,7 +182,5 @@ def _without(
     right = tuple(mistake.put_right(session) for session in sessions)
     if not all(model.accepts(session.block).all() for session in right):
         return {}
-    observed = tabulate(model, right, np.concatenate([predict_units(model, s) for s in right]))
-    set_ups = refit_set_up(model, observed, calibrated)
-    refitted = observed.observations.with_values(refitted_values(observed, set_ups))
+    _, refitted, _ = without_set_up(model, right, calibrated)
     return {key: size.rms for key, size in sizes(refitted).items()}

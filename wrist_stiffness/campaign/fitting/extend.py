@@ -313,6 +313,5 @@ def _require_signals(model: ErrorModel, effect: Effect, units: Sequence[UnitSess
     """Refuse an effect without its signals: its parameters would stay at nothing in silence."""
     for each in units:
         tried = model.with_effects().batch_with(each.block.take(slice(0, 2)), [(effect,)])[0]
-        lacking = [text for text in tried.warnings if "left out" in text]
-        if lacking:
-            raise InputError(f"{each.name}: {lacking[0].removesuffix(', left out')}")
+        if signal := tried.lacks(effect.name):
+            raise InputError(f"{each.name}: {effect.name}: {signal} is missing")

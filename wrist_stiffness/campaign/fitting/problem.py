@@ -314,7 +314,7 @@ class FitProblem:
 
     @cached_property
     def _tabulated(self) -> Observed:
-        units = sum(len(each.cut.dwell) for each in self.sessions)
+        units = sum(map(len, self.sessions))
         return tabulate(self.model, self.sessions, np.zeros((units, 6)))
 
     def rows(self, blocks: list[Array]) -> Array:

@@ -31,7 +31,8 @@ GRIDS: dict[str, tuple[float, ...]] = {
     "motor_share_percent": (0.0, 100.0),
     "hysteresis_deg": (0.0, 5.0),
 }
-"""Values to try of parameters in which a law is not linear, in the units of their names."""
+"""Values to try first of parameters in which a law is not linear, in the units of their names
+(assumed)."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,13 @@ def shares(key: str, grids: Mapping[str, tuple[float, ...]], fixed: Mapping[str,
 
 
 MASS_G, ARM_MM = 10.0, 10.0
+"""Of the trials of a weight; its effect is linear in the mass and in its first moment."""
+
+
+def first_moment(own: Mapping[str, Parameter], axis: str) -> Factor:
+    """Return a mass times its place along an axis, usually as large as both usually are."""
+    usual = own["mass_g"].scale * own[f"{axis}_mm"].scale
+    return Factor(f"moment_{axis}_gmm", plausible=usual)
 
 
 def weight(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
@@ -187,7 +195,7 @@ def weight(law: Law, place: str, signals: frozenset[str], near: Mapping[str, flo
     heavy = zero | {"mass_g": MASS_G}
     columns = [Column(factor(own["mass_g"]), heavy, MASS_G)]
     for axis in "xyz":
-        moment = Factor(f"moment_{axis}_gmm", plausible=30.0 * 20.0)
+        moment = first_moment(own, axis)
         columns.append(Column(moment, heavy | {f"{axis}_mm": ARM_MM}, MASS_G * ARM_MM, heavy))
     for key in [each for each in own if each not in ("mass_g", "x_mm", "y_mm", "z_mm")]:
         columns.append(Column(factor(own[key]), zero | {key: 100.0}, 100.0))
@@ -205,36 +213,38 @@ def weight(law: Law, place: str, signals: frozenset[str], near: Mapping[str, flo
 
 
 PLATE_MM = -12.0
+"""Along z of U, about where the shipped wrist has its plate: from there a moving mass is sought."""
 
 
 def moving_mass(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
     """Return columns of a mass moving at the plate, of its place, and of a round inertia."""
     own = {p.key: p for p in law.parameters(place)}
-    at_plate = {"mass_g": 50.0, "x_mm": 0.0, "y_mm": 0.0, "z_mm": PLATE_MM, "inertia_gmm2": 0.0}
+    mass, inertia = own["mass_g"].scale, own["inertia_gmm2"].scale
+    at_plate = {"mass_g": mass, "x_mm": 0.0, "y_mm": 0.0, "z_mm": PLATE_MM, "inertia_gmm2": 0.0}
     nothing = at_plate | {"mass_g": 0.0}
     columns = [
-        Column(factor(own["mass_g"]), at_plate, 50.0),
+        Column(factor(own["mass_g"]), at_plate, mass),
         *(
             Column(
-                Factor(f"moment_{a}_gmm", plausible=50.0 * 20.0),
+                first_moment(own, a),
                 at_plate | {f"{a}_mm": at_plate[f"{a}_mm"] + 1.0},
-                50.0,
+                mass,
                 at_plate,
             )
             for a in "xyz"
         ),
-        Column(factor(own["inertia_gmm2"]), nothing | {"inertia_gmm2": 1e4}, 1e4),
+        Column(factor(own["inertia_gmm2"]), nothing | {"inertia_gmm2": inertia}, inertia),
     ]
 
     def start(found: Mapping[str, float], at: Shape) -> Values:
-        mass = max(found["mass_g"], 1.0)
+        moved = max(found["mass_g"], 1.0)
         arm = {
             f"{a}_mm": _clipped(
-                own[f"{a}_mm"], at_plate[f"{a}_mm"] + found[f"moment_{a}_gmm"] / mass
+                own[f"{a}_mm"], at_plate[f"{a}_mm"] + found[f"moment_{a}_gmm"] / moved
             )
             for a in "xyz"
         }
-        return {"mass_g": mass, **arm, "inertia_gmm2": max(found["inertia_gmm2"], 0.0)}
+        return {"mass_g": moved, **arm, "inertia_gmm2": max(found["inertia_gmm2"], 0.0)}
 
     return Recipe((), lambda at: tuple(columns), start)
 
@@ -244,6 +254,7 @@ def _clipped(parameter: Parameter, value: float) -> float:
 
 
 ORDERS = tuple(3.0 + 1.2 * i for i in range(40))
+"""Waves a turn that are tried first (assumed): a search goes on between two of them."""
 
 
 def gear(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float]) -> Recipe:
@@ -266,6 +277,7 @@ def gear(law: Law, place: str, signals: frozenset[str], near: Mapping[str, float
 
 
 GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
+"""Gaps that are tried first, of both signs (assumed)."""
 
 SPECIAL: dict[str, Maker] = {
     "gravity": weight,

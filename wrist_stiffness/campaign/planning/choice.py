@@ -32,7 +32,6 @@ def choose(
     rng: np.random.Generator,
     looked_at: int = LOOKED_AT,
     per_second: bool = True,
-    progress: Callable[[int, int], None] | None = None,
 ) -> list[int]:
     """Choose settings.
 
@@ -56,8 +55,6 @@ def choose(
         How many settings are compared in each step.
     per_second : bool
         Whether short ones are preferred; else as few as possible are chosen.
-    progress : callable, optional
-        Called with (seconds planned, budget).
 
     Returns
     -------
@@ -79,8 +76,6 @@ def choose(
         chosen.append(best)
         total += grams[best]
         spent += float(cost_s[best])
-        if progress is not None:
-            progress(int(spent), int(budget_s))
     return _exchanged(chosen, grams, cost_s, total, budget_s - spent, utility, rng)
 
 

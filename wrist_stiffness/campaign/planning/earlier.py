@@ -9,10 +9,8 @@ import numpy as np
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.planning.timeline import Experiment
 from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.campaign.units import COUNTS
 from wrist_stiffness.model.error_model import ErrorModel
-
-SAME_COUNTS = 1.5
-"""Encoder counts by which a motor at rest may seem to turn."""
 
 
 def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
@@ -43,7 +41,7 @@ def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
     last = np.append(np.diff(parts.unit[order]) != 0, True)
     rows = order[last]
     moving = ~parts.dwell[parts.unit[rows]]
-    limit = SAME_COUNTS * model.table.geometry.limits.encoder_step
+    limit = COUNTS * model.table.geometry.limits.encoder_step
     turned = np.any(np.abs(np.diff(parts.block.theta, axis=0)) > limit, axis=1)
     motions = np.append(0, np.cumsum(turned))[rows]
     visit = np.unique(motions, return_inverse=True)[1]

@@ -21,9 +21,6 @@ instead."""
 SENSOR_STEP = 0.01
 """Registrations are plausible by the millimetre, where they compose on no straight line."""
 
-MISSING = " is missing, left out"
-"""How the model's warning about an absent signal ends."""
-
 
 @dataclass(frozen=True, eq=False)
 class Signature:
@@ -131,13 +128,7 @@ def _signature(model: ErrorModel, block: Block, sets: Sequence[Effect]) -> Signa
     else:
         changes = [each.measured - without.measured for each in further[len(moved) :]]
         truths = np.stack(changes, axis=-1)
-    announced = f"{first.name}: "
-    lacks = [
-        warning.removeprefix(announced).removesuffix(MISSING)
-        for warning in at_base.warnings
-        if warning.startswith(announced) and warning.endswith(MISSING)
-    ]
-    return Signature(first, columns, truths, "".join(lacks[:1]))
+    return Signature(first, columns, truths, at_base.lacks(first.name))
 
 
 def _step(parameter: Parameter, base: Effect, linear: bool) -> float:

@@ -21,6 +21,9 @@ LINES = {"--": "dashed", ":": "dotted", "-.": "dash-dotted"}
 MOST_SESSIONS = 6
 """Time lines of more sessions would be too small to read."""
 
+MOST_LETTERS = 28
+"""Of a name beside a bar or above a plot; of a longer one the end is shown, where paths differ."""
+
 
 @dataclass(frozen=True)
 class Bars:
@@ -198,5 +201,5 @@ def draw_time_line(
     return figure
 
 
-def _shortened(name: str, most: int = 28) -> str:
-    return name if len(name) <= most else f"…{name[1 - most :]}"
+def _shortened(name: str) -> str:
+    return name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}"

@@ -1,0 +1,71 @@
+"""Where the fit of a new effect begins: near what is there, from the base's residuals alone."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.fitting.fit import fit
+from wrist_stiffness.campaign.fitting.free_effects import free_all
+from wrist_stiffness.campaign.fitting.problem import FitProblem
+from wrist_stiffness.campaign.fitting.start_search import start_values
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law
+
+SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
+POSES = 60
+
+
+def base_of(model, hidden):
+    """Fit registrations alone to poses measured on a wrist that has one effect more."""
+    rng = np.random.default_rng(5)
+    theta = np.radians(rng.uniform(-30.0, 30.0, (POSES, 2)))
+    load = rng.normal(size=(POSES, 6)) * np.repeat([0.5, 0.01], 3)
+    block = Block(2.0 * np.arange(POSES), theta, load)
+    true = model.with_effects(hidden).batch(block).measured
+    rotation, shift = exp_twist(true + SIGMA * rng.normal(size=(POSES, 6)))
+    nominal = model.table.mechanism.forward(theta).platform
+    session = MeasuredSession("day", block, shift, rotation @ nominal, np.diag(SIGMA**2))
+    frame = free_all(Effect(find_law("measurement_frame"), "pose_sensor"), per_session=True)
+    return fit(FitProblem(model, (as_units(model, session),), (frame,)))
+
+
+@pytest.mark.parametrize(
+    ("law", "place", "key", "size"),
+    [
+        ("link_stiffness", "link_1", "flexibility_percent", 100.0),
+        ("link_stiffness", "link_1", "flexibility_percent", -50.0),
+        ("backlash", "motor_2", "width_mdeg", 60.0),
+    ],
+)
+def test_a_law_begins_near_its_true_value(model, law, place, key, size):
+    hidden = Effect(find_law(law), place).with_values({key: size})
+    found = start_values(base_of(model, hidden), Effect(find_law(law), place))
+    assert found[key] == pytest.approx(size, rel=0.25)
+
+
+def test_a_shape_begins_at_the_point_of_its_grid_that_explains_most(model):
+    hidden = Effect(find_law("transmission_error"), "motor_1").with_values(
+        {"order": 13.8, "cos_mdeg": 30.0}
+    )
+    found = start_values(base_of(model, hidden), Effect(hidden.law, "motor_1"))
+    assert found["order"] == pytest.approx(13.8)
+    assert found["cos_mdeg"] == pytest.approx(30.0, rel=0.2)
+
+
+@pytest.mark.parametrize(("typed", "nearest"), [(1.0, 3.0), (-10.0, 3.0)])
+def test_a_formula_begins_at_the_best_multiple_of_what_was_typed(model, typed, nearest):
+    """It has no prior that would say how large it is, nor of which sign."""
+
+    def sag(size):
+        law = FormulaLaw(
+            "sag", "platform", np.eye(6)[2], "sag_um * sin(2 * theta_1)", [], ["sag_um"]
+        )
+        return Effect(law, "platform", {"sag_um": Estimate(size)})
+
+    found = start_values(base_of(model, sag(3.2)), sag(typed))
+    assert found["sag_um"] == pytest.approx(nearest)
