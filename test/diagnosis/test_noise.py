@@ -101,6 +101,20 @@ def test_what_repeats_have_in_common_is_no_scatter_however_they_are_weighted(rng
     assert total_variance(noise, table) == pytest.approx(1.0, rel=0.5)
 
 
+def test_loads_that_hardly_repeat_do_not_use_up_what_the_side_of_approach_needs(rng):
+    """Each row comes from one of two sides; a hundred columns differ by little of them."""
+    condition = np.repeat(np.arange(12), 3)
+    side = np.where(np.arange(36) % 3 == 0, 1.0, -1.0)[:, None]
+    loads = rng.normal(size=(12, 100))[condition] + 3e-4 * rng.normal(size=(36, 100))
+    loads = np.broadcast_to(loads[:, None], (36, 3, 100))
+    backlash = (side * [1.0, 0.0, 0.0])[:, :, None]
+    values = 30.0 * backlash[:, :, 0] + rng.normal(size=(36, 3))
+    table = Observations(values, {}, replicate=condition)
+    found, _ = replicate_variance(values, np.concatenate([loads, backlash], axis=2), table)
+    # Of the 900 of the side hardly anything is left beside the noise of 1.
+    assert found.max() < 4.0
+
+
 def test_a_component_that_was_never_measured_does_not_change_the_replicate_floor(rng):
     """What candidates take of the differences is taken from those that were measured."""
     values = rng.normal(size=(60, 2))

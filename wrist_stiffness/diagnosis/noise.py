@@ -75,8 +75,13 @@ def replicate_variance(
     freedom = np.maximum(count - 1, 0).sum(axis=0)
 
     rows = inside.reshape(-1, stacked.shape[2])
-    original = np.linalg.norm(stacked.reshape(rows.shape), axis=0)
-    basis = orthonormal(rows[:, :-1], original[:-1])[:, : int(RICH_SHARE * freedom.sum())]
+    whole = np.linalg.norm(stacked.reshape(rows.shape)[:, :-1], axis=0)
+    # Each counts by what of it differs inside: a load never repeats exactly, and hundreds of
+    # columns of its noise would use up the freedom that those of backlash need.
+    directions, strength, _ = np.linalg.svd(
+        rows[:, :-1] / np.where(whole > 0.0, whole, 1.0), full_matrices=False
+    )
+    basis = directions[:, strength > ABSORBED][:, : int(RICH_SHARE * freedom.sum())]
     left = rows[:, -1] - basis @ (basis.T @ rows[:, -1])
     seen = observations.measured.any(axis=0)
     freedom = freedom - basis.shape[1] / seen.sum()
