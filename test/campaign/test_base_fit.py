@@ -1,16 +1,21 @@
 """The base alone: it ends at the noise from any wrong base, and tolerances are its limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.searching.base_fit import fit_base, free_base
 from wrist_stiffness.campaign.searching.base_problem import SILENT
+from wrist_stiffness.campaign.searching.taken_up import taken_up
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.effect import Effect, Estimate
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
+
+FRAME = "measurement_frame@pose_sensor"
 
 
 @pytest.mark.slow
@@ -36,6 +41,21 @@ def test_what_changes_nothing_has_no_column(model, in_the_cell):
     assert length[names.index("axis_misalignment@joint_3 shift_v_um")] == 0.0
     assert ((length == 0.0) | (length > SILENT)).all()
     assert np.count_nonzero(length) > 0.9 * len(length)
+
+
+def test_of_a_base_is_told_what_it_moved_of_what_was_measured(model, in_the_cell):
+    """A single gauge sees one direction and no turn."""
+    settings = CellSettings(rate_hz=10.0, program_seconds=30.0, program_seed=101, base="wrong")
+    session = in_the_cell(model.table, settings, 1)
+    shift = np.where([False, False, True], session.shift, np.nan)
+    gauge = replace(session, shift=shift, rotation=np.full_like(session.rotation, np.nan))
+    found = fit_base(model, (as_units(model, gauge),))
+    told = {each.name: each for each in taken_up(found, ["day"])}[f"{FRAME} in day"]
+    assert " of phi" not in told.sentence
+    free, unknowns = found.problem.free, found.problem.unknowns
+    frame = [n for n, u in enumerate(unknowns) if free[u.free].effect.name == FRAME]
+    moved = found.columns[:, 2, frame] @ found.z[frame]
+    assert told.moved == {"s": pytest.approx(1e6 * np.sqrt(np.mean(moved**2)))}
 
 
 def test_tolerances_are_limits_within_which_parts_are_evenly_spread(model):

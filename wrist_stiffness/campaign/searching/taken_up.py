@@ -24,7 +24,8 @@ class TakenUp:
     name : str
         Effect and place, and the session where it is set up anew in each.
     moved : dict of str to float
-        Root mean square by which it moved the prediction, by quantity, in the unit of its report.
+        Root mean square by which it moved the prediction of what was measured, by quantity, in the
+        unit of its report.
     parameter : str
         Of a tolerance: the parameter that went furthest; empty for what has no prior.
     value, deviations : float
@@ -40,7 +41,10 @@ class TakenUp:
     @property
     def sentence(self) -> str:
         """One line for a person."""
-        sizes = ", ".join(f"{self.moved[q.name]:.2f} {q.unit} of {q.name}" for q in QUANTITIES)
+        units = {q.name: q.unit for q in QUANTITIES}
+        sizes = ", ".join(
+            f"{size:.2f} {units[name]} of {name}" for name, size in self.moved.items()
+        )
         if not self.parameter:
             return f"{self.name}: {sizes}"
         return (
@@ -71,12 +75,9 @@ def taken_up(base: BaseFit, sessions: Sequence[str]) -> tuple[TakenUp, ...]:
 
 def _one(base: BaseFit, name: str, places: list[int]) -> TakenUp:
     twist = base.columns[:, :, places] @ base.z[places]
-    moved = {
-        q.name: float(
-            q.per_si * np.sqrt(np.mean(np.sum(twist[:, list(q.components)] ** 2, axis=1)))
-        )
-        for q in QUANTITIES
-    }
+    table = base.problem.table
+    sizes = table.rms(twist**2)
+    moved = {q.name: sizes[q.key] for q in table.reported}
     known = [place for place in places if np.isfinite(base.prior_std[place])]
     if not known:
         return TakenUp(name, moved)
