@@ -68,6 +68,17 @@ def test_an_effect_outside_the_catalogue_is_unknown(arm, rng):
     assert result.unexplained.depends_on
 
 
+def test_of_what_an_effect_explains_is_said_where_and_beyond_what(rng):
+    """Noise as large as the effect stays in the error, and is no part of that share."""
+    table = plain(rng)
+    table = table.with_values(table.values + 1.5 * table.covariate("x")[:, None])
+    result = diagnose(table, (line("x"), line("z")), (offset(),), rng, QUICK)
+    (finding,) = result.findings
+    share = "where it was fitted it explains 100.0 % of what the rest of the model leaves above the"
+    assert f"{share} noise" in finding.evidence
+    assert result.after["value_si"] > 0.5 * result.before["value_si"]
+
+
 def test_noise_alone_misses_nothing(rng):
     result = diagnose(plain(rng), (line("x"), line("z"), line("w")), (offset(),), rng, QUICK)
     assert result.verdict == "none"

@@ -137,7 +137,10 @@ def _told(own: Ranked) -> str:
     candidate = own.hypothesis.candidate
     misfit = own.remaining / (own.remaining + own.gain)
     sentence = candidate.evidence or f"{candidate.effect} at {candidate.component}"
-    sentence += f": explains {100 * (1 - misfit):.1f} % of what the rest of the model leaves"
+    sentence += (
+        f": where it was fitted it explains {100 * (1 - misfit):.1f} % of what the rest of the "
+        "model leaves above the noise"
+    )
     if misfit > 0:
         sentence += f"; what remains is {100 * np.sqrt(misfit):.0f} % of its size"
     return sentence
