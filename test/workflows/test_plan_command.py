@@ -112,7 +112,8 @@ def test_table_summary_picture_and_json_belong_together(folder, rows):
 def test_an_existing_folder_is_refused_before_any_work(folder, capsys):
     arguments = [*files(folder), "-o", str(folder / "next")]
     assert main(["plan", *arguments]) == 2
-    assert "exists already and is not overwritten" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "exists already and is not overwritten; choose another name or remove it" in error
 
 
 def test_nothing_is_left_where_the_plan_cannot_be_written(tmp_path, capsys):

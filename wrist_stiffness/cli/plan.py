@@ -104,7 +104,9 @@ def _run(arguments: argparse.Namespace) -> int:
     if not output.resolve().parent.is_dir():
         raise InputError(f"{output} cannot be written: its folder does not exist")
     if output.exists():
-        raise InputError(f"{arguments.output} exists already and is not overwritten")
+        raise InputError(
+            f"{output} exists already and is not overwritten; choose another name or remove it"
+        )
     options = Options(
         arguments.minutes,
         speed_deg_per_s=arguments.speed,

@@ -117,7 +117,10 @@ class RecordingWriter:
         if not self.path.exists():
             return
         if not self._overwrite:
-            raise RecordingError(f"{self.path} exists already and is not overwritten")
+            raise RecordingError(
+                f"{self.path} exists already and is not overwritten; choose another name or remove "
+                "it"
+            )
         if self.path.is_dir() != self._is_folder or not is_only_recording(self.path):
             raise RecordingError(f"{self.path} is not only a recording and is never overwritten")
 

@@ -178,7 +178,9 @@ def _require_place(output: Path, overwrite: bool) -> None:
     if not output.is_file():
         return
     if not overwrite:
-        raise InputError(f"{output} exists already and is not overwritten")
+        raise InputError(
+            f"{output} exists already and is not overwritten; choose another name or remove it"
+        )
     try:
         with output.open("rb") as old:
             head = old.readline(LONGEST_HEAD)

@@ -258,7 +258,9 @@ def write_plan(model: ErrorModel, planned: Planned, folder: str | Path) -> None:
     if timeline is None:
         raise InputError(f"{folder}: there is no experiment to write")
     if folder.exists():
-        raise InputError(f"{folder} exists already and is not overwritten")
+        raise InputError(
+            f"{folder} exists already and is not overwritten; choose another name or remove it"
+        )
     partial = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     try:
         partial.mkdir()
