@@ -10,6 +10,7 @@ import pytest
 
 from wrist_stiffness.cli import simulate as command
 from wrist_stiffness.cli.main import main
+from wrist_stiffness.cli.simulate import in_usual_units
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording, read_samples, topics
@@ -167,6 +168,20 @@ def test_blind_recording_is_opened_by_its_seed_alone(wrist, tmp_path, capsys):
     key = json.loads((tmp_path / "key.json").read_text())
     assert key["effect"] in CATALOGUE
     assert told.startswith(f"{key['effect']}@{key['component']} ({key['form']})")
+
+
+@pytest.mark.parametrize(
+    ("magnitude", "si", "told"),
+    [
+        (0.005756, "rad", "329.8 mdeg"),
+        (8e-6, "m", "8 um"),
+        (2e-6, "m/N", "2 um/N"),
+        (0.2, "-", "0.2"),
+        (1e-5, "1/K", "1e-05 1/K"),
+    ],
+)
+def test_a_secret_is_told_in_the_units_of_a_diagnosis(magnitude, si, told):
+    assert in_usual_units(magnitude, si) == told
 
 
 def test_another_day_is_of_the_same_wrist_and_effect(wrist, tmp_path, monkeypatch, capsys):

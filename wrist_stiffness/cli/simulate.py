@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from math import pi
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
@@ -38,6 +39,9 @@ DRAWN_FOR = (
     "base",
 )
 """Options with which a secret is drawn; with others it is another one, in size or altogether."""
+
+USUAL_UNITS = {"rad": (180e3 / pi, "mdeg"), "m": (1e6, "um"), "kg": (1e3, "g"), "s": (1e3, "ms")}
+"""Factor and name of the units in which models and diagnoses speak, by that of SI."""
 
 
 def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
@@ -195,8 +199,9 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     if arguments.json:
         write_json(arguments.json, {"size": secret.size, **asdict(hidden)})
     print(
-        f"{hidden.effect}@{hidden.component} ({hidden.form}): {hidden.magnitude:.4g} "
-        f"{ALL[hidden.effect].unit}, size {secret.size:.3g} times the noise of one sample"
+        f"{hidden.effect}@{hidden.component} ({hidden.form}): "
+        f"{in_usual_units(hidden.magnitude, ALL[hidden.effect].unit)}, size {secret.size:.3g} "
+        "times the noise of one sample"
     )
     if hidden.effect in {law for law, _ in SET_UP}:
         print("every session sets this up anew: the right diagnosis is that nothing is missing")
@@ -204,3 +209,10 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     told = (f"--{n.replace('_', '-')} {value}" for n, value in values.items() if value is not None)
     print(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(told)}")
     return EXIT_DONE
+
+
+def in_usual_units(magnitude: float, si: str) -> str:
+    """Return a magnitude in the units that a diagnosis speaks; what has none stays a number."""
+    head, per, rest = si.partition("/")
+    factor, unit = USUAL_UNITS.get(head, (1.0, head))
+    return f"{factor * magnitude:.4g} {unit}{per}{rest}".removesuffix(" -")
