@@ -137,6 +137,12 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
     assert FleetComparison(rows[1:]).lines()[-1] == "b  not compared: no recording"
 
 
+@pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])
+def test_a_fleet_names_each_recording_once(error):
+    rows = (FleetRow(Path("b/c.mcap"), None, error),)
+    assert FleetComparison(rows).lines()[-1] == "b/c.mcap  not compared: no pose"
+
+
 @pytest.mark.slow
 def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
     pytest.importorskip("distributed", reason="the extra fleet")

@@ -39,7 +39,8 @@ class FleetComparison:
         ]
         for row in self.rows:
             if row.result is None:
-                out.append(f"{row.path!s:{wide}}  not compared: {row.error}")
+                reason = row.error.removeprefix(f"{row.path}: ").removeprefix(f"{row.path} ")
+                out.append(f"{row.path!s:{wide}}  not compared: {reason}")
             else:
                 out.append(f"{row.path!s:{wide}}{_cells(row.result)}")
         mistakes = [
