@@ -148,7 +148,8 @@ def test_where_the_sensor_stands_is_no_reason_why_the_platform_is_off(loaded, ma
     )
     (note,) = (text for text in found.warnings if "pose_sensor" in text)
     assert "(measurement_frame@pose_sensor, target_mounting@pose_sensor) say where it" in note
-    pose = [0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    rigid = loaded.table.mechanism.forward(POSE).platform
+    pose = [0.001, 0.0, 0.0, *Rotation.from_matrix(rigid).as_quat()]
     measured = explain(tmp_path / "m.yaml", POSE.tolist(), LOAD, measured=pose)
     assert sum("pose_sensor" in row.name for row in measured.rows) == 2
     assert not any("pose_sensor" in text for text in measured.warnings)
@@ -186,6 +187,7 @@ def test_command_prints_a_table_and_writes_json(model_path, tmp_path, capsys):
         (["--load", "1"], "--load takes 3 or 6 numbers, not 1"),
         (["--measured", "0", "0", "0", "0", "0", "0", "2"], "length 2.0000, not 1"),
         (["--measured", "nan", "0", "0", "0", "0", "0", "1"], "all finite"),
+        (["--measured", "0", "0", "0", "0", "0", "0.2", "0.98"], "23.1 deg (limit 5 deg)"),
         (["--measured", "300", "0", "0", "0", "0", "0", "1"], "more than 100 mm"),
         (["--temperature", "link1=25"], "temperature of 'link1': no such place"),
         (["--temperature", "link_1=warm"], "--temperature link_1=warm: write NAME=NUMBER"),
@@ -199,6 +201,22 @@ def test_bad_input_is_one_line(model_path, capsys, extra, text):
     error = capsys.readouterr().err
     assert text in error
     assert error.count("\n") == 1
+
+
+def test_a_covariate_that_nothing_uses_is_told(model, tmp_path):
+    """Either of two that a law uses is missed; a misspelt one would be, too."""
+    save_model(model, tmp_path / "m.yaml")
+    text = (tmp_path / "m.yaml").read_text()
+    formula = (
+        "effects:\n"
+        "- {effect: formula, id: sag, component: link_2, direction: [0, 0, 0, 1, 0, 0],\n"
+        "   expression: 'sag_mdeg * clamp * wind', covariates: [clamp, wind],\n"
+        "   parameters: {sag_mdeg: 2.0}}"
+    )
+    (tmp_path / "m.yaml").write_text(text.replace("effects: []", formula))
+    given = {"clamp": 1.0, "wind": 2.0, "clmap": 1.0}
+    found = explain(tmp_path / "m.yaml", POSE.tolist(), LOAD, covariates=given)
+    assert found.warnings == ("covariate clmap: no effect of the model uses it",)
 
 
 def test_measured_pose_needs_seven_numbers(model_path):

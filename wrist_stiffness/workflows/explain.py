@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.reading.refusals import OTHER_GEOMETRY
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
@@ -174,6 +175,11 @@ def explain(
                 "the platform is: they count with --measured only"
             )
     parts = budget(error_model, sample)
+    notes += [
+        f"covariate {name}: no effect of the model uses it"
+        for name in sample.covariates
+        if budget(error_model, _without(name, sample)).warnings == parts.warnings
+    ]
     past = [effect for effect in error_model.effects if effect.name in parts.remembering]
     if past:
         notes.append(
@@ -186,6 +192,11 @@ def explain(
     }
     total = parts.measured if measured is None else measured_twist(measured, parts.platform)
     return _explained(parts, total, measured is not None, meanings, notes)
+
+
+def _without(covariate: str, sample: Sample) -> Sample:
+    kept = {name: value for name, value in sample.covariates.items() if name != covariate}
+    return replace(sample, covariates=kept)
 
 
 def measured_twist(pose: Sequence[float], platform: Array) -> Array:
@@ -206,8 +217,8 @@ def measured_twist(pose: Sequence[float], platform: Array) -> Array:
     Raises
     ------
     InputError
-        If a number is not finite, the point is farther from O than any wrist bends, or the
-        quaternion is not of unit length.
+        If a number is not finite, the point is farther from O than any wrist bends, the
+        quaternion is not of unit length, or the rotation is one that no effect explains.
     """
     values = np.array(pose, dtype=float)
     if values.shape != (7,) or not np.isfinite(values).all():
@@ -224,7 +235,16 @@ def measured_twist(pose: Sequence[float], platform: Array) -> Array:
             f"(within {QUATERNION_TOLERANCE:g})"
         )
     rotation = Rotation.from_quat(values[3:]).as_matrix() @ platform.T
-    return log_motion(rotation, values[:3])
+    twist = log_motion(rotation, values[:3])
+    off = float(np.linalg.norm(twist[3:]))
+    if off > OTHER_GEOMETRY:
+        raise InputError(
+            f"measured pose: its rotation is {np.degrees(off):.1f} deg (limit "
+            f"{np.degrees(OTHER_GEOMETRY):g} deg) from what the motor angles say; is it that of "
+            "the platform in wrist_base, with the quaternion in the order x y z w, and are the "
+            "angles those of motor 1, then motor 2?"
+        )
+    return twist
 
 
 def _explained(
