@@ -4,6 +4,17 @@ A message is one line that names the value, the place and the limit.  The comman
 `WristError` into that line and exit code 2; a node turns it into a diagnostic and a safe output.
 """
 
+import re
+
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+
+
+def with_a_point(text: str) -> str:
+    """Return what to say, behind what is wrong, of a number with a decimal comma; empty if none."""
+    if not DECIMAL_COMMA.fullmatch(text.strip()):
+        return ""
+    return f": write {text.strip().replace(',', '.')}, with a decimal point"
+
 
 class WristError(Exception):
     """Base of all errors that have an answer outside the code."""

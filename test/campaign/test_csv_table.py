@@ -198,6 +198,7 @@ def changed(row, column, value):
     ("text", "reason"),
     [
         (changed(4, "fx_N", "o.5"), r"row 4, column fx_N: 'o\.5' is no number"),
+        (changed(4, "fx_N", '"-5,9e-05"'), r"'-5,9e-05' is no number: write -5\.9e-05, with a dec"),
         (changed(3, "motor_2_deg", ""), "row 3, column motor_2_deg: blank"),
         (changed(7, "x_mm", "nan"), "row 7, column x_mm: 'nan' is not finite"),
         (changed(4, "motor_1_deg", "400"), "row 4, column motor_1_deg: 400 is outside -360 to 360"),

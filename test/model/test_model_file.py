@@ -186,6 +186,12 @@ def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
             "1e1",
             "clearance_um: '1e1' is not a finite number: YAML takes it for a text, write 10.0",
         ),
+        (
+            "{clearance_um: [12.1, 0.4]}",
+            "\n      clearance_um: 0,33",
+            "clearance_um: '0,33' is not a finite number: write 0.33, with a decimal point",
+        ),
+        ("component: joint_3\n", "component: joint_3\n  33:\n", "key 33: numbers have a decimal"),
         ("effects:\n", "effects: 3\nx:\n", "3 is not a list"),
         ("component: joint_3\n", "component: joint_3\n  color: red\n", "unknown key color"),
         ("- effect: joint_clearance", "- 7\n- effect: joint_clearance", r"effects\[0\]: 7 is not"),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from wrist_stiffness.errors import WristError
+from wrist_stiffness.errors import WristError, with_a_point
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import unit
 
@@ -200,7 +200,11 @@ class Block:
     def no_more_keys(self) -> None:
         """Check that no key was left unread."""
         if unknown := set(self.values) - self._used:
-            raise self._error(f"{self.place}: unknown key {', '.join(sorted(map(str, unknown)))}")
+            # Within braces, `0,33` is the number 0 and a key 33.
+            comma = any(isinstance(key, int) for key in unknown)
+            hint = ": numbers have a decimal point, no comma" if comma else ""
+            names = ", ".join(sorted(map(str, unknown)))
+            raise self._error(f"{self.place}: unknown key {names}{hint}")
 
     def _check_source(self, source: Any) -> None:
         by_key = source if isinstance(source, Mapping) else {"rest": source}
@@ -232,6 +236,8 @@ def _as_number(value: Any) -> str:
 
     It wants a point and the sign of the exponent (https://yaml.org/type/float.html).
     """
+    if isinstance(value, str) and (hint := with_a_point(value)):
+        return hint
     try:
         number = float(value) if isinstance(value, str) else np.nan
     except ValueError:

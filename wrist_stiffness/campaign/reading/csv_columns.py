@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation
 from math import inf
 
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, with_a_point
 
 TIME = "time_s"
 MOTORS = ("motor_1_deg", "motor_2_deg")
@@ -176,7 +176,7 @@ def reader_of(column: str) -> Callable[[str], float]:
         try:
             exact = Decimal(text.strip())
         except InvalidOperation as error:
-            raise ValueError(f"{text!r} is no number") from error
+            raise ValueError(f"{text!r} is no number{with_a_point(text)}") from error
         if not exact.is_finite():
             raise ValueError(f"{text!r} is not finite")
         if not lower <= exact <= upper:
@@ -220,7 +220,7 @@ def nanoseconds(text: str) -> int:
     try:
         exact = EXACT.multiply(Decimal(text.strip()), NANOSECONDS)
     except InvalidOperation as error:
-        raise ValueError(f"{text!r} is no number") from error
+        raise ValueError(f"{text!r} is no number{with_a_point(text)}") from error
     if not exact.is_finite() or exact != exact.to_integral_value():
         raise ValueError(f"{text!r} is no whole number of nanoseconds")
     return int(exact)
