@@ -11,11 +11,14 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import mistake_in
 from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING
-from wrist_stiffness.campaign.fitting.free_effects import unfitted
+from wrist_stiffness.campaign.fitting.free_effects import answering_as, unfitted
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.refitted import ANSWERS_LOAD
 from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
+from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.workflows.compare import remarks_of
 from wrist_stiffness.workflows.fit_report import TITLES, plus_minus
@@ -45,6 +48,9 @@ SEED = 0
 
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""
+
+FAR_FROM_DRAWN = 3.0
+"""Standard deviations of its prior at which a part is softer or stiffer than any is built."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,10 +177,7 @@ def diagnose_recordings(
     known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
     rng = np.random.default_rng(SEED)
     answer = diagnose_sessions(known, list(sessions.values()), rng, tell=tell)
-    mistake = ""
-    if _leaves_much(answer.diagnosis):
-        tell("asking for wrong signs, units and names")
-        mistake = mistake_in(known, list(sessions.values()), rng)
+    mistake = mistake_beside(known, answer, list(sessions.values()), rng, tell)
     hashes = sha256_by_name(sessions)
     return Diagnosed(
         answer,
@@ -185,10 +188,54 @@ def diagnose_recordings(
     )
 
 
+def mistake_beside(
+    known: ErrorModel,
+    answer: WristDiagnosis,
+    sessions: Sequence[MeasuredSession],
+    rng: np.random.Generator,
+    tell: Callable[[str], None] = lambda text: None,
+) -> str:
+    """Return the mistake of signs, units or names that an answer makes likely; empty for none.
+
+    Parameters
+    ----------
+    known : ErrorModel
+        What the diagnosis began with.
+    answer : WristDiagnosis
+        What was found.
+    sessions : sequence of MeasuredSession
+        In which.
+    rng : numpy.random.Generator
+        For the noise floor.
+    tell : callable, optional
+        Told what is being done.
+    """
+    mistake = ""
+    if _leaves_much(answer.diagnosis):
+        tell("asking for wrong signs, units and names")
+        mistake = mistake_in(known, sessions, rng)
+    if not mistake and _doubts_load(answer):
+        # Axes that are off their drawing hide a wrong load, and so do parts that it made as stiff
+        # as they can be: so it is asked with the axes as fitted and the stiffness of before.
+        tell("asking for a wrong load")
+        fitted = known.with_effects(*answer.base.effects(0))
+        mistake = mistake_in(answering_as(known, fitted), sessions, rng)
+    return mistake
+
+
 def _leaves_much(result: Diagnosis) -> bool:
     """Tell whether so much is left that a mistake of the set-up is looked for."""
     floor = result.noise_floor
     return any(error > WORTH_ASKING * floor[key] for key, error in result.after.items())
+
+
+def _doubts_load(answer: WristDiagnosis) -> bool:
+    """Tell whether the wrist answers loads so unusually that these may be wrong."""
+    named = {law for finding in answer.diagnosis.findings for law, _ in finding.members}
+    far = {
+        each.name.partition("@")[0] for each in answer.absorbed if each.deviations > FAR_FROM_DRAWN
+    }
+    return not ANSWERS_LOAD.isdisjoint(named | far)
 
 
 def _table(result: Diagnosis) -> list[str]:
