@@ -124,9 +124,10 @@ def test_each_session_has_its_own_set_up(model):
     assert [line.split(":")[0] for line in compared.absorbed] == ["day", "next day"]
 
 
-def test_too_few_dwells_are_refused(model):
-    few = session(model).take(slice(0, 100))
-    with pytest.raises(InputError, match="dwells and moments are too few to compare with"):
+def test_too_few_dwells_are_refused_and_why_there_are_no_more(model):
+    few = replace(session(model).take(slice(0, 100)), remarks=("cut at byte 44",))
+    reason = r"^day: \d+ dwells and moments are too few to compare with, .*; cut at byte 44$"
+    with pytest.raises(InputError, match=reason):
         compare_models([("m", model)], [few], np.random.default_rng(0))
 
 

@@ -65,7 +65,7 @@ def compare_models(
             raise InputError(
                 f"model {name} is of another wrist than {models[0][0]}: its axes differ"
             )
-        tables.append(_prepared(model, cuts, calibrated))
+        tables.append(_prepared(model, sessions, cuts, calibrated))
         progress(number + 1, steps)
     left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
     floor = noise_floor(left)
@@ -109,20 +109,26 @@ def mistake_in(
     """
     cuts = tuple(as_units(model, session) for session in sessions)
     calibrated = said_calibrated(sessions)
-    _, refitted, _ = _prepared(model, cuts, calibrated)
+    _, refitted, _ = _prepared(model, sessions, cuts, calibrated)
     floor = noise_floor(refitted.with_values(held_out_process(refitted, rng)))
     return told_mistake(model, cuts, calibrated, refitted, floor.rms(refitted))
 
 
 def _prepared(
-    model: ErrorModel, cuts: tuple[UnitSession, ...], calibrated: Sequence[str]
+    model: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    cuts: tuple[UnitSession, ...],
+    calibrated: Sequence[str],
 ) -> Prepared:
     """Return what a model leaves, what the set-up leaves of that, and where this stands."""
     observed, refitted, set_ups = without_set_up(model, cuts, calibrated)
     if refitted.n_units < FEWEST_UNITS:
+        names = ", ".join(session.name for session in sessions)
+        # A recording that was cut short says so itself.
+        why = "".join(f"; {remark}" for session in sessions for remark in session.remarks)
         raise InputError(
-            f"{refitted.n_units} dwells and moments are too few to compare with, it needs "
-            f"{FEWEST_UNITS}"
+            f"{names}: {refitted.n_units} dwells and moments are too few to compare with, it needs "
+            f"{FEWEST_UNITS}{why}"
         )
     return observed, refitted, tuple(each.sentence for each in set_ups)
 

@@ -44,12 +44,13 @@ def require_units(problem: FitProblem, aside: int = 0) -> None:
     Raises
     ------
     InputError
-        With the number of units and the least one.
+        With the sessions, the number of units and the least one.
     """
     units = problem.table.n_units - aside
     if units < FEWEST_UNITS:
+        names = ", ".join(session.name for session in problem.sessions)
         raise InputError(
-            f"{units} dwells and moments are too few to fit to, it needs {FEWEST_UNITS}"
+            f"{names}: {units} dwells and moments are too few to fit to, it needs {FEWEST_UNITS}"
         )
 
 
