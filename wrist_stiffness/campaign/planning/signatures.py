@@ -19,7 +19,8 @@ STEP = 0.1
 instead."""
 
 SENSOR_STEP = 0.01
-"""Registrations are plausible by the millimetre, where they compose on no straight line."""
+"""What the pose sensor says goes along no straight line: of a delay a longer step would be off by
+some thousandths."""
 
 
 @dataclass(frozen=True, eq=False)
