@@ -23,12 +23,13 @@ ROOMS_USED = {
     "cli": CORE | {"workflows", "shipped"},
     "ros": CORE | {"workflows", "shipped"},
     "errors": set(),
+    "progress": set(),
     "atomic_file": set(),
     "shipped": set(),
     "__main__": {"cli"},
     "__init__": set(),
 }
-COMMON = {"errors", "atomic_file"}
+COMMON = {"errors", "atomic_file", "progress"}
 ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both

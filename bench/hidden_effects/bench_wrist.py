@@ -45,7 +45,9 @@ def wrist() -> Table:
 
 @cache
 def code_version(modules: tuple[str, ...], files: tuple[str, ...]) -> str:
-    """Return a short digest of the table and of code.
+    """Return a short digest of the table and of what code does, not of what it says of itself.
+
+    By syntax trees: those of another Python may look different.
 
     Parameters
     ----------
@@ -57,8 +59,23 @@ def code_version(modules: tuple[str, ...], files: tuple[str, ...]) -> str:
     digest = hashlib.sha256(Path(shipped_file("precomputed/palmieri2015.npz")).read_bytes())
     here = Path(__file__).parent
     for path in [*_sources(modules), *(here / name for name in files)]:
-        digest.update(path.read_bytes())
+        digest.update(_without_words(path.read_text(encoding="utf-8")).encode())
     return digest.hexdigest()[:12]
+
+
+def _without_words(text: str) -> str:
+    """Return code as its syntax tree, without comments, docstrings and layout."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [each for each in node.body if not _is_words(each)]
+    return ast.dump(tree)
+
+
+def _is_words(statement: ast.stmt) -> bool:
+    """Tell whether a statement is a string alone: what stands above or below it is explained."""
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def _sources(modules: tuple[str, ...]) -> list[Path]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.comparing import set_up as fitted_anew
 from wrist_stiffness.campaign.comparing.compare import compare_models
 from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
@@ -161,3 +162,16 @@ def test_the_bow_of_a_target_a_millimetre_off_is_no_error_of_a_motion(model):
     moving = ~observed.sessions[0].cut.dwell
     assert moving.sum() > 100
     assert rms((refitted_values(observed, [set_up]) / scatter)[moving]) < 1.3
+
+
+def test_a_model_that_is_wrong_is_not_believed_the_more_the_longer_it_is_recorded():
+    """What is off alike at neighbours must not weigh eight times against what is plausible."""
+    rng = np.random.default_rng(4)
+    columns, residual = 0.1 * rng.normal(size=(50, 6, 3)), rng.normal(size=(50, 6))
+
+    def taken_up(units, times):
+        many = np.tile(columns[:units], (times, 1, 1)), np.tile(residual[:units], (times, 1))
+        return np.linalg.norm(fitted_anew._solved(*many, np.zeros(3)))
+
+    assert taken_up(50, 8) == pytest.approx(taken_up(50, 1))
+    assert taken_up(25, 2) > 1.1 * taken_up(25, 1)

@@ -103,3 +103,23 @@ def test_blanks_and_a_component_never_measured_are_left_out():
 def test_columns_of_other_units_are_refused():
     with pytest.raises(InputError, match="240 units"):
         asked(np.random.default_rng(8), np.zeros((N, M)), [np.zeros((N - 1, 1))])
+
+
+def test_uncertainty_is_that_of_clustered_errors_and_of_the_blocks_that_columns_use_up():
+    """The sandwich of least squares, times n / (n - k - 1) of n blocks for k columns."""
+    rng = np.random.default_rng(3)
+    conditions = rng.normal(size=(N, 3))
+    residual = wander(rng) + 3.0 * conditions @ np.ones((3, M))
+    found = asked(rng, residual, list(conditions.T[:, :, None]), blocks=12).entered
+    assert len(found) == 3
+    columns = np.column_stack([conditions, np.ones(N)])
+    slopes = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    blocks = time_blocks(np.zeros(N, dtype=int), 12)
+    inverse = np.linalg.inv(columns.T @ columns)
+    for component, left in enumerate((residual - columns @ slopes).T):
+        scores = np.array([left[blocks == b] @ columns[blocks == b] for b in range(12)])
+        variance = np.diag(inverse @ scores.T @ scores @ inverse) * 12 / (12 - 3 - 1)
+        for each in found:
+            assert each.slope[0, component] == pytest.approx(slopes[each.which, component])
+            own = each.covariance[component, component]
+            assert own == pytest.approx(variance[each.which])

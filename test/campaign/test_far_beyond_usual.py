@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from wrist_stiffness.campaign.fitting.result import Fitted
+from wrist_stiffness.campaign.fitting.result import FittedParameter
 from wrist_stiffness.campaign.searching.telling import sized, valued
 from wrist_stiffness.diagnosis.result import Diagnosis, Finding, Unexplained
 from wrist_stiffness.model.effect import Effect
@@ -41,7 +41,7 @@ def named(value):
 def added(value):
     """Return whether `extend` warns of it."""
     name = "drive_compliance@motor_1"
-    return Fitted(name, KEY, None, value, 10.0, 0.0, USUAL, USUAL, False, ()).far
+    return FittedParameter(name, KEY, None, value, 10.0, 0.0, USUAL, USUAL, False, ()).far
 
 
 @pytest.mark.parametrize("sizes", [2.9, 3.1, 3.9, 29.0, 31.0])

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from wrist_stiffness.campaign.fitting.calibrate import told_model
 from wrist_stiffness.campaign.fitting.fit import fit
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, free_all
 from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.refitted import AXES, GAPS
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -22,6 +24,8 @@ from wrist_stiffness.simulation.instrument import LoadSensor, Noise
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 """White scatter of a measured pose in tests with noise of their own [m, rad]."""
+
+FRAME = "measurement_frame@pose_sensor"
 
 
 def effect(name, **values):
@@ -306,3 +310,59 @@ def test_what_a_user_typed_without_uncertainty_is_believed(model):
     assert held == ()
     assert free[-1].effect == estimated
     assert dict(free[-1].scale) == {"width_mdeg": 20.0}
+
+
+@pytest.mark.parametrize("seed", [10, 23])
+def test_rough_data_lead_into_the_valley_of_the_true_flanges(model, seed):
+    """From there a fit ends where one ends that begins at the truth; else flanges touch wrongly."""
+    rng = np.random.default_rng(seed)
+    block = poses(rng, 24, 0.1)
+    joints = ("joint_2", "joint_3", "joint_4")
+    free = [free_all(effect(f"{law}@{joint}")) for law in (GAPS, AXES) for joint in joints]
+    free.append(free_all(effect(FRAME), per_session=True))
+    drawn = problem_of(model, [measured(model, block, rng)], free)
+    true = rng.normal(size=len(drawn.unknowns))
+    session = measured(model.with_effects(*drawn.effects(true, 0)), block, rng)
+    problem = problem_of(model, [session], free)
+    led, best = fit(problem), fit(problem, true)
+    apart = led.z - best.z
+    assert apart @ np.linalg.solve(best.covariance, apart) < 1.0
+
+
+def test_what_the_fit_cannot_follow_widens_its_uncertainty(model):
+    """Repeated poses tell the scatter, so what a soft bushing leaves of them is a misfit."""
+    rng = np.random.default_rng(1)
+    block = poses(rng, 30)
+    twice = Block(2.0 * np.arange(60), np.tile(block.theta, (2, 1)), np.tile(block.load, (2, 1)))
+    soft = model.with_effects(effect("bushing_stiffness@joint_1", flexibility_percent=300.0))
+    session = replace(measured(soft, twice, rng), covariance=None)
+    free = (FreeEffect(effect(FRAME), {"shift_x_um": 1000.0}, True),)
+    found = fit(problem_of(model, [session], free))
+    assert found.misfit > 3.0
+    white = replace(found.noise, scale=1.0).whiten(found.seen, found.columns)
+    by_scatter = 1000.0 / np.linalg.norm(white)
+    assert found.parameters[0].sigma == pytest.approx(np.sqrt(found.misfit) * by_scatter, rel=1e-3)
+
+
+def test_what_moved_only_with_another_is_told_as_well(model):
+    """At one pose the data tell the sum of two shifts; a model with one of them would be off."""
+    rng = np.random.default_rng(21)
+    block = replace(poses(rng, load=0.0), theta=np.zeros((40, 2)))
+    session = measured(model.with_effects(effect(FRAME, shift_x_um=800.0)), block, rng)
+    names = (FRAME, "target_mounting@pose_sensor")
+    free = [FreeEffect(effect(name), {"shift_x_um": 1e3}, True) for name in names]
+    found = fit(problem_of(model, [session], free))
+    assert not any(parameter.excited for parameter in found.parameters)
+    shift = [each.estimates["shift_x_um"].value for each in told_model(found).effects]
+    assert len(shift) == 2
+    assert sum(shift) == pytest.approx(800.0, abs=1.0)
+
+
+def test_what_the_data_hardly_move_is_not_told(model):
+    """Under a thousandth of a newton the load's scale does next to nothing."""
+    rng = np.random.default_rng(3)
+    session = measured(model, poses(rng, load=1e-3), rng)
+    free = [free_all(effect(name)) for name in ("load_scale@load_sensor", FRAME)]
+    found = fit(problem_of(model, [session], free))
+    assert 0.0 < abs(by_name(found)["load_scale@load_sensor", "scale_percent"].moved) < 0.01
+    assert [each.name for each in told_model(found).effects] == [FRAME]

@@ -248,17 +248,19 @@ def test_columns_of_a_linear_law_make_up_its_truth(model, timeline):
     assert np.allclose(found.truths[..., 0], direct, atol=1e-12)
 
 
-def test_columns_are_the_derivative_by_one_plausible_size(model, timeline):
-    effect = effect_named("load_scale@load_sensor").with_values({"scale_percent": 2.0})
+@pytest.mark.parametrize(
+    ("name", "value", "within"),
+    # A delay bends more, so its step is shorter.
+    [("load_scale@load_sensor", 2.0, 0.01), ("time_delay@pose_sensor", 5.0, 0.001)],
+)
+def test_columns_are_the_derivative_by_one_plausible_size(model, timeline, name, value, within):
+    (parameter,) = effect_named(name).parameters
+    effect = effect_named(name).with_values({parameter.key: value})
     (found,) = signatures(model, timeline.block, [(effect,)])
-    twists = [
-        model.with_effects(effect.with_values({"scale_percent": 2.0 + step}))
-        .batch(timeline.block)
-        .measured
-        for step in (-0.01, 0.01)
-    ]
-    slope = (twists[1] - twists[0]) / 0.02 * 3.0
-    assert np.allclose(found.columns[..., 0], slope, atol=0.01 * np.abs(slope).max())
+    sides = [effect.with_values({parameter.key: value + step}) for step in (-0.01, 0.01)]
+    twists = [model.with_effects(side).batch(timeline.block).measured for side in sides]
+    slope = (twists[1] - twists[0]) / 0.02 * parameter.scale
+    assert np.allclose(found.columns[..., 0], slope, atol=within * np.abs(slope).max())
 
 
 def test_an_effect_that_the_model_has_is_asked_at_other_values(model, timeline):

@@ -89,6 +89,30 @@ def test_the_shortest_plan_is_arranged_twice_at_most(model, monkeypatch):
         lasted.clear()
 
 
+@pytest.mark.parametrize(("whole", "further"), [(False, True), (True, False)])
+def test_between_rivals_poses_may_be_moved_outward(model, whole, further):
+    """Most effects differ most there; a whole wrist is measured where it was drawn."""
+    asked = conditions(model)
+    drawn = pool.draw_settings(
+        model.table.workspace, asked.sources, model.table.geometry.gravity, generator()
+    )
+    known = {tuple(each.theta) for each in drawn}
+    visits = planning._drawn(model, asked, whole, generator()).visits_of(range(len(drawn)))
+    assert {tuple(each.theta) for each in visits} <= known
+    every = planning._drawn(model, asked, whole, generator()).timeline.dwells
+    reach = max(np.linalg.norm(each.visit.theta) for each in every)
+    assert (reach > 1.05 * max(np.linalg.norm(theta) for theta in known)) == further
+
+
+def test_a_plan_without_room_for_a_visit_is_the_shortest_one(model):
+    """Arranged anew it would draw another warm-up, which may be too long."""
+    settings, rng = planning._drawn(model, conditions(model), False, generator()), generator()
+    shortest = settings.arranged([], rng)
+    visits, timeline = settings.within(shortest.duration_s, [0, 1], shortest, rng)
+    assert visits == []
+    assert timeline is shortest
+
+
 def test_moves_keep_to_speed_joint_limits_and_domain(model, longer):
     knots = longer.timeline.knots
     time = np.array([knot[0] for knot in knots])

@@ -98,6 +98,16 @@ def test_two_effects_are_found_one_after_the_other_and_refitted_together(rng):
         assert error == pytest.approx(0.125, rel=0.3)
 
 
+@pytest.mark.parametrize(("large", "named"), [(10.0, ["line@x", "line@z"]), (40.0, ["line@x"])])
+def test_what_an_inexact_law_may_leave_of_a_large_effect_names_no_second_one(rng, large, named):
+    """Laws are right to a tenth of their effect's size: 1.5 is more than that of 10, not of 40."""
+    table = plain(rng)
+    hidden = large * table.covariate("x") + 1.5 * table.covariate("z")
+    table = table.with_values(table.values + hidden[:, None])
+    result = diagnose(table, (line("x"), line("z"), line("w")), (offset(),), rng, QUICK)
+    assert [finding.name for finding in result.findings] == named
+
+
 def test_twins_share_a_class(rng):
     table = plain(rng)
     table = table.with_values(table.values + np.outer(2 * table.covariate("x"), [1, 1]))

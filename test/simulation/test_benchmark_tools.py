@@ -187,6 +187,36 @@ def test_another_reading_or_delay_makes_old_answers_stale(solver, bench, monkeyp
     assert {"observe.py", "own_diagnosis.py"} <= set(files)
 
 
+CODE = """LIMIT = 3.0
+
+
+def far(value):
+    return value > LIMIT
+"""
+EXPLAINED = """'''What is far.'''
+
+LIMIT = 3.0  # of the noise
+'''In deviations.'''
+
+def far(
+    value,
+):
+    '''Tell whether it is.'''
+    return value > LIMIT
+"""
+
+
+def test_only_what_code_does_makes_old_answers_stale(bench, monkeypatch, tmp_path):
+    tools = bench("bench_wrist")
+    monkeypatch.setattr(tools, "__file__", str(tmp_path / "bench_wrist.py"))
+    digests = []
+    for number, text in enumerate((CODE, EXPLAINED, CODE.replace("3.0", "3.5"))):
+        name = f"file_{number}.py"
+        (tmp_path / name).write_text(text)
+        digests.append(tools.code_version((), (name,)))
+    assert digests[0] == digests[1] != digests[2]
+
+
 @pytest.fixture
 def twelve_units(bench):
     """Session of twelve units, and a dictionary of one zero and one direction of a wrong base."""

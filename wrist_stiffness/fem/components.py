@@ -35,7 +35,7 @@ the order observed."""
 Condenser = Callable[[Solid, MeshSettings, Interface], CondensedSolid]
 """Makes the superelement of a solid."""
 
-Progress = Callable[[int, int, str], None]
+PartProgress = Callable[[int, int, str], None]
 """Called with the number of parts done, the number of all parts, and what comes next."""
 
 
@@ -69,7 +69,7 @@ def elastic_components(
     geometry: Geometry,
     sizes: MeshSettings = SHIPPED_SIZES,
     interface: Interface = "rigid",
-    progress: Progress | None = None,
+    progress: PartProgress | None = None,
     condenser: Condenser = condense_solid,
 ) -> tuple[ElasticComponents, Provenance]:
     """Condense every elastic part of a wrist.
@@ -83,7 +83,7 @@ def elastic_components(
     interface : {"rigid", "distributing"}
         How walls follow their frames.
     progress : callable, optional
-        See `Progress`.
+        See `PartProgress`.
     condenser : callable
         `condense_solid`, or a `CondensedStore` that remembers.
 

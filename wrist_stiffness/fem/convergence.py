@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.progress import Progress
 
 QUANTITIES = ("s", "phi", "compliance")
 """Mean |s| [m] and phi [rad] under the rated load over the poses, and the norm of C."""
@@ -67,7 +67,7 @@ def mesh_convergence(
     factors: tuple[float, ...],
     interface: Interface = "rigid",
     condenser: Condenser = condense_solid,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Convergence:
     """Condense a wrist on a sequence of meshes and extrapolate.
 

@@ -6,7 +6,7 @@ until poses that the splines never saw agree with the closed form to the toleran
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
@@ -31,6 +31,7 @@ from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechan
 from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
+from wrist_stiffness.progress import Progress, silent
 
 GRIDS = (5, 9, 13, 17, 21, 25, 31, 37)
 """Points along each motor angle that are tried until the tolerance is met."""
@@ -43,8 +44,6 @@ MESH_FACTORS = (1.5625, 1.25, 1.0)
 
 MESH_POSES = 12
 """Operative poses over which the mesh study averages."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class BuildSettings:
 def build_table(
     values: Mapping[str, Any],
     settings: BuildSettings,
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
     condenser: Condenser = condense_solid,
 ) -> Table:
     """Run the sweep.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from wrist_stiffness.campaign.fitting.free_effects import answering_as
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.fit_report import (
     Errors,
     far_lines,
@@ -32,8 +32,6 @@ from wrist_stiffness.workflows.read_sessions import (
     read_sessions,
     was_fitted_to,
 )
-
-Progress = Callable[[int, int], None]
 
 SEED = 0
 """Of the noise floor beside which a mistake shows."""
@@ -105,7 +103,7 @@ def calibrate_model(
     output: str | Path,
     run: Run,
     hold_out: bool = False,
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
 ) -> Calibrated:
     """Fit a model to recordings and write it as it holds for the newest one.
 

@@ -15,6 +15,7 @@ from typing import NoReturn
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.workflows.node_list import (
     LARGEST_SEED,
@@ -59,7 +60,6 @@ SHORTEST_S, LONGEST_S = 2.0, 172800.0
 DOMAINS = 90
 """ROS domains 1 to 90; those above 101 clash with ports that Linux hands out."""
 
-Progress = Callable[[int, int], None]
 Tell = Callable[[str], None]
 
 
@@ -69,7 +69,7 @@ def run_cell(
     record: Path | None = None,
     rate_hz: float = 100.0,
     seed: int = 0,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
     tell: Tell = lambda line: None,
 ) -> bool:
     """Run predictor, corrector and virtual cell until the motion is over; in the main thread.

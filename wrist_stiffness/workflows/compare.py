@@ -19,6 +19,7 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import SOURCES
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.provenance import Provenance, Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
@@ -26,8 +27,6 @@ from wrist_stiffness.workflows.read_sessions import (
     sha256_by_name,
     was_fitted_to,
 )
-
-Progress = Callable[[int, int], None]
 
 SEED = 0
 """Of what chance gives: the same recordings give the same answer."""
@@ -155,7 +154,7 @@ def compare(
     models: Sequence[str | Path],
     recordings: Recordings,
     run: Run,
-    progress: Callable[[str], Progress] = lambda label: lambda done, total: None,
+    progress: Callable[[str], Progress] = lambda label: silent,
 ) -> Compared:
     """Compare models with recordings of one wrist.
 

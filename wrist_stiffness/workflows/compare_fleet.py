@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +10,7 @@ from typing import Any
 
 from wrist_stiffness.campaign.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.campaign.reading.folder import recordings_in
+from wrist_stiffness.progress import Progress
 from wrist_stiffness.workflows.compare import compare
 from wrist_stiffness.workflows.fleet import FleetRow, map_recordings
 from wrist_stiffness.workflows.provenance import Run
@@ -81,7 +82,7 @@ def compare_each(
     recordings: Recordings,
     run: Run,
     scheduler: str | None,
-    progress: Callable[[int, int], None],
+    progress: Progress,
 ) -> FleetComparison:
     """Compare models with every recording by itself, in parallel.
 

@@ -12,6 +12,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.progress import Progress
 from wrist_stiffness.recording.writer import is_only_recording
 from wrist_stiffness.workflows.before_after import Pass, before_and_after
 from wrist_stiffness.workflows.cell import Tell, check_numbers, run_cell
@@ -19,8 +20,6 @@ from wrist_stiffness.workflows.compare_runs import RunComparison, compare_runs
 from wrist_stiffness.workflows.pictures.before_after import draw_before_after
 from wrist_stiffness.workflows.replay import ReplaySummary, replay
 from wrist_stiffness.workflows.table import draw_maps
-
-Progress = Callable[[int, int], None]
 
 LIVE, REPLAYED = "live", "replayed"
 PICTURES = ("map_s.png", "map_phi.png", "budget.png", "bent.png", "before_after.png")

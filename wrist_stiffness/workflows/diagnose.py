@@ -20,6 +20,7 @@ from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.diagnosis import Diagnosis, Finding
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.compare import remarks_of
 from wrist_stiffness.workflows.fit_report import TITLES, plus_minus
 from wrist_stiffness.workflows.provenance import Provenance, Run
@@ -41,7 +42,6 @@ from wrist_stiffness.workflows.verdict import (
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.report.page import Page
 
-Progress = Callable[[int, int], None]
 
 SEED = 0
 """Of what chance gives: the same recordings give the same answer."""
@@ -144,7 +144,7 @@ def diagnose_recordings(
     model: str | Path,
     recordings: Recordings,
     run: Run,
-    progress: Callable[[str], Progress] = lambda label: lambda done, total: None,
+    progress: Callable[[str], Progress] = lambda label: silent,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Diagnosed:
     """Find the effects that a model misses in recordings of one wrist.

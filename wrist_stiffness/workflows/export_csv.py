@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
@@ -41,6 +41,7 @@ from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.recording.topics import MOTOR_COMMANDS
@@ -81,7 +82,7 @@ def export_csv(
     remaps: Mapping[str, str] | None = None,
     settings: StreamSettings | None = None,
     overwrite: bool = False,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    progress: Progress = silent,
 ) -> Exported:
     """Write the measured poses of a recording with the signals that belong to them as a table.
 
@@ -226,7 +227,7 @@ def _write(
     columns: Columns,
     time_ns: Stamps,
     values: Mapping[str, Array],
-    progress: Callable[[int, int], None],
+    progress: Progress,
 ) -> None:
     names = columns.names[1:]
     writers = [writer_of(name) for name in names]

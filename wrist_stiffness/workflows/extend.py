@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,6 +21,7 @@ from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate, has_unit
 from wrist_stiffness.model.registry import find_law, law_from_file
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.calibrate import writable
 from wrist_stiffness.workflows.fit_report import (
     Errors,
@@ -33,8 +34,6 @@ from wrist_stiffness.workflows.fit_report import (
 )
 from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions, was_fitted_to
-
-Progress = Callable[[int, int], None]
 
 KINDS = ("along", "about")
 AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
@@ -270,7 +269,7 @@ def extend_model(
     recordings: Recordings,
     output: str | Path,
     run: Run,
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
 ) -> Extended:
     """Add an effect to a model, fit it with what is there, and write the model.
 

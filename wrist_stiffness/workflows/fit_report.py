@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.judge import SEEN, THIS_SESSION, Judged
-from wrist_stiffness.campaign.fitting.result import Fit, Fitted
+from wrist_stiffness.campaign.fitting.result import Fit, FittedParameter
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import against_floor, is_at_floor, over_floor
 
@@ -106,13 +106,13 @@ def left_lines(errors: Errors, judged: Judged) -> list[str]:
 
 
 def told_lines(
-    parameters: Iterable[Fitted], all_of_them: bool = False, usual: bool = True
+    parameters: Iterable[FittedParameter], all_of_them: bool = False, usual: bool = True
 ) -> list[str]:
     """Return the estimates that the data tell, or all of them, a line each.
 
     Parameters
     ----------
-    parameters : iterable of Fitted
+    parameters : iterable of FittedParameter
         Of a fit.
     all_of_them : bool
         Also those that the data do not tell.
@@ -129,7 +129,7 @@ def told_lines(
     return lines
 
 
-def far_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
+def far_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]:
     """Tell what went farther than usual, and what to look at on the machine."""
     checks = {
         each.effect.name: each.effect.law.check.replace("{place}", each.effect.component)
@@ -142,7 +142,7 @@ def far_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
     ]
 
 
-def untold_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
+def untold_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]:
     """Tell what the data do not say, by what to record to see it."""
     needs = {each.effect.name: each.effect.law.excited_by for each in found.problem.free}
     # Several sessions may say the same of one parameter.
@@ -165,7 +165,7 @@ def untold_lines(found: Fit, parameters: Iterable[Fitted]) -> list[str]:
     return lines
 
 
-def parameter_values(parameters: Iterable[Fitted]) -> list[dict[str, Any]]:
+def parameter_values(parameters: Iterable[FittedParameter]) -> list[dict[str, Any]]:
     """Return all parameters for programs."""
     values = []
     for each in parameters:
@@ -213,7 +213,7 @@ def plus_minus(value: float, sigma: float) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
 
 
-def tolerances(parameter: Fitted) -> str:
+def tolerances(parameter: FittedParameter) -> str:
     """Return how far a parameter went, in the words of a fitter."""
     text = f"{abs(parameter.moved):.1f} x its usual size"
     # The usual gap is where shims follow the axes; 11.5 ppm/K is steel.

@@ -28,9 +28,9 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.progress import Progress, silent
 
 Result = TypeVar("Result")
-Progress = Callable[[int, int], None]
 
 CONNECT_S = 10.0
 
@@ -61,7 +61,7 @@ def map_recordings(
     paths: Sequence[Path],
     scheduler_address: str | None = None,
     workers: int | None = None,
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
 ) -> list[FleetRow[Result]]:
     """Call a function of one recording for each of many.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from wrist_stiffness.campaign.reading.marker_poses import LEAST_MARKERS
 from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter, topics
 from wrist_stiffness.recording.messages import (
     Float64,
@@ -88,7 +89,7 @@ def import_csv(
     output: str | Path,
     unloaded: bool = False,
     overwrite: bool = False,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    progress: Progress = silent,
 ) -> Imported:
     """Write a table of measured poses as a recording.
 

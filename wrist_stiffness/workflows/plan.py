@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from wrist_stiffness.campaign.planning.timeline import Experiment, Pace, Timelin
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import topics
 from wrist_stiffness.recording.messages import JointTrajectory, JointTrajectoryPoint
 from wrist_stiffness.recording.writer import RecordingWriter
@@ -46,7 +47,6 @@ COLUMNS = (
     "purpose",
 )
 
-Progress = Callable[[int, int], None]
 
 LONGEST_MIN = 120.0
 """Minutes of one experiment; planning takes 2 GB and minutes for so many."""
@@ -210,7 +210,7 @@ def plan_between_rivals(
     noise = rivals.noise(model.table)
     earlier = []
     if recordings is not None:
-        sessions = read_sessions(recordings, model.table, lambda done, total: None)
+        sessions = read_sessions(recordings, model.table, silent)
         earlier = [as_experiment(model, session) for session in sessions.values()]
     return model, _planned(model, question, loads, noise, options, earlier, progress)
 

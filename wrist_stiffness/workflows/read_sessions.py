@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256
+from wrist_stiffness.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Recordings:
 
 
 def read_sessions(
-    recordings: Recordings, table: Table, progress: Callable[[int, int], None]
+    recordings: Recordings, table: Table, progress: Progress
 ) -> dict[Path, MeasuredSession]:
     """Read recordings with measured poses, each a session with a name of its own.
 

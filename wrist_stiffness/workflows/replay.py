@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import RecordingError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.messages import (
     Float64,
@@ -84,8 +85,6 @@ PROGRESS_EVERY = 500
 
 NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
 """A value in a message; not the digits of a name such as motor_1_joint."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass
@@ -155,7 +154,7 @@ def replay(
     settings: tuple[StreamSettings, StreamSettings] | None = None,
     topics: Mapping[str, str] | None = None,
     overwrite: bool = False,
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
 ) -> ReplaySummary:
     """Write a recording again with predicted errors and corrected commands added.
 

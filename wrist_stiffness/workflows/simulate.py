@@ -11,6 +11,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.progress import Progress
 from wrist_stiffness.recording import RecordingWriter, topics
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.simulation.blind import ToldScale, draw
@@ -61,7 +62,7 @@ def simulate_recording(
     settings: CellSettings,
     seconds: float,
     seed: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     overwrite: bool = False,
 ) -> Simulated:
     """Let the virtual cell work and record it.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,9 +14,8 @@ from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values
 from wrist_stiffness.mechanism.yaml_block import read_yaml
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.budget import PER_AXIS, Push, budget
-
-Progress = Callable[[int, int], None]
 
 FINE = 161
 
@@ -37,7 +36,7 @@ def build(
     tolerance: float = 0.005,
     per_axis: int | None = None,
     kernel: Kernel = "thin_plate",
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
 ) -> Table:
     """Run the offline sweep and write its table; an interrupted build goes on where it was.
 

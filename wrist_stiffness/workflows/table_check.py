@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,11 +13,11 @@ from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.lookup.verification import interpolation_errors, unseen_poses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry_file import load_geometry
+from wrist_stiffness.progress import Progress, silent
 
 STATED_ROUNDING = 1e-7
 """Rounding of an interpolation error: 1e-16 times the condition number of the spline's system."""
 
-Progress = Callable[[int, int], None]
 
 REBUILT_TOLERANCE = 1e-6
 """Relative difference of a rebuilt table that counts as the same: other BLAS, same mesh."""
@@ -45,7 +44,7 @@ def check(
     path: str | Path,
     geometry: str | Path | None = None,
     rebuild: bool = False,
-    progress: Progress = lambda done, of: None,
+    progress: Progress = silent,
 ) -> list[Finding]:
     """Verify a table.
 

@@ -7,7 +7,7 @@ import pytest
 
 from wrist_stiffness.campaign.searching import place, seeking
 from wrist_stiffness.campaign.searching.place import Reached
-from wrist_stiffness.campaign.searching.screening import Fitted
+from wrist_stiffness.campaign.searching.screening import FittedCandidate
 from wrist_stiffness.model.parameters import Parameter
 
 PRICE = 5.0
@@ -101,7 +101,7 @@ class Wrist:
             leaders=lambda known: sorted(
                 ((gain(each), each, ()) for each in known), key=lambda found: -found[0]
             ),
-            fitted=lambda each, shape, value: Fitted(each, {}, value, PRICE),
+            fitted=lambda each, shape, value: FittedCandidate(each, {}, value, PRICE),
         )
 
 

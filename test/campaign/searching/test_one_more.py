@@ -6,7 +6,7 @@ import pytest
 
 from wrist_stiffness.campaign.searching import stepwise
 from wrist_stiffness.campaign.searching.place import WORTH, Reached
-from wrist_stiffness.campaign.searching.screening import Fitted
+from wrist_stiffness.campaign.searching.screening import FittedCandidate
 
 COST = 1000.0
 PRICE = 5.0
@@ -22,7 +22,9 @@ class Promising(Reached):
         candidates = [SimpleNamespace(name=name) for name in self.kept]
         return SimpleNamespace(
             leaders=lambda _: [(PROMISED, each, ()) for each in candidates],
-            fitted=lambda each, shape, value: Fitted(each, {}, self.kept[each.name], PRICE),
+            fitted=lambda each, shape, value: FittedCandidate(
+                each, {}, self.kept[each.name], PRICE
+            ),
         )
 
 

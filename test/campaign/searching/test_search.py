@@ -6,7 +6,7 @@ from numpy.testing import assert_equal
 
 from wrist_stiffness.campaign.searching import stepwise
 from wrist_stiffness.campaign.searching.place import EXACT, ROUGH, WORTH
-from wrist_stiffness.campaign.searching.screening import Fitted
+from wrist_stiffness.campaign.searching.screening import FittedCandidate
 from wrist_stiffness.campaign.searching.seeking import Search
 
 PLAY = "joint_clearance@joint_1"
@@ -32,7 +32,7 @@ def test_a_fit_that_leaves_very_much_is_begun_from_the_drawing_too(wrist, share,
     """A base that gave way to a large effect does not find back."""
     large = share * ROUGH * NUMBERS
     wrist.left, wrist.afresh = wrist.leaves(alone=2.0 * large, b=large), wrist.leaves(b=NUMBERS)
-    added = Fitted(wrist.candidate(BACKLASH), {}, large, PRICE)
+    added = FittedCandidate(wrist.candidate(BACKLASH), {}, large, PRICE)
     found = stepwise.with_one_more(wrist, wrist.reached(), added)
     assert len(wrist.done) == starts
     assert found.base.cost == (NUMBERS if starts == 2 else large)
@@ -43,7 +43,7 @@ def test_the_better_of_two_starts_is_kept(wrist):
     """From the drawing a fit may as well end further off."""
     large = 2.0 * ROUGH * NUMBERS
     wrist.left, wrist.afresh = wrist.leaves(alone=2.0 * large, b=large), wrist.leaves(b=1.5 * large)
-    added = Fitted(wrist.candidate(BACKLASH), {}, large, PRICE)
+    added = FittedCandidate(wrist.candidate(BACKLASH), {}, large, PRICE)
     assert stepwise.with_one_more(wrist, wrist.reached(), added).base.cost == large
 
 

@@ -12,7 +12,6 @@ from wrist_stiffness.campaign.comparing.sentences import tell
 from wrist_stiffness.campaign.comparing.set_up import without_set_up
 from wrist_stiffness.campaign.comparing.wiring import told_mistake
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
-from wrist_stiffness.campaign.fitting.problem import Progress, silent
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
 from wrist_stiffness.campaign.observing import Observed
@@ -21,6 +20,7 @@ from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.progress import Progress, silent
 
 Prepared = tuple[Observed, Observations, tuple[str, ...]]
 

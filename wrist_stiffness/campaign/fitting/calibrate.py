@@ -11,8 +11,8 @@ import numpy as np
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
 from wrist_stiffness.campaign.fitting.free_effects import commissioning, unfitted
 from wrist_stiffness.campaign.fitting.judge import Judged, judged, judged_by_itself
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, require_units, silent
-from wrist_stiffness.campaign.fitting.result import Fit, Fitted
+from wrist_stiffness.campaign.fitting.problem import FitProblem, require_units
+from wrist_stiffness.campaign.fitting.result import Fit, FittedParameter
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
@@ -21,6 +21,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
+from wrist_stiffness.progress import Progress, silent
 
 NEGLIGIBLE = 0.01
 """Of a prior's standard deviation: a smaller move of a parameter that the data do not tell is none.
@@ -62,7 +63,7 @@ class Calibration:
         return noise_floor(self.judged.observations)
 
     @cached_property
-    def parameters(self) -> tuple[Fitted, ...]:
+    def parameters(self) -> tuple[FittedParameter, ...]:
         """All that was fitted."""
         return self.fit.parameters
 

@@ -16,9 +16,9 @@ from wrist_stiffness.campaign.fitting.free_effects import (
     within_tolerances,
 )
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.fitting.recipes import recipe
-from wrist_stiffness.campaign.fitting.result import Fit, Fitted
+from wrist_stiffness.campaign.fitting.result import Fit, FittedParameter
 from wrist_stiffness.campaign.fitting.start_search import start_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
@@ -29,6 +29,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.progress import Progress, silent
 
 MOVED = 2.0
 """Uncertainties, of before, by which a parameter of the base must move to be named."""
@@ -74,12 +75,12 @@ class Extension:
         return told_model(self.fit, keep=(self.effect.name,))
 
     @cached_property
-    def parameters(self) -> tuple[Fitted, ...]:
+    def parameters(self) -> tuple[FittedParameter, ...]:
         """All that was fitted."""
         return self.fit.parameters
 
     @property
-    def own(self) -> tuple[Fitted, ...]:
+    def own(self) -> tuple[FittedParameter, ...]:
         """Parameters of the effect itself."""
         return tuple(each for each in self.parameters if each.effect == self.effect.name)
 
@@ -98,7 +99,7 @@ class Extension:
         }
 
     @property
-    def base_moved(self) -> tuple[tuple[Fitted, Fitted], ...]:
+    def base_moved(self) -> tuple[tuple[FittedParameter, FittedParameter], ...]:
         """Parameters of the base before and after, of those that the effect moved, farthest first.
 
         Both from the recordings without the held-out part.

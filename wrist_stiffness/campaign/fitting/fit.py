@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
-from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem, Progress, silent
+from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.campaign.fitting.wander import found_wander, with_wander
 from wrist_stiffness.diagnosis.noise import estimate_noise
@@ -23,6 +23,7 @@ from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.whitening import NoiseModel
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.progress import Progress, silent
 
 MOST_STEPS = 40
 """Gauss-Newton steps."""

@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.fit import fit, start_of
-from wrist_stiffness.campaign.fitting.problem import FitProblem, Progress, require_units, silent
+from wrist_stiffness.campaign.fitting.problem import FitProblem, require_units
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.campaign.fitting.wander import with_wander
 from wrist_stiffness.diagnosis.observations import Labels, Observations
 from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
 from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.progress import Progress, silent
 
 ANOTHER_SESSION = "another session"
 THIS_SESSION = "this session only"

@@ -27,15 +27,10 @@ excite stays where it is."""
 MOST_KNOWN = 4096
 """Effects with values that are kept: a fit asks for one a parameter at a time."""
 
-Progress = Callable[[int, int], None]
 Values = tuple[tuple[str, float], ...]
 
 STEP = 1e-2
 """Step of the difference quotients, in standard deviations of the prior."""
-
-
-def silent(done: int, total: int) -> None:
-    """Show no progress."""
 
 
 def require_units(problem: FitProblem, aside: int = 0) -> None:

@@ -27,7 +27,7 @@ TOGETHER = 0.7
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedParameter:
     """One parameter after the fit.
 
     Parameters
@@ -130,7 +130,7 @@ class Fit:
         return with_wander(self.problem.table.with_values(blank), self.wander)
 
     @property
-    def parameters(self) -> tuple[Fitted, ...]:
+    def parameters(self) -> tuple[FittedParameter, ...]:
         """All that was fitted, with uncertainties."""
         problem = self.problem
         sigma = np.sqrt(np.diag(self.covariance))
@@ -143,7 +143,7 @@ class Fit:
             value = effect.estimates[unknown.key].value
             near = 1e-6 * unknown.step
             out.append(
-                Fitted(
+                FittedParameter(
                     problem.free[unknown.free].effect.name,
                     unknown.key,
                     None if unknown.session is None else problem.sessions[unknown.session].name,

@@ -7,7 +7,7 @@ computed again on its own path, in its own order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,11 +43,10 @@ from wrist_stiffness.campaign.planning.timeline import (
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.progress import Progress
 
 LONGEST_S = 3600.0
 """Of a plan between rivals for which no duration is asked [s]."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)

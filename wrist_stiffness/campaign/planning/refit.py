@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -20,6 +20,7 @@ from wrist_stiffness.campaign.planning.timeline import Experiment
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.progress import Progress
 
 EVALUATIONS = 20
 """Of the model at most; a fit nearby is good enough to plan from."""
@@ -130,7 +131,7 @@ def rivals_alike(
     question: Question,
     earlier: Sequence[Experiment],
     noise: MeasurementNoise,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Question:
     """Return the question with each rival as what would have left what the first one has left.
 

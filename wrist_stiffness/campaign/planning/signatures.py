@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +13,15 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.progress import Progress
 
 STEP = 0.1
 """Step of a difference, in plausible sizes; a law linear in its parameters is taken at full size
 instead."""
 
 SENSOR_STEP = 0.01
-"""Registrations are plausible by the millimetre, where they compose on no straight line."""
+"""What the pose sensor says goes along no straight line: of a delay a longer step would be off by
+some thousandths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,7 @@ def signatures(
     model: ErrorModel,
     block: Block,
     candidates: Sequence[Sequence[Effect]],
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Signature]:
     """Evaluate what effects would leave.
 

@@ -24,7 +24,7 @@ from wrist_stiffness.model.registry import catalogue
 LARGE = 5.0
 """An effect so many times its usual size would still surprise nobody who looks for a fault."""
 
-FAR = 10.0
+BEYOND_BOUNDS = 10.0
 """What an estimate may be against the bounds of its law; at zero they stay."""
 
 LEVER, SHIFTS_ALONE = 0.03, 0.01
@@ -174,7 +174,7 @@ class WristCandidate:
             size = None
         else:
             size = LARGE * plausible
-        far = (FAR * factor.lower, FAR * factor.upper)
+        far = (BEYOND_BOUNDS * factor.lower, BEYOND_BOUNDS * factor.upper)
         return Factor(factor.name, *far, size, plausible)
 
 

@@ -294,7 +294,7 @@ def _settled(
 ) -> Diagnosis:
     """Return an answer that says what the laws leave, fitted whole, instead of their slopes.
 
-    Then its errors are told `by_laws` too: a bushing fifty times as soft has other slopes.
+    Then its errors are told `by_laws` too: a bushing that is many times as soft has other slopes.
     """
     left = ask(search.after(final))
     if left.findings:

@@ -19,8 +19,7 @@ STICKING = frozenset(("joint_friction",))
 
 SMALL = 0.025
 """Share of its usual size from which what is added begins once more, where from its usual size it
-ended higher than without it: of one wrist 16,000 was left, 34,000 with play from 20 um in the right
-joint, 5,400 from 0.5 um."""
+ended higher than without it: small play in the right joint may not be reached from large play."""
 
 MOST_SHARPENED = 2
 """So many that lead with rounded walls are fitted with the walls as they are."""
@@ -61,8 +60,8 @@ def from_afar(fitter: Fitter, begun: Reached, catalogue: Candidates) -> dict[str
 def _rubbing(fitter: Fitter, begun: Reached, catalogue: Candidates) -> Reached:
     """Return a base alone with the joint that rubs, from the drawing, where one explains anything.
 
-    Of one wrist friction explained a fifth, play a tenth and a wrong one as much, both together
-    nine tenths.
+    Friction and play may each explain little, play in a wrong joint as much, and both together
+    nearly all.
     """
     sessions = begun.base.problem.sessions
     trials = [
@@ -76,7 +75,7 @@ def _rubbing(fitter: Fitter, begun: Reached, catalogue: Candidates) -> Reached:
 def _with_rounded_walls(fitter: Fitter, begun: Reached, more: WristCandidate) -> Reached:
     """Fit one more effect from its usual size, and everything else from where it was found.
 
-    From the drawing, with what rubs at its usual size again, no more was found (ten wrists).
+    From the drawing, with what rubs at its usual size again, no more was found.
     """
     sessions, others = begun.base.problem.sessions, list(begun.effects.values())
 

@@ -24,7 +24,7 @@ MOST_TRIALS = 7
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedCandidate:
     """A candidate at its best.
 
     Parameters
@@ -113,7 +113,9 @@ class Screen:
             found.append((best[0] - len(best[1]) * self._base.unit_price, candidate, best[1]))
         return sorted(found, key=lambda each: -each[0])
 
-    def fitted(self, candidate: WristCandidate, shape: tuple[float, ...], value: float) -> Fitted:
+    def fitted(
+        self, candidate: WristCandidate, shape: tuple[float, ...], value: float
+    ) -> FittedCandidate:
         """Fit a candidate with its own law, from where its columns lead.
 
         Parameters
@@ -166,4 +168,4 @@ class Screen:
             max_nfev=MOST_TRIALS,
         )
         gain = self.energy - 2.0 * float(found.cost) - price
-        return Fitted(candidate, values(found.x), gain, price)
+        return FittedCandidate(candidate, values(found.x), gain, price)

@@ -41,7 +41,7 @@ RUBBING = frozenset(("joint_friction", "cable_wrench"))
 """Laws that stick before they slip: tried likewise, as the base takes up what holds it."""
 
 CLOSING = frozenset(("bushing_stiffness", "bushing_hardening"))
-"""Laws of a bushing: 0.5 um of play of another shape looked like one of 0.2 of its stiffness."""
+"""Laws of a bushing: what the law of play does not say quite right looks like a softer one."""
 
 UNSEEN = PRESSING | RUBBING | LOOSE
 """Laws that no slope shows as they are."""
@@ -182,8 +182,8 @@ class Search:
     def _from_wall_to_wall(self, begun: Reached) -> Reached:
         """Return play that leaves very much fitted as what is sought beside it will be.
 
-        In the next minimum play of one joint left 274,000 where it leaves 3,200, and whatever was
-        fitted beside it with rounded walls seemed to explain the difference.
+        In a wrong minimum it may leave many times as much, and whatever is fitted beside it with
+        rounded walls seems to explain the difference.
         """
         if not (begun.astray and begun.loose):
             return begun
@@ -194,7 +194,8 @@ class Search:
     def _without(self, begun: Reached, trials: Mapping[str, Reached]) -> Reached:
         """Return play fitted alone from where more beside it led: what led there may be no more.
 
-        In one joint 50 um left 117,000 alone, 1,340 beside play of another, and from there 1,420.
+        Large play of one joint may find its minimum only beside play of another, and then leave as
+        little without it.
         """
         if begun.loose:
             for name, each in trials.items():

@@ -11,7 +11,7 @@ from dataclasses import replace
 from wrist_stiffness.campaign.searching.candidates import WristCandidate
 from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import WORTH, Candidates, Reached
-from wrist_stiffness.campaign.searching.screening import Fitted
+from wrist_stiffness.campaign.searching.screening import FittedCandidate
 
 LEADING = 0.3
 """Candidates that explain this share of what the best explains are fitted too."""
@@ -107,7 +107,7 @@ def _contested(fitter: Fitter, reached: Reached, name: str, candidates: Candidat
 
 
 def with_one_more(
-    fitter: Fitter, reached: Reached, added: Fitted, instead_of: str | None = None
+    fitter: Fitter, reached: Reached, added: FittedCandidate, instead_of: str | None = None
 ) -> Reached:
     """Fit the whole base along with one effect more.
 
@@ -119,7 +119,7 @@ def with_one_more(
         Knows the model.
     reached : Reached
         Where the search stands.
-    added : Fitted
+    added : FittedCandidate
         What is added, fitted with the base to first order.
     instead_of : str, optional
         Name of an effect that leaves its place to it.

@@ -50,7 +50,7 @@ def valued(result: Diagnosis, fitted: BaseFit, whole: Collection[str] = ()) -> D
     """Return an answer with the parameters of whole fits where slopes do not say them.
 
     Where a finding stands for a whole fit, and where its own law ends so far from what the slopes
-    said that these do not hold there: a bushing is thirty times as soft, and slopes said seven.
+    said that these do not hold there: of a bushing that is many times as soft they tell a part.
 
     Parameters
     ----------
