@@ -3,9 +3,10 @@
     python bench/hidden_effects/how_much.py --processes 2
 
 Nothing is diagnosed here.  The simulation's own laws are told the largest of what hides, exactly;
-or all of it, each magnitude wrong by chance.  So no diagnosis that names as many effects, or
-finds their sizes no better, can be expected below.  Each answer is calibrated and judged as those
-of the solvers are.  Lines are kept in results/how_much.jsonl; a second start does what is missing.
+or all of it, each magnitude wrong by chance.  Each answer is calibrated and judged as those of the
+solvers are.  And effects are ordered by what they add as far as that is above a limit, below it
+by their usual sizes: how far an order must be known.  Lines are kept in results/how_much.jsonl; a
+second start does what is missing.  A wrist takes some ten minutes.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ from typing import Any
 import numpy as np
 from bench_wrist import TRUTH, code_version
 from cases import Case, full_cases
-from dictionary import design_of, dictionary
+from dictionary import Dictionary, design_of, dictionary
 from observe import Riddle, observe, pose_riddle
+from scipy.stats import spearmanr
 from score import HeldOut, floor
+from usual_sizes import usual_sizes
 
 from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
@@ -39,6 +42,9 @@ LARGEST = (0, 1, 2, 3, 5, 8, 12)
 
 WRONG = (0.0, 0.01, 0.03, 0.1, 0.3)
 """Standard deviations of the relative error of every magnitude, all effects told."""
+
+ABOVE = (0.2, 0.5, 1.0, np.inf)
+"""Times the floor above which it is told what an effect adds."""
 
 
 def version() -> str:
@@ -58,6 +64,10 @@ def ask(case: Case, folder: Path) -> list[dict[str, Any]]:
     # Largest by what each does alone to the second day.
     size = [held.contribution(part) for part in riddle.parts.values()]
     ordered = [riddle.hidden[place] for place in np.argsort(size)[::-1]]
+    lines: list[dict[str, Any]] = [
+        {"key": case.key, "version": version(), "told": name, "rank": rank}
+        for name, rank in _ranks(riddle, words, np.array(size) / least).items()
+    ]
     told = {f"largest {count}": tuple(ordered[:count]) for count in LARGEST}
     rng = np.random.default_rng(case.seed)
     chance = rng.standard_normal(len(riddle.hidden))
@@ -67,7 +77,6 @@ def ask(case: Case, folder: Path) -> list[dict[str, Any]]:
             replace(each, magnitude=each.magnitude * float(factor))
             for each, factor in zip(riddle.hidden, factors, strict=True)
         )
-    lines = []
     for name, effects in told.items():
         line = {"key": case.key, "version": version(), "told": name}
         try:
@@ -78,6 +87,24 @@ def ask(case: Case, folder: Path) -> list[dict[str, Any]]:
         error = held.error(riddle.train.residual - one, riddle.test.residual - two)
         lines.append(line | {"after": float(error / least)})
     return lines
+
+
+def _ranks(riddle: Riddle, words: Dictionary, added: np.ndarray) -> dict[str, float]:
+    """Return Spearman's correlations of orders that are exact above a limit."""
+    usual = usual_sizes(riddle, words).suspects
+    said = np.array([usual.get(name, 0.0) for name in riddle.parts])
+    highest = float(said.max())
+    return {
+        _order(limit): float(
+            spearmanr(added, np.where(added > limit, highest + added, said)).statistic
+        )
+        for limit in ABOVE
+    }
+
+
+def _order(limit: float) -> str:
+    exact = f", exact above {limit:g} x the floor" if limit < np.inf else ""
+    return f"order by usual sizes{exact}"
 
 
 def explained(riddle: Riddle, effects: tuple[HiddenEffect, ...]) -> list[np.ndarray]:
@@ -94,9 +121,14 @@ def explained(riddle: Riddle, effects: tuple[HiddenEffect, ...]) -> list[np.ndar
 def table(lines: Sequence[dict[str, Any]]) -> str:
     """Return medians and ranges in Markdown, in the order in which things are told."""
     names = [*(f"largest {n}" for n in LARGEST), *(f"all, wrong by {s:.0%}" for s in WRONG)]
-    rows = ["| told | wrists | error after, median | least | most |", "|---|---|---|---|---|"]
+    names += [_order(limit) for limit in ABOVE]
+    rows = [
+        "| told | wrists | error after, or rank: median | least | most |",
+        "|---|---|---|---|---|",
+    ]
     for name in names:
-        found = [line["after"] for line in lines if line["told"] == name and "after" in line]
+        own = [line for line in lines if line["told"] == name]
+        found = [line.get("after", line.get("rank")) for line in own if "error" not in line]
         if found:
             rows.append(
                 f"| {name} | {len(found)} | {np.median(found):.2f} "
