@@ -16,7 +16,7 @@ from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
 from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -156,10 +156,7 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     )
     nominal = rigid_rotation(model.table, session.block.theta)
     error = session.rotation @ np.swapaxes(nominal, -1, -2)
-    known = np.isfinite(error).all(axis=(1, 2))
-    turn = np.full((len(session), 3), np.nan)
-    turn[known] = Rotation.from_matrix(error[known]).as_rotvec()
-    values = np.concatenate([session.shift, turn], axis=1)
+    values = np.concatenate([session.shift, rotation_vector(error)], axis=1)
     units = len(parts.dwell)
     lost = _lost(values, parts)
     stated = np.zeros(6) if session.covariance is None else np.diag(session.covariance)

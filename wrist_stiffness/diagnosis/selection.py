@@ -10,7 +10,7 @@ do that down to the noise.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f
+from scipy.special import fdtrc
 
 from wrist_stiffness.diagnosis.hypotheses import Evidence, Hypothesis, addition, refined
 from wrist_stiffness.diagnosis.permutation import rearranged_residuals
@@ -211,4 +211,4 @@ def _stands_out(
         return True
     spare = max(dimension - size, 2.0)
     ratio = (gain / max(size, 1)) / (1 + remaining / spare)
-    return bool(f.sf(ratio, size, spare) < settings.alpha)
+    return bool(fdtrc(size, spare, ratio) < settings.alpha)

@@ -180,7 +180,10 @@ class Mechanism:
             raise InputError(f"motor angles {angles_text(bad)}: not finite")
         constant, cosine, sine = (part[..., columns] for part in self._turn_parts)
         angle = theta[..., None, None]
-        return constant + np.cos(angle) * cosine + np.sin(angle) * sine
+        turned = np.cos(angle) * cosine
+        turned += constant
+        turned += np.sin(angle) * sine
+        return turned
 
     def closure_radicand(self, theta: Array) -> Array:
         """Gram determinant of b, c and d, which is D^2; negative where the loop cannot close.

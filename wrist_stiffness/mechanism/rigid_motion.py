@@ -53,6 +53,29 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
     return rotation, shift
 
 
+def rotation_vector(rotation: Array) -> Array:
+    """Return the rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3).
+
+    For small angles to the last digit, and in a third of SciPy's time.
+    """
+    # Twice the sine of the angle times the axis.
+    w = np.empty(rotation.shape[:-1])
+    w[..., 0] = rotation[..., 2, 1] - rotation[..., 1, 2]
+    w[..., 1] = rotation[..., 0, 2] - rotation[..., 2, 0]
+    w[..., 2] = rotation[..., 1, 0] - rotation[..., 0, 1]
+    sine = 0.5 * np.sqrt(dot(w, w))
+    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1.0)
+    turned = sine > 0.0
+    w *= np.where(turned, 0.5 * np.arctan2(sine, cosine) / np.where(turned, sine, 1.0), 0.5)[
+        ..., None
+    ]
+    # The sine fades towards a half turn; measured poses can be anywhere.
+    large = cosine < COSINE_OF_LARGE_ANGLE
+    if np.any(large):
+        w[large] = Rotation.from_matrix(rotation[large]).as_rotvec()
+    return w
+
+
 def log_motion(rotation: Array, shift: Array) -> Array:
     """Return the twist whose exponential is a rigid motion (inverse of `exp_twist`).
 
@@ -68,21 +91,7 @@ def log_motion(rotation: Array, shift: Array) -> Array:
     (..., 6) float
         Twist at O in F [m, rad].
     """
-    # Twice the sine of the angle times the axis.
-    w = np.empty(shift.shape)
-    w[..., 0] = rotation[..., 2, 1] - rotation[..., 1, 2]
-    w[..., 1] = rotation[..., 0, 2] - rotation[..., 2, 0]
-    w[..., 2] = rotation[..., 1, 0] - rotation[..., 0, 1]
-    sine = 0.5 * np.sqrt(dot(w, w))
-    cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1.0)
-    if np.any(cosine < COSINE_OF_LARGE_ANGLE):
-        # The sine fades towards a half turn; measured poses can be anywhere.
-        w = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec().reshape(shift.shape)
-    else:
-        turned = sine > 0.0
-        w *= np.where(turned, 0.5 * np.arctan2(sine, cosine) / np.where(turned, sine, 1.0), 0.5)[
-            ..., None
-        ]
+    w = rotation_vector(rotation)
     angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE
     safe = np.where(small, 1.0, angle)

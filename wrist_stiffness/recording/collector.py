@@ -192,7 +192,9 @@ class Collector:
                 }
             )
             order.append(batch.indices)
-        if parts:
+        if len(parts) == 1:
+            self.blocks.extend(parts)
+        elif parts:
             received = np.argsort(np.concatenate(order))
             self.blocks.append({key: value[received] for key, value in _joined(parts).items()})
 

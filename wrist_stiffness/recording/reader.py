@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import yaml
 
 from wrist_stiffness.errors import RecordingError
@@ -27,6 +28,10 @@ from wrist_stiffness.recording.mcap_index import McapIndex, Span, index_mcap
 from wrist_stiffness.recording.messages import Message
 
 METADATA_FILE = "metadata.yaml"
+
+PAYLOADS_AT_A_TIME = 10_000
+"""So many of one topic are given together: a chunk has some hundred, and each step of decoding them
+costs as much for a hundred as for a thousand."""
 
 
 @dataclass(frozen=True)
@@ -171,15 +176,23 @@ class Recording:
                 for number, channel in index.channels.items()
                 if channel.topic in topics
             }
+            runs: dict[int, list[tuple[Times, Payloads]]] = {number: [] for number in wanted}
             for chunk in index.chunks:
                 try:
                     found = payloads_in(chunk, wanted)
                 except RecordingError as error:
                     self._report(f"{error}, its messages are left out")
                     continue
-                for number, (log_times, payloads) in found.items():
-                    if len(payloads):
-                        yield wanted[number], log_times, payloads
+                for number, part in found.items():
+                    run = runs[number]
+                    if run and not _one_more(run, part):
+                        yield wanted[number], *_joined(run)
+                        run.clear()
+                    if len(part[1]):
+                        run.append(part)
+            for number, run in runs.items():
+                if run:
+                    yield wanted[number], *_joined(run)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:
         """Iterate over the decoded messages in log-time order.
@@ -271,6 +284,27 @@ def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Record
     else:
         raise RecordingError(f"{path} does not exist")
     return Recording(path, [index_mcap(file) for file in files], flaws, strict)
+
+
+def _one_more(run: list[tuple[Times, Payloads]], part: tuple[Times, Payloads]) -> bool:
+    """Tell whether payloads go on with those of the chunks before: of one form, and not too many."""
+    if sum(len(payloads) for _, payloads in run) >= PAYLOADS_AT_A_TIME:
+        return False
+    return _size(run[-1][1]) == _size(part[1])
+
+
+def _size(payloads: Payloads) -> int | None:
+    """Return the size of payloads that all have one, None of others."""
+    return payloads.shape[1] if isinstance(payloads, np.ndarray) else None
+
+
+def _joined(run: list[tuple[Times, Payloads]]) -> tuple[Times, Payloads]:
+    """Return the payloads of several chunks as those of one."""
+    times = np.concatenate([times for times, _ in run])
+    rows = [payloads for _, payloads in run if isinstance(payloads, np.ndarray)]
+    if rows:
+        return times, np.concatenate(rows)
+    return times, [payload for _, payloads in run for payload in payloads]
 
 
 def _files_of_folder(folder: Path, flaws: list[str]) -> list[Path]:

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.observing import Observed, predict_units, tabulate
 from wrist_stiffness.campaign.unit_session import UnitSession
@@ -19,7 +18,7 @@ from wrist_stiffness.diagnosis.observations import Mask, Observations
 from wrist_stiffness.diagnosis.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -208,7 +207,7 @@ def _bow(
     def registered(theta: Array) -> Array:
         moved = mechanism.forward(theta + zero).platform
         nominal = np.swapaxes(mechanism.forward(theta).platform, -1, -2)
-        turn = Rotation.from_matrix(instrument[0] @ moved @ target[0] @ nominal).as_rotvec()
+        turn = rotation_vector(instrument[0] @ moved @ target[0] @ nominal)
         return np.hstack([(moved @ target[1]) @ instrument[0].T + instrument[1], turn])
 
     theta = session.block.theta

@@ -20,8 +20,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
-from scipy.stats import norm
+from scipy.special import logsumexp, ndtr
 
 from wrist_stiffness.campaign.planning.signatures import Signature
 from wrist_stiffness.campaign.planning.timeline import Experiment
@@ -314,7 +313,7 @@ def _squares(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
 
 def chance_right(discriminations: Array | float) -> Array:
     """Return the probability that the data prefer the truth to its rival."""
-    right: Array = norm.cdf(0.5 * np.asarray(discriminations))
+    right: Array = ndtr(0.5 * np.asarray(discriminations))
     return right
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.campaign.reading.registration import place_left, turn_left
 from wrist_stiffness.campaign.reading.spikes import WINDOW, spikes
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.rigid_motion import log_motion
+from wrist_stiffness.mechanism.rigid_motion import rotation_vector
 
 DENSE_S = 0.2
 """Median time between poses below which single ones are compared with their neighbours [s]."""
@@ -53,8 +53,7 @@ def lost_beams(
     """
     if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
         return np.zeros(len(time), dtype=bool)
-    steps = rigid[1:] @ np.swapaxes(rigid[:-1], 1, 2)
-    way = log_motion(steps, np.zeros((len(steps), 3)))[:, 3:]
+    way = rotation_vector(rigid[1:] @ np.swapaxes(rigid[:-1], 1, 2))
     swing = _swing(time, way)
     moving = swing > MOVING_RAD
     turn = turn_left(rotation, rigid)

@@ -77,7 +77,7 @@ class MachineSignals:
         own = self.angles.time_ns
         during = (own[0] <= time_ns) & (time_ns <= own[-1])
         near = self.angles.near(time_ns, round(JOINT_GAP_S * NANOSECONDS))
-        way, straight = self._between(time_ns)
+        way, straight = self._told_between(time_ns)
         newest = self.loads.newest(time_ns)
         age = time_ns - self.loads.time_ns[newest]
         loads = (newest >= 0) & (age <= round(load_age_limit_s * NANOSECONDS))
@@ -98,7 +98,7 @@ class MachineSignals:
             usable &= known
         return usable, tuple(reasons)
 
-    def _between(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def _told_between(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Tell what is known of the way between the joint states around stamps (n,).
 
         Returns
@@ -106,9 +106,22 @@ class MachineSignals:
         way, straight : (n,) bool
             Where it is no pause, or one without motion; where it is as good as straight.
         """
-        own, angle = self.angles.time_ns, self.angles.interpolated
+        own = self.angles.time_ns
         before = own[np.maximum(self.angles.newest(time_ns), 0)]
         after = own[np.minimum(np.searchsorted(own, time_ns), len(own) - 1)]
+        way, straight = np.ones((2, len(time_ns)), dtype=bool)
+        apart = after - before > DENSE_S * NANOSECONDS
+        if apart.any():
+            way[apart], straight[apart] = self._between(
+                time_ns[apart], before[apart], after[apart]
+            )
+        return way, straight
+
+    def _between(
+        self, time_ns: Stamps, before: Stamps, after: Stamps
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Tell the same of stamps whose joint states before and after are not dense, (n,) each."""
+        own, angle = self.angles.time_ns, self.angles.interpolated
         gap = after - before
         nearest = np.where(time_ns - before < after - time_ns, before, after)
         # As far as it came in as much time outside the pause, it may have gone on.
@@ -124,8 +137,7 @@ class MachineSignals:
         share = into * (1.0 - into)
         bent = 0.5 * share[:, None] * np.max(np.abs(np.diff(way, axis=0)), axis=0)
         still = (np.maximum(moved, bent) <= STILL_RAD).all(axis=1)
-        dense, near = (gap <= limit * NANOSECONDS for limit in (DENSE_S, WAY_S))
-        return near | still, dense | (bent <= BENT_RAD).all(axis=1)
+        return (gap <= WAY_S * NANOSECONDS) | still, (bent <= BENT_RAD).all(axis=1)
 
     def at(self, time_ns: Stamps) -> Block:
         """Return the signals that belong to usable stamps (n,) [ns], which rise."""

@@ -238,6 +238,8 @@ def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tup
 
 def last_of_equal(time_ns: Stamps) -> NDArray[np.intp]:
     """Return the rows in the order of their stamps; of equal stamps only the last one received."""
+    if np.all(np.diff(time_ns) > 0):
+        return np.arange(len(time_ns))
     _, reverse = np.unique(time_ns[::-1], return_index=True)
     return len(time_ns) - 1 - reverse
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import rotation_vector
 
 POSES_USED = 1000
 
@@ -129,16 +130,17 @@ def turn_left(measured: Array, rigid: Array) -> Array:
     known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
     if len(known) == 0:
         return left
-    seen, said = Rotation.from_matrix(measured[known]), Rotation.from_matrix(rigid[known])
-    used = np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))
-    seen_used, said_used, weight = seen[used], said[used], np.ones(len(used))
+    used = known[np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))]
+    seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
+    weight = np.ones(len(used))
     for _ in range(ROUNDS):
-        instrument = _instrument(seen_used, said_used, weight)
-        target = (said_used.inv() * instrument.inv() * seen_used).mean(weight)
-        off = (seen_used * (instrument * said_used * target).inv()).magnitude()
+        instrument = _instrument(seen, said, weight)
+        target = (said.inv() * instrument.inv() * seen).mean(weight)
+        off = (seen * (instrument * said * target).inv()).magnitude()
         # All keep a say: at rest the misfit is least, and it is motion that tells the instrument.
         weight = 1.0 / (off**2 + (SOUND * np.median(off)) ** 2 + np.finfo(float).eps)
-    left[known] = (instrument.inv() * seen * target.inv() * said.inv()).as_rotvec()
+    turned_back = instrument.inv().as_matrix() @ measured[known] @ target.inv().as_matrix()
+    left[known] = rotation_vector(turned_back @ np.swapaxes(rigid[known], 1, 2))
     return left
 
 

@@ -203,7 +203,9 @@ def session_of(
             "the load never changes: what the load does and what is always there look the same"
         )
     path_ns = path_stamps(machine, time_ns, table, load_age_limit_s)
-    all_ns = np.union1d(time_ns, path_ns)
+    place = np.searchsorted(time_ns, path_ns)
+    new = time_ns[np.minimum(place, len(time_ns) - 1)] != path_ns
+    all_ns = np.insert(time_ns, place[new], path_ns[new])
     rows = np.searchsorted(all_ns, time_ns)
     session = MeasuredSession(
         name,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
@@ -65,8 +65,7 @@ def _apart(column: Array) -> Array:
     apart = np.zeros(len(column))
     known = np.flatnonzero(np.isfinite(column))
     if len(known) >= WINDOW:
-        windows = sliding_window_view(np.pad(column[known], WINDOW // 2, mode="edge"), WINDOW)
-        apart[known] = np.abs(column[known] - np.median(windows, axis=1))
+        apart[known] = np.abs(column[known] - median_filter(column[known], WINDOW, mode="nearest"))
     return apart
 
 

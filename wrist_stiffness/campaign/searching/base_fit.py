@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import lstsq
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import (
@@ -50,7 +50,7 @@ of the base is a search for where the pins rest."""
 
 Walls = Literal["sharp", "rounded first", "rounded"]
 
-MEDIAN_CHI2 = float(chi2.ppf(0.5, 1))
+MEDIAN_CHI2 = float(chdtri(1, 0.5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class BaseFit:
     @property
     def strained(self) -> bool:
         """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
-        return bool(chi2.sf(self.strain, np.count_nonzero(self.tolerances)) < 0.05)
+        return bool(chdtrc(np.count_nonzero(self.tolerances), self.strain) < 0.05)
 
     @property
     def variance(self) -> float:

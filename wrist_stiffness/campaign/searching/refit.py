@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from wrist_stiffness.campaign.searching.base_fit import LOOSE, BaseFit, Walls
 from wrist_stiffness.campaign.searching.fitter import Fitter
@@ -191,7 +191,7 @@ def _least(effect: Effect, others: Sequence[Effect], fall: Mapping[str, float]) 
         for each in others
     }
     inexact = sum(share**2 * fall[name] for name, share in shares.items())
-    return max(float(chi2.isf(CHANCE, len(effect.parameters))), inexact)
+    return max(float(chdtri(len(effect.parameters), CHANCE)), inexact)
 
 
 def _less(fitter: Fitter, base: BaseFit, fitted: BaseFit, others: Sequence[Effect]) -> BaseFit:
