@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wrist_stiffness.campaign.in_pieces import in_pieces
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.block import Block
 
@@ -35,7 +36,7 @@ def beyond_range(table: Table, block: Block) -> list[str]:
                 f"{beyond} of {of} measured poses are not used: the {name} at O goes up to "
                 f"{size.max():.3g} {unit}, the table's limit is {limit:.3g} {unit}"
             )
-    outside = ~table.workspace.domain(block.theta)
+    outside = ~in_pieces(table.workspace.domain, block.theta)
     if outside.any():
         first = ", ".join(f"{angle:.1f}" for angle in np.degrees(block.theta[outside][0]))
         turns = np.abs(block.theta).max() > 2.0 * np.pi

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.in_pieces import in_pieces
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.campaign.table_range import beyond_range
 from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
 from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
@@ -154,9 +154,13 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         model.table.geometry.limits.encoder_step,
         np.asarray(session.measured.any(axis=1)),
     )
-    nominal = rigid_rotation(model.table, session.block.theta)
-    error = session.rotation @ np.swapaxes(nominal, -1, -2)
-    values = np.concatenate([session.shift, rotation_vector(error)], axis=1)
+    rigid = model.table.mechanism.platform_rotation
+    turn = in_pieces(
+        lambda theta, rotation: rotation_vector(rotation @ np.swapaxes(rigid(theta), 1, 2)),
+        session.block.theta,
+        session.rotation,
+    )
+    values = np.concatenate([session.shift, turn], axis=1)
     units = len(parts.dwell)
     lost = _lost(values, parts)
     stated = np.zeros(6) if session.covariance is None else np.diag(session.covariance)

@@ -236,16 +236,7 @@ class Mechanism:
         turned = self._turned(theta)
         driven = turned[..., 3]
         b, d = driven[..., 0, :], driven[..., 1, :]
-        k = dot(b, d)
-        gram = gram_determinant(k, *self._cosines)
-        if not (gram > GRAM_ROUNDING).all():
-            self._refuse_open_loop(theta, k, gram)
-        # D is the determinant of b, d and c.
-        determinant = self.assembly_mode * np.sqrt(gram)
-        across = cross(b, d)
-        c = third_axis(b, d, across, k, *self._cosines, determinant)
-        # The closure is exact only to rounding; unit length keeps the rotations orthonormal.
-        c = unit(c)
+        c, across, determinant = self._closed(theta, b, d)
         rows = np.empty((*theta.shape[:-1], 2, 3, 3))
         rows[..., 0, :] = driven
         rows[..., 1, :] = c[..., None, :]
@@ -260,6 +251,46 @@ class Mechanism:
         dual[..., 2, :] = -to_c[..., 0, :]
         dual /= determinant[..., None, None]
         return Configuration(theta, b, c, d, determinant, dual, bodies)
+
+    def platform_rotation(self, theta: Array) -> Array:
+        """Rotation U -> F of the rigid platform alone, in a third of the time of `forward`.
+
+        Parameters
+        ----------
+        theta : (..., 2) float
+            Motor angles [rad].
+
+        Returns
+        -------
+        (..., 3, 3) float
+            The same as `forward` gives.
+
+        Raises
+        ------
+        InputError
+            If an angle is not finite.
+        UnreachablePoseError
+            If the loop does not close at one of the poses (the first one is named).
+        """
+        theta = np.asarray(theta, dtype=float)
+        driven = self._turned(theta, slice(3, 4))[..., 0]
+        b, d = driven[..., 0, :], driven[..., 1, :]
+        c, _, _ = self._closed(theta, b, d)
+        rows = np.stack([b, c, cross(b, c)], axis=-2)
+        return np.asarray(np.swapaxes(self._home_inverse[0] @ rows, -1, -2))
+
+    def _closed(self, theta: Array, b: Array, d: Array) -> tuple[Array, Array, Array]:
+        """Return axis c that closes the loop with b and d, b x d, and D; refuse where none does."""
+        k = dot(b, d)
+        gram = gram_determinant(k, *self._cosines)
+        if not (gram > GRAM_ROUNDING).all():
+            self._refuse_open_loop(theta, k, gram)
+        # D is the determinant of b, d and c.
+        determinant = self.assembly_mode * np.sqrt(gram)
+        across = cross(b, d)
+        c = third_axis(b, d, across, k, *self._cosines, determinant)
+        # The closure is exact only to rounding; unit length keeps the rotations orthonormal.
+        return unit(c), across, determinant
 
     def _refuse_open_loop(self, theta: Array, k: Array, gram: Array) -> None:
         wrong = ~(gram > GRAM_ROUNDING)

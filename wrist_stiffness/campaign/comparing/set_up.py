@@ -161,7 +161,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
     def said() -> tuple[Array, Array]:
         """Rotation and shift of the platform as the instrument should see it."""
         turn, shift = exp_twist(predicted + softness @ tare)
-        turn = turn @ mechanism.forward(theta + zero).platform
+        turn = turn @ mechanism.platform_rotation(theta + zero)
         shift = shift + turn @ target[1]
         return instrument[0] @ turn @ target[0], shift @ instrument[0].T + instrument[1]
 
@@ -205,8 +205,8 @@ def _bow(
     """
 
     def registered(theta: Array) -> Array:
-        moved = mechanism.forward(theta + zero).platform
-        nominal = np.swapaxes(mechanism.forward(theta).platform, -1, -2)
+        moved = mechanism.platform_rotation(theta + zero)
+        nominal = np.swapaxes(mechanism.platform_rotation(theta), -1, -2)
         turn = rotation_vector(instrument[0] @ moved @ target[0] @ nominal)
         return np.hstack([(moved @ target[1]) @ instrument[0].T + instrument[1], turn])
 
@@ -225,17 +225,13 @@ def _softness(model: ErrorModel, session: UnitSession, theta: Array) -> Array:
     still = Block(
         mean(block.time), theta, mean(block.load), load_on_platform=block.load_on_platform
     )
-    bare = model.with_effects()
-    before = bare.batch(still).twist
-    columns = []
-    for axis, step in enumerate(LOAD_STEP):
-        # Towards zero, so that no load leaves the table's range.
-        moved = np.where(still.load[:, axis] > 0.0, -step, step)
-        load = still.load.copy()
-        load[:, axis] += moved
-        after = bare.batch(replace(still, load=load)).twist
-        columns.append((after - before) / moved[:, None])
-    return np.nan_to_num(np.stack(columns, axis=-1))
+    # Towards zero, so that no load leaves the table's range.
+    step = np.where(still.load > 0.0, -LOAD_STEP, LOAD_STEP)
+    load = still.load[:, None] + step[:, None] * np.vstack([np.zeros(6), np.eye(6)])
+    beside = still.take(np.repeat(np.arange(len(still)), load.shape[1]))
+    twist = model.with_effects().batch(replace(beside, load=load.reshape(-1, 6))).twist
+    twist = np.swapaxes(twist.reshape(load.shape), 1, 2)
+    return np.nan_to_num((twist[:, :, 1:] - twist[:, :, :1]) / step[:, None])
 
 
 def _solved(columns: Array, residual: Array, taken: Array) -> Array:

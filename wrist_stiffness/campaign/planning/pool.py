@@ -189,7 +189,7 @@ def _visitable(workspace: Workspace, theta: Array, reference: Array) -> bool:
 def _platforms(workspace: Workspace, theta: Array, approach: Array) -> Array:
     """Return the platform's rotations on both approaches, (n, 3, 3)."""
     way = theta + np.linspace(-1.0, 1.0, 9)[:, None] * (theta - Visit(theta, approach).before)
-    return workspace.mechanism.forward(way).platform
+    return workspace.mechanism.platform_rotation(way)
 
 
 def _approachable(workspace: Workspace, theta: Array, reference: Array, side: Array) -> bool:

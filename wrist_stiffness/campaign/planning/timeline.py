@@ -259,7 +259,7 @@ class _Clock:
     def timeline(self) -> Timeline:
         time, theta, speed, loads = (list(column) for column in zip(*self._samples, strict=True))
         angles = np.array(theta)
-        platform = self._workspace.mechanism.forward(angles).platform
+        platform = self._workspace.mechanism.platform_rotation(angles)
         wrench = np.array([load.wrench(turn) for load, turn in zip(loads, platform, strict=True)])
         block = Block(np.array(time), angles, wrench, np.array(speed))
         rows, visit, moving = (

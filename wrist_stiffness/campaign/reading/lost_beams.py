@@ -6,6 +6,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from wrist_stiffness.campaign.in_pieces import in_pieces
 from wrist_stiffness.campaign.reading.registration import place_left, turn_left
 from wrist_stiffness.campaign.reading.spikes import WINDOW, spikes
 from wrist_stiffness.mechanism.components import Array
@@ -53,7 +54,7 @@ def lost_beams(
     """
     if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
         return np.zeros(len(time), dtype=bool)
-    way = rotation_vector(rigid[1:] @ np.swapaxes(rigid[:-1], 1, 2))
+    way = in_pieces(_turn_between, rigid[:-1], rigid[1:])
     swing = _swing(time, way)
     moving = swing > MOVING_RAD
     turn = turn_left(rotation, rigid)
@@ -63,6 +64,11 @@ def lost_beams(
     for each in (turn, _across(turn, way, step)):
         lost |= spikes(each, LEAST_SPIKE_STEPS * step, swing, moving)
     return lost
+
+
+def _turn_between(first: Array, second: Array) -> Array:
+    """Return the rotation vectors (n, 3) that turn rotations (n, 3, 3) into others [rad]."""
+    return rotation_vector(second @ np.swapaxes(first, 1, 2))
 
 
 def _swing(time: Array, way: Array) -> Array:

@@ -231,10 +231,11 @@ def _doubted(temperatures: Mapping[str, Signal]) -> tuple[str, ...]:
 def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
     wrench = np.empty_like(loads.wrench)
     on_platform = {}
-    for name in np.unique(loads.frame_id).tolist():
+    names = np.unique(loads.frame_id).tolist()
+    for name in names:
         # Moving a wrench to O is linear, so six unit wrenches tell all of it.
         moved = [frames.load(name, unit[:3], unit[3:]) for unit in np.eye(6).tolist()]
-        rows = loads.frame_id == name
+        rows = loads.frame_id == name if len(names) > 1 else slice(None)
         wrench[rows] = loads.wrench[rows] @ np.array([load.wrench for load in moved])
         on_platform[name] = moved[0].on_platform
     if len(set(on_platform.values())) > 1:

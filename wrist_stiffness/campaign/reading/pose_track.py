@@ -18,6 +18,9 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
 
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+"""Quaternion, scalar last."""
+
 MOVED = 2.0
 """Variance over that of its white noise from which on the frame has moved, not only been noisy."""
 
@@ -160,10 +163,10 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
     turn, origin = base_transform(poses.frame_id, what, frames)
     shift, quaternion = measured_components(poses)
     turned = np.isfinite(quaternion).all(axis=1)
-    rotation = np.full((len(shift), 3, 3), np.nan)
-    rotation[turned] = turn @ Rotation.from_quat(quaternion[turned]).as_matrix()
+    rotation = Rotation.from_quat(np.where(turned[:, None], quaternion, IDENTITY)).as_matrix()
+    rotation[~turned] = np.nan
     if np.any(turn != np.eye(3)):  # NaN times zero would spread to the other components
-        shift = shift @ turn.T
+        shift, rotation = shift @ turn.T, turn @ rotation
     huge = np.diagonal(poses.covariance, axis1=1, axis2=2) >= NOT_MEASURED
     covariance = _stated(poses.covariance, ~huge)
     if covariance is not None:

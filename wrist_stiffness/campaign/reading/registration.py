@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.in_pieces import in_pieces
 from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
@@ -126,10 +127,9 @@ def turn_left(measured: Array, rigid: Array) -> Array:
         Rotation vectors in F, from rigid to measured with the instrument and the target turned
         back [rad].
     """
-    left = np.full((len(measured), 3), np.nan)
     known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
     if len(known) == 0:
-        return left
+        return np.full((len(measured), 3), np.nan)
     used = known[np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))]
     seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
     weight = np.ones(len(used))
@@ -139,9 +139,12 @@ def turn_left(measured: Array, rigid: Array) -> Array:
         off = (seen * (instrument * said * target).inv()).magnitude()
         # All keep a say: at rest the misfit is least, and it is motion that tells the instrument.
         weight = 1.0 / (off**2 + (SOUND * np.median(off)) ** 2 + np.finfo(float).eps)
-    turned_back = instrument.inv().as_matrix() @ measured[known] @ target.inv().as_matrix()
-    left[known] = rotation_vector(turned_back @ np.swapaxes(rigid[known], 1, 2))
-    return left
+    back, and_back = instrument.inv().as_matrix(), target.inv().as_matrix()
+    return in_pieces(
+        lambda here, there: rotation_vector(back @ here @ and_back @ np.swapaxes(there, 1, 2)),
+        measured,
+        rigid,
+    )
 
 
 def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
@@ -162,8 +165,8 @@ def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
         Distance of the target from its place in U, as far as motion tells it [m].
     """
     used = np.unique(np.linspace(0, len(shift) - 1, POSES_USED).astype(int))
-    places = np.concatenate([rigid, np.broadcast_to(np.eye(3), rigid.shape)], axis=2)
-    design, seen = places[used].reshape(-1, 6), shift[used].ravel()
+    places = np.concatenate([rigid[used], np.tile(np.eye(3), (len(used), 1, 1))], axis=2)
+    design, seen = places.reshape(-1, 6), shift[used].ravel()
     good = np.isfinite(seen)
     if not good.any():
         return shift, 0.0
@@ -173,4 +176,4 @@ def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
         off = np.abs(seen - design @ fitted)
         # A lost beam is far beyond three times the median of what is left.
         good = off <= SOUND * np.nanmedian(off)
-    return shift - places @ fitted, float(np.linalg.norm(fitted[:3]))
+    return shift - rigid @ fitted[:3] - fitted[3:], float(np.linalg.norm(fitted[:3]))

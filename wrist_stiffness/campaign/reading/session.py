@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.campaign.in_pieces import in_pieces
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.clocks import ClockOffset, clock_offset
 from wrist_stiffness.campaign.reading.lost_beams import lost_beams
@@ -179,7 +180,7 @@ def session_of(
     usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
     remarks += reasons
     time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
-    reachable = table.mechanism.reachable(machine.angles.interpolated(time_ns))
+    reachable = in_pieces(table.mechanism.reachable, machine.angles.interpolated(time_ns))
     if not reachable.all():
         remarks.append(
             f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"

@@ -52,18 +52,14 @@ def _alone(time: Array, values: Array) -> NDArray[np.bool_]:
     """Tell which values (n, 2), the outer ones aside, are alone off the line, (n - 4, 2)."""
     # Rows of each value with those around it, and of its neighbours with those without it.
     off, before, after = (
-        _off_the_line(time, values, *(np.arange(2, len(time) - 2) + k for k in ks))
+        _off_the_line(time, values, *(slice(2 + k, len(time) - 2 + k) for k in ks))
         for ks in ((-1, 0, 1), (-2, -1, 1), (-1, 1, 2))
     )
     return np.asarray(off > np.maximum(LEAST_WILD_RAD, ALONE * np.maximum(before, after)))
 
 
 def _off_the_line(
-    time: Array,
-    values: Array,
-    first: NDArray[np.intp],
-    middle: NDArray[np.intp],
-    last: NDArray[np.intp],
+    time: Array, values: Array, first: slice, middle: slice, last: slice
 ) -> Array:
     """Return how far middle values (k, 2) are from the straight line between two others."""
     share = ((time[middle] - time[first]) / (time[last] - time[first]))[:, None]

@@ -70,7 +70,7 @@ def _carried(motion: Motion, now: Motion, ahead_s: float) -> Array:
 
 def _turn(at: Situation, theta: Array) -> Array:
     """Return the platform's turn (n, 6) from where a situation has it to other motor angles."""
-    moved = at.table.mechanism.forward(theta).platform
+    moved = at.table.mechanism.platform_rotation(theta)
     turned = moved @ np.swapaxes(at.body("platform"), -1, -2)
     return log_motion(turned, np.zeros((len(theta), 3)))
 
