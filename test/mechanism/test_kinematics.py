@@ -232,6 +232,15 @@ def test_jacobian_equals_finite_differences(mechanism):
         np.testing.assert_allclose(jacobian[:, :, motor], omega, atol=1e-9)
 
 
+def test_platform_alone_is_that_of_all_bodies(mechanism):
+    theta = poses(mechanism, 6).reshape(2, 3, 2)
+    platform = mechanism.forward(theta).platform
+    np.testing.assert_allclose(mechanism.platform_rotation(theta), platform, atol=ROUNDING)
+    np.testing.assert_allclose(
+        mechanism.platform_rotation(theta[1, 2]), platform[1, 2], atol=ROUNDING
+    )
+
+
 def test_single_pose_equals_stack_and_repeats_to_the_bit(mechanism):
     theta = poses(mechanism, 6).reshape(2, 3, 2)
     stack = mechanism.forward(theta)

@@ -29,20 +29,23 @@ def unreachable_pose(mechanism):
     return theta[np.argmin(mechanism.closure_radicand(theta))]
 
 
+@pytest.mark.parametrize("function", ["forward", "platform_rotation"])
 @pytest.mark.parametrize("stacked", [False, True])
-def test_unreachable_pose_is_named(stacked):
+def test_unreachable_pose_is_named(stacked, function):
     mechanism = SKEWED
     pose = unreachable_pose(mechanism)
     assert not mechanism.reachable(pose)
     theta = np.stack([np.zeros(2), pose, pose + 0.01]) if stacked else pose
     with pytest.raises(UnreachablePoseError, match="does not close") as caught:
-        mechanism.forward(theta)
+        getattr(mechanism, function)(theta)
     first, second = np.degrees(pose)
     assert f"({first:.3f}, {second:.3f}) deg" in str(caught.value)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("function", ["forward", "reachable", "tilt", "closure_radicand"])
+@pytest.mark.parametrize(
+    "function", ["forward", "platform_rotation", "reachable", "tilt", "closure_radicand"]
+)
 def test_angle_that_is_not_finite_is_named(function, bad):
     with pytest.raises(InputError, match=rf"\({bad:.3f}, 57\.296\) deg: not finite"):
         getattr(C_HORIZONTAL, function)(np.array([[0.0, 0.0], [bad, 1.0]]))

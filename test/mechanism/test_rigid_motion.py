@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.mechanism.vectors import skew
 
 twists = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(np.array)
@@ -32,12 +32,18 @@ def test_logarithm_undoes_the_exponential(direction, size):
     np.testing.assert_allclose(log_motion(*exp_twist(twist)), twist, rtol=1e-9, atol=2e-16)
 
 
-@pytest.mark.parametrize("angle", [1.9, 2.2, 3.0, 3.1415])
+@pytest.mark.parametrize("angle", [1.9, 2.2, 3.0, 3.1415, np.pi - 1e-9])
 def test_logarithm_of_large_turns(angle):
     axis = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25)
     rotation = Rotation.from_rotvec(angle * axis).as_matrix()
     found = log_motion(rotation, np.zeros(3))
     np.testing.assert_allclose(found[3:], angle * axis, rtol=1e-9)
+    # One large turn among small ones, as a lost beam is among measured errors.
+    small = Rotation.from_rotvec(1e-7 * axis).as_matrix()
+    beside = rotation_vector(np.stack([[small, rotation], [np.full((3, 3), np.nan), small]]))
+    np.testing.assert_allclose(beside[0, 1], angle * axis, rtol=1e-9)
+    np.testing.assert_allclose(beside[[0, 1], [0, 1]], [1e-7 * axis] * 2, rtol=1e-9)
+    assert np.isnan(beside[1, 0]).all()
 
 
 def test_many_at_once_as_one_by_one():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples
+from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples, reader
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.messages import (
     Float64,
@@ -61,15 +61,24 @@ def test_joints_are_found_by_name_in_any_order(tmp_path):
     assert samples.faults == ()
 
 
-def test_rows_equal_the_messages_over_many_blocks(tmp_path):
+@pytest.mark.parametrize(
+    "choices",
+    [
+        # At random: batches must come back in the order of reception.
+        np.random.default_rng(5).integers(2, size=9000),
+        # In runs of many chunks: what is gathered of them must be of one form.
+        np.repeat([0, 1, 0], 3000),
+        np.zeros(9000, dtype=int),
+    ],
+    ids=["mixed", "in runs", "alike"],
+)
+def test_rows_equal_the_messages_over_many_blocks(tmp_path, monkeypatch, choices):
+    monkeypatch.setattr(reader, "PAYLOADS_AT_A_TIME", 2000)
     generator = np.random.default_rng(5)
-    # Two layouts alternate at random: batches must come back in the order of reception.
     layouts = [MOTORS, ("x", *MOTORS[::-1])]
     states = [
         joint_state(index, tuple(generator.random(len(names)).tolist()), names)
-        for index, names in enumerate(
-            layouts[choice] for choice in generator.integers(2, size=9000)
-        )
+        for index, names in enumerate(layouts[choice] for choice in choices)
     ]
     samples = samples_of(
         tmp_path, [("/joint_states", state.header.stamp_ns, state) for state in states]

@@ -69,8 +69,8 @@ def compare_models(
         progress(number + 1, steps)
     left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
     floor = noise_floor(left)
-    best, (_, refitted, _) = models[-1][1], tables[-1]
-    mistake = told_mistake(best, cuts, calibrated, refitted, floor.rms(refitted))
+    best, (observed, refitted, _) = models[-1][1], tables[-1]
+    mistake = told_mistake(best, observed, calibrated, refitted, floor.rms(refitted))
     progress(len(models) + 1, steps)
     compared = []
     for (name, _), (observed, refitted, absorbed) in zip(models, tables, strict=True):
@@ -109,9 +109,9 @@ def mistake_in(
     """
     cuts = tuple(as_units(model, session) for session in sessions)
     calibrated = said_calibrated(sessions)
-    _, refitted, _ = _prepared(model, sessions, cuts, calibrated)
+    observed, refitted, _ = _prepared(model, sessions, cuts, calibrated)
     floor = noise_floor(refitted.with_values(held_out_process(refitted, rng)))
-    return told_mistake(model, cuts, calibrated, refitted, floor.rms(refitted))
+    return told_mistake(model, observed, calibrated, refitted, floor.rms(refitted))
 
 
 def _prepared(

@@ -119,7 +119,10 @@ def refit_set_up(
 
 
 def without_set_up(
-    model: ErrorModel, sessions: tuple[UnitSession, ...], calibrated: Sequence[str]
+    model: ErrorModel,
+    sessions: tuple[UnitSession, ...],
+    calibrated: Sequence[str],
+    predicted: Array | None = None,
 ) -> tuple[Observed, Observations, tuple[SetUp, ...]]:
     """Return what a model leaves of units, what a set-up fitted anew leaves of that, and the fit.
 
@@ -131,8 +134,11 @@ def without_set_up(
         In the order of time.
     calibrated : sequence of str
         As in `refit_set_up`.
+    predicted : (u, 6) float, optional
+        What the model predicts of all units, where that is known already [m, rad].
     """
-    predicted = np.concatenate([predict_units(model, each) for each in sessions])
+    if predicted is None:
+        predicted = np.concatenate([predict_units(model, each) for each in sessions])
     observed = tabulate(model, sessions, predicted)
     set_ups = refit_set_up(model, observed, calibrated)
     left = observed.observations.with_values(refitted_values(observed, set_ups))

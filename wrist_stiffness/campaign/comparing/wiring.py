@@ -14,6 +14,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import sizes
 from wrist_stiffness.campaign.comparing.set_up import without_set_up
+from wrist_stiffness.campaign.observing import Observed
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.model.block import Block
@@ -101,7 +102,7 @@ MISTAKES = (
 
 def told_mistake(
     model: ErrorModel,
-    sessions: Sequence[UnitSession],
+    observed: Observed,
     calibrated: Sequence[str],
     left: Observations,
     floor: dict[str, float],
@@ -112,8 +113,8 @@ def told_mistake(
     ----------
     model : ErrorModel
         With which the sessions are compared.
-    sessions : sequence of UnitSession
-        As they were recorded.
+    observed : Observed
+        The sessions as they were recorded, and what the model predicts of them.
     calibrated : sequence of str
         Effects of the set-up that are not refitted.
     left : Observations
@@ -127,7 +128,7 @@ def told_mistake(
         return ""
     best = (CLEAR, "")
     for mistake in MISTAKES:
-        after = _without(mistake, model, sessions, calibrated)
+        after = _without(mistake, model, observed, calibrated)
         if any(after[key] > LARGER * before[key] for key in after):
             continue
         over_after = _over(after, floor, mistake.shift_factor)
@@ -173,14 +174,16 @@ def _share(before: dict[str, float], after: dict[str, float]) -> float:
 def _without(
     mistake: Mistake,
     model: ErrorModel,
-    sessions: Sequence[UnitSession],
+    observed: Observed,
     calibrated: Sequence[str],
 ) -> dict[str, float]:
     """Return the error that is left without a mistake, empty where it cannot be one."""
-    if not all(mistake.concerns(session) for session in sessions):
+    if not all(mistake.concerns(session) for session in observed.sessions):
         return {}
-    right = tuple(mistake.put_right(session) for session in sessions)
+    right = tuple(mistake.put_right(session) for session in observed.sessions)
     if not all(model.accepts(session.block).all() for session in right):
         return {}
-    _, refitted, _ = without_set_up(model, right, calibrated)
+    same = all(a.block is b.block for a, b in zip(right, observed.sessions, strict=True))
+    predicted = observed.predicted if same else None
+    _, refitted, _ = without_set_up(model, right, calibrated, predicted)
     return {key: size.rms for key, size in sizes(refitted).items()}
