@@ -287,7 +287,7 @@ def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Record
 
 
 def _one_more(run: list[tuple[Times, Payloads]], part: tuple[Times, Payloads]) -> bool:
-    """Tell whether payloads go on with those of the chunks before: of one form, and not too many."""
+    """Tell whether payloads go on with those of chunks before: of one form, and not too many."""
     if sum(len(payloads) for _, payloads in run) >= PAYLOADS_AT_A_TIME:
         return False
     return _size(run[-1][1]) == _size(part[1])
