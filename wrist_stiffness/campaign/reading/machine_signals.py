@@ -112,9 +112,7 @@ class MachineSignals:
         way, straight = np.ones((2, len(time_ns)), dtype=bool)
         apart = after - before > DENSE_S * NANOSECONDS
         if apart.any():
-            way[apart], straight[apart] = self._between(
-                time_ns[apart], before[apart], after[apart]
-            )
+            way[apart], straight[apart] = self._between(time_ns[apart], before[apart], after[apart])
         return way, straight
 
     def _between(

@@ -58,9 +58,7 @@ def _alone(time: Array, values: Array) -> NDArray[np.bool_]:
     return np.asarray(off > np.maximum(LEAST_WILD_RAD, ALONE * np.maximum(before, after)))
 
 
-def _off_the_line(
-    time: Array, values: Array, first: slice, middle: slice, last: slice
-) -> Array:
+def _off_the_line(time: Array, values: Array, first: slice, middle: slice, last: slice) -> Array:
     """Return how far middle values (k, 2) are from the straight line between two others."""
     share = ((time[middle] - time[first]) / (time[last] - time[first]))[:, None]
     return np.asarray(np.abs(values[middle] - (1.0 - share) * values[first] - share * values[last]))
