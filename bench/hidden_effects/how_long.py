@@ -14,9 +14,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,12 +22,12 @@ from typing import Any
 import numpy as np
 from bench_wrist import wrist
 from cases import Case, full_cases
+from kept_lines import asked
 from observe import hidden_effects, observe
 from own_diagnosis import version_of_own
 from tables import newcombe
 
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -110,21 +108,9 @@ def main() -> None:
         "--output", type=Path, default=Path(__file__).parent / "results" / "how_long.jsonl"
     )
     arguments = parser.parse_args()
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    kept = arguments.output.read_text().splitlines() if arguments.output.exists() else []
-    lines = [x for x in map(json.loads, kept) if x["version"] == version_of_own()]
-    done = {line["key"] for line in lines}
     singles = [case for case in full_cases() if case.main and case.kind == "single"]
-    todo = [case for case in singles[:: arguments.every] if case.key not in done]
-    progress = Progress("cases")
-    with ProcessPoolExecutor(arguments.processes) as pool, arguments.output.open("a") as out:
-        for number, future in enumerate(as_completed([pool.submit(ask, each) for each in todo])):
-            found = future.result()
-            out.write("".join(json.dumps(line) + "\n" for line in found))
-            out.flush()
-            lines += found
-            progress(number + 1, len(todo))
-    print(table(lines))
+    chosen = singles[:: arguments.every]
+    print(table(asked(ask, chosen, arguments.output, version_of_own(), arguments.processes)))
 
 
 if __name__ == "__main__":

@@ -17,10 +17,9 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +27,12 @@ import numpy as np
 from bench_wrist import TRUTH, code_version
 from cases import Case, full_cases
 from dictionary import Dictionary, design_of, dictionary
+from kept_lines import asked
 from observe import Riddle, observe, pose_riddle
 from scipy.stats import spearmanr
 from score import HeldOut, floor
 from usual_sizes import usual_sizes
 
-from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 
@@ -145,23 +144,18 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
     arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    path = arguments.output / "how_much.jsonl"
-    kept = path.read_text().splitlines() if path.exists() else []
-    lines = [line for line in map(json.loads, kept) if line["version"] == version()]
-    done = {line["key"] for line in lines}
     wrists = [case for case in full_cases() if case.main and case.ordinary]
-    todo = [case for case in wrists if case.key not in done]
-    progress = Progress("wrists")
-    with ProcessPoolExecutor(arguments.processes) as pool, path.open("a") as out:
-        futures = [pool.submit(ask, case, arguments.output) for case in todo]
-        for number, future in enumerate(as_completed(futures)):
-            found = future.result()
-            out.write("".join(json.dumps(line) + "\n" for line in found))
-            out.flush()
-            lines += found
-            progress(number + 1, len(todo))
-    print(table(lines))
+    print(
+        table(
+            asked(
+                partial(ask, folder=arguments.output),
+                wrists,
+                arguments.output / "how_much.jsonl",
+                version(),
+                arguments.processes,
+            )
+        )
+    )
 
 
 if __name__ == "__main__":

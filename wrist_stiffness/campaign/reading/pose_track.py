@@ -162,7 +162,7 @@ def measured_components(poses: PoseSamples) -> tuple[Array, Array]:
 def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
     turn, origin = base_transform(poses.frame_id, what, frames)
     shift, quaternion = measured_components(poses)
-    turned = np.isfinite(quaternion).all(axis=1)
+    turned = np.asarray(np.isfinite(quaternion).all(axis=1))
     rotation = Rotation.from_quat(np.where(turned[:, None], quaternion, IDENTITY)).as_matrix()
     rotation[~turned] = np.nan
     if np.any(turn != np.eye(3)):  # NaN times zero would spread to the other components
