@@ -8,6 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.observing import QUANTITIES
+from wrist_stiffness.diagnosis import Observations
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
@@ -34,6 +36,9 @@ from wrist_stiffness.simulation.instrument import instrument
 START_NS = 1_700_000_000_000_000_000
 MILLISECOND = 1_000_000
 MOTORS = ("motor_1_joint", "motor_2_joint")
+
+SCATTER = np.repeat([1e-6, 1e-4], 3)
+"""Of each component of a dwell in a table made by hand [m, rad]."""
 
 
 def pose_of(rotation, shift):
@@ -158,3 +163,40 @@ def in_the_cell():
 def campaign(table):
     """An empty one; a test adds what it needs."""
     return Campaign(table.mechanism)
+
+
+def _dwells(rng, change=None, n=400):
+    """Random dwells three seconds apart: 1 um and 0.1 mrad of noise in each component."""
+    force, moment = rng.normal(0, 0.6, (n, 3)), rng.normal(0, 0.01, (n, 3))
+    force[::10], moment[::10] = 0.0, 0.0
+    conditions = {
+        **{f"theta_{motor}": rng.uniform(-0.8, 0.8, n) for motor in (1, 2)},
+        **{f"approach_{motor}": rng.choice([-1.0, 1.0], n) for motor in (1, 2)},
+        **{f"speed_{motor}": np.zeros(n) for motor in (1, 2)},
+        **dict(zip(("fx", "fy", "fz"), force.T, strict=True)),
+        **dict(zip(("mx", "my", "mz"), moment.T, strict=True)),
+        "force": np.linalg.norm(force, axis=1),
+        "moment": np.linalg.norm(moment, axis=1),
+        "held_s": rng.uniform(0.5, 20, n),
+        "loaded_at_rest": rng.integers(0, 2, n).astype(float),
+        "time_s": 3.0 * np.arange(n),
+        "T_link_1": 20 + 5 * (1 - np.exp(-np.arange(n) / 150)),
+        "humidity": rng.uniform(30, 70, n),
+    }
+    values = SCATTER * rng.normal(size=(n, 6))
+    if change is not None:
+        values = values + change(conditions)
+    return Observations(
+        values,
+        conditions,
+        np.diag(SCATTER**2),
+        conditions["time_s"],
+        np.zeros(n, dtype=int),
+        quantities=QUANTITIES,
+    )
+
+
+@pytest.fixture(scope="session")
+def dwells():
+    """Return the function that makes a table of random dwells."""
+    return _dwells

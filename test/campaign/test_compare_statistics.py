@@ -1,4 +1,4 @@
-"""Floor, headroom, sentences and worst poses on a table made by hand."""
+"""Headroom, sentences and worst poses on a table made by hand."""
 
 from dataclasses import replace
 
@@ -13,47 +13,12 @@ from wrist_stiffness.campaign.comparing.worst_poses import worst_poses
 from wrist_stiffness.campaign.noise_floor import (
     NoiseFloor,
     against_floor,
-    by_side,
     is_at_floor,
     noise_floor,
-    repeatability,
 )
-from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.diagnosis import Observations
 
 N = 400
 SIGMA = np.repeat([1e-6, 1e-4], 3)
-
-
-def table(rng, change=None, n=N):
-    """Random dwells three seconds apart: 1 um and 0.1 mrad of noise in each component."""
-    force, moment = rng.normal(0, 0.6, (n, 3)), rng.normal(0, 0.01, (n, 3))
-    force[::10], moment[::10] = 0.0, 0.0
-    conditions = {
-        **{f"theta_{motor}": rng.uniform(-0.8, 0.8, n) for motor in (1, 2)},
-        **{f"approach_{motor}": rng.choice([-1.0, 1.0], n) for motor in (1, 2)},
-        **{f"speed_{motor}": np.zeros(n) for motor in (1, 2)},
-        **dict(zip(("fx", "fy", "fz"), force.T, strict=True)),
-        **dict(zip(("mx", "my", "mz"), moment.T, strict=True)),
-        "force": np.linalg.norm(force, axis=1),
-        "moment": np.linalg.norm(moment, axis=1),
-        "held_s": rng.uniform(0.5, 20, n),
-        "loaded_at_rest": rng.integers(0, 2, n).astype(float),
-        "time_s": 3.0 * np.arange(n),
-        "T_link_1": 20 + 5 * (1 - np.exp(-np.arange(n) / 150)),
-        "humidity": rng.uniform(30, 70, n),
-    }
-    values = SIGMA * rng.normal(size=(n, 6))
-    if change is not None:
-        values = values + change(conditions)
-    return Observations(
-        values,
-        conditions,
-        np.diag(SIGMA**2),
-        conditions["time_s"],
-        np.zeros(n, dtype=int),
-        quantities=QUANTITIES,
-    )
 
 
 def told(observations, seed=0):
@@ -66,19 +31,19 @@ def along(component, values):
     return out
 
 
-def test_noise_depends_on_nothing_and_every_topic_is_named():
-    found = told(table(np.random.default_rng(0)))
+def test_noise_depends_on_nothing_and_every_topic_is_named(dwells):
+    found = told(dwells(np.random.default_rng(0)))
     assert found.statements == ()
     assert set(found.silent) >= {"approach direction", "load direction", "hold time", "humidity"}
     assert found.not_varied == ("speed",)
     assert found.sentences[0].startswith("Nothing depends beyond chance on approach direction")
 
 
-def test_backlash_is_told_as_a_gap_that_grows_with_the_load():
+def test_backlash_is_told_as_a_gap_that_grows_with_the_load(dwells):
     def lost_motion(c):
         return along(2, c["approach_2"] * (1.6e-6 + 1.2e-6 * (c["force"] - c["force"].mean())))
 
-    found = told(table(np.random.default_rng(1), lost_motion))
+    found = told(dwells(np.random.default_rng(1), lost_motion))
     gap, growth = found.statements
     # 2 * 1.6 um between both sides; two groups of 200 units with 1 um each: 0.1 um.
     assert gap.condition.name == "approach of motor 2"
@@ -116,25 +81,27 @@ def change_of(name, component, size):
     ],
     ids=["direction", "size", "covariate", "hold", "zero", "at rest", "temperature", "harmonic"],
 )
-def test_each_kind_of_condition_is_found_first_with_its_size(change, name, size):
-    first = told(table(np.random.default_rng(2), change)).statements[0]
+def test_each_kind_of_condition_is_found_first_with_its_size(dwells, change, name, size):
+    first = told(dwells(np.random.default_rng(2), change)).statements[0]
     assert first.condition.name.startswith(name)
     (shift,) = (each for each in first.changes if each.quantity == "s")
     assert shift.size == pytest.approx(size, abs=4 * shift.uncertainty)
     assert shift.uncertainty < 0.3 * size
 
 
-def test_of_a_wave_only_the_part_that_was_seen_is_told():
+def test_of_a_wave_only_the_part_that_was_seen_is_told(dwells):
     """A motor that turns by 0.8 rad either way goes through little of a cosine once a turn."""
-    found = told(table(np.random.default_rng(15), lambda c: along(2, 50e-6 * np.cos(c["theta_2"]))))
+    found = told(
+        dwells(np.random.default_rng(15), lambda c: along(2, 50e-6 * np.cos(c["theta_2"])))
+    )
     first = found.statements[0]
     assert first.condition.name == "angle of motor 2, once a turn"
     (shift,) = (each for each in first.changes if each.quantity == "s")
     assert shift.size == pytest.approx(0.5 * 50.0 * (1.0 - np.cos(0.8)), rel=0.05)
 
 
-def test_a_temperature_is_felt_late_by_its_time_constant():
-    observations = table(np.random.default_rng(16))
+def test_a_temperature_is_felt_late_by_its_time_constant(dwells):
+    observations = dwells(np.random.default_rng(16))
     step = (observations.times >= 300.0).astype(float)
     asked, _ = conditions(
         replace(observations, covariates={**observations.covariates, "T_link_1": step})
@@ -145,10 +112,10 @@ def test_a_temperature_is_felt_late_by_its_time_constant():
     assert late.columns[:, 0] == pytest.approx(expected, abs=1e-12)
 
 
-def test_of_a_condition_that_is_constant_but_for_rounding_nothing_is_asked():
+def test_of_a_condition_that_is_constant_but_for_rounding_nothing_is_asked(dwells):
     """A constant load as a sensor's frame turns it, and a room at 0.1 + 0.2 degrees."""
     rng = np.random.default_rng(14)
-    observations = table(rng)
+    observations = dwells(rng)
     rounding = 1.0 + 2e-16 * rng.integers(-1, 2, N)
     still = {"force": rounding, "fz": -rounding, "T_link_1": 0.3 * rounding}
     zero = dict.fromkeys(("fx", "fy", "mx", "my", "mz", "moment"), np.zeros(N))
@@ -158,28 +125,28 @@ def test_of_a_condition_that_is_constant_but_for_rounding_nothing_is_asked():
     assert not any("with load" in each.name or "temperature" in each.name for each in asked)
 
 
-def test_what_only_went_with_another_condition_has_the_chance_that_is_left_to_it():
+def test_what_only_went_with_another_condition_has_the_chance_that_is_left_to_it(dwells):
     """A speed that follows the side of approach looks like its backlash at first."""
     rng = np.random.default_rng(15)
-    observations = table(rng, lambda c: along(3, 5e-3 * c["approach_1"]))
+    observations = dwells(rng, lambda c: along(3, 5e-3 * c["approach_1"]))
     speed = np.radians(5.0) * (observations.covariates["approach_1"] + rng.normal(0, 1.0, N))
     found = told(replace(observations, covariates={**observations.covariates, "speed_1": speed}))
     assert [each.condition.topic for each in found.statements] == ["approach direction"]
     assert found.silent["speed"] > 0.02
 
 
-def test_twins_are_named():
+def test_twins_are_named(dwells):
     def with_twin(c):
         c["spindle"] = 2 * c["humidity"] + 5
         return along(0, 0.2e-6 * c["humidity"])
 
-    first = told(table(np.random.default_rng(3), with_twin)).statements[0]
+    first = told(dwells(np.random.default_rng(3), with_twin)).statements[0]
     assert {first.condition.name, *first.twins} == {"humidity", "spindle"}
     assert "the same as: " in first.sentence
 
 
-def test_slow_conditions_of_a_short_recording_are_not_told_from_wander():
-    short = table(np.random.default_rng(4), lambda c: along(0, 5e-6 * c["T_link_1"]), n=100)
+def test_slow_conditions_of_a_short_recording_are_not_told_from_wander(dwells):
+    short = dwells(np.random.default_rng(4), lambda c: along(0, 5e-6 * c["T_link_1"]), n=100)
     found = told(short)
     assert "temperature" in found.too_short
     assert "temperature" not in {each.condition.topic for each in found.statements}
@@ -187,36 +154,36 @@ def test_slow_conditions_of_a_short_recording_are_not_told_from_wander():
 
 
 @pytest.mark.parametrize("beside", [0.0, 2e-3], ids=["a sentence", "named only"])
-def test_a_topic_is_too_short_to_be_told_or_told_and_never_both(beside):
+def test_a_topic_is_too_short_to_be_told_or_told_and_never_both(dwells, beside):
     """The swing of an angle grows with time; the temperature does as well and says no more."""
 
     def growing(c):
         large = along(0, beside * np.sin(c["theta_2"]))
         return large + along(1, 20e-6 * (c["T_link_1"] - 20.0) * np.sin(c["theta_1"]))
 
-    found = told(table(np.random.default_rng(4), growing, n=150))
+    found = told(dwells(np.random.default_rng(4), growing, n=150))
     assert set(found.too_short) == {"temperature", "temperature lag", "time in the session"}
     topics = {each.condition.topic for each in found.statements}
     assert not set(found.too_short) & (topics | set(found.minor) | found.silent.keys())
     assert not any("temperature" in text for text in found.sentences[:-1])
 
 
-def test_of_a_topic_that_is_slow_in_part_the_rest_is_told():
+def test_of_a_topic_that_is_slow_in_part_the_rest_is_told(dwells):
     def law(c):
         c["theta_2"] = np.linspace(-0.8, 0.8, len(c["theta_2"]))
         return along(0, 20e-6 * np.cos(c["theta_1"]))
 
-    found = told(table(np.random.default_rng(4), law, n=100))
+    found = told(dwells(np.random.default_rng(4), law, n=100))
     assert found.statements[0].condition.name.startswith("angle of motor 1")
     assert "motor angle" not in found.too_short
     assert "angle of motor 2, once a turn" in found.too_short
 
 
-def test_a_process_learns_a_law_of_pose_and_load_down_to_the_noise():
+def test_a_process_learns_a_law_of_pose_and_load_down_to_the_noise(dwells):
     def law(c):
         return along(2, 4e-6 * c["fz"] * np.cos(c["theta_1"]) + 3e-6 * np.sin(2 * c["theta_2"]))
 
-    observations = table(np.random.default_rng(5), law, n=1200)
+    observations = dwells(np.random.default_rng(5), law, n=1200)
     left = observations.with_values(held_out_process(observations, np.random.default_rng(0)))
     before, after = sizes(observations)["s_um"].rms, sizes(left)["s_um"].rms
     assert before > 3
@@ -238,18 +205,18 @@ def test_each_block_is_predicted_by_the_others_alone():
         np.testing.assert_allclose(left[own], expected, atol=1e-12)
 
 
-def test_a_process_makes_nothing_of_noise():
-    observations = table(np.random.default_rng(6))
+def test_a_process_makes_nothing_of_noise(dwells):
+    observations = dwells(np.random.default_rng(6))
     left = observations.with_values(held_out_process(observations, np.random.default_rng(0)))
     before, after = sizes(observations)["s_um"].rms, sizes(left)["s_um"].rms
     # The best of eight settings may look better by chance, by less than one unit in fifty.
     assert 0.98 * before < after <= before
 
 
-def test_a_process_makes_nothing_of_slow_wander_under_slow_conditions():
+def test_a_process_makes_nothing_of_slow_wander_under_slow_conditions(dwells):
     """Neighbours in time tell each other's wander; blocks that were not seen do not."""
     rng = np.random.default_rng(23)
-    observations = table(rng)
+    observations = dwells(rng)
     walk = np.cumsum(rng.normal(size=(N, 7)), axis=0) / np.sqrt(N)
     conditions = {name: np.zeros(N) for name in observations.covariates}
     conditions |= {"T_link_1": 20.0 + walk[:, 6], "time_s": observations.times}
@@ -258,8 +225,8 @@ def test_a_process_makes_nothing_of_slow_wander_under_slow_conditions():
     assert sizes(left)["s_um"].rms > 0.5 * sizes(slow)["s_um"].rms
 
 
-def test_blanks_stay_blanks_in_what_a_process_leaves():
-    observations = table(np.random.default_rng(7), change_of("fz", 2, 3e-6))
+def test_blanks_stay_blanks_in_what_a_process_leaves(dwells):
+    observations = dwells(np.random.default_rng(7), change_of("fz", 2, 3e-6))
     values = observations.values.copy()
     values[::3, 3:], values[:, 0] = np.nan, np.nan
     left = held_out_process(observations.with_values(values), np.random.default_rng(0))
@@ -267,66 +234,9 @@ def test_blanks_stay_blanks_in_what_a_process_leaves():
     assert np.nanstd(left[:, 2]) < 0.7 * np.std(values[:, 2])
 
 
-def repeated(rng, extra):
-    """Pairs of dwells, half of them approached from both sides."""
-    observations = table(rng)
-    label = np.arange(N) // 4
-    shared = extra * rng.normal(size=(N // 4, 6))[label]
-    return replace(
-        observations,
-        values=observations.values * 2 + shared,
-        replicate=label,
-    )
-
-
-def test_floor_comes_from_dwells_that_repeat_each_other():
-    observations = repeated(np.random.default_rng(8), 30e-6)
-    floor = noise_floor(observations)
-    assert floor.source == "replicates"
-    # Twice the stated 1 um in three components, told to 4 % by the pairs from one side.
-    assert floor.rms(observations)["s_um"] == pytest.approx(2 * np.sqrt(3), rel=0.08)
-
-
-def test_floor_without_repeats_is_the_instruments_own():
-    observations = table(np.random.default_rng(9))
-    floor = noise_floor(observations)
-    assert floor.source == "instrument"
-    assert floor.rms(observations)["s_um"] == pytest.approx(np.sqrt(3), rel=1e-9)
-
-
-def test_floor_without_any_word_of_the_instrument_is_what_nothing_predicts():
-    observations = replace(table(np.random.default_rng(10)), covariance=None)
-    floor = noise_floor(observations)
-    assert floor.source == "unpredictable"
-    assert floor.rms(observations)["s_um"] == pytest.approx(sizes(observations)["s_um"].rms)
-
-
-def test_lost_motion_shows_in_repeats_from_any_side_only():
-    rng = np.random.default_rng(11)
-    observations = repeated(rng, 0.0)
-    gap = along(2, 10e-6 * observations.covariates["approach_1"])
-    observations = observations.with_values(observations.values + gap)
-    assert repeatability(observations)["s_um"] > 9
-    assert repeatability(by_side(observations))["s_um"] == pytest.approx(2 * np.sqrt(3), rel=0.15)
-
-
-def test_one_gauge_repeats_as_well_as_that_gauge():
-    """Axes that it does not see have no scatter of their own, least of all a metre."""
-    everything = repeated(np.random.default_rng(11), 0.0)
-    gauge = everything.with_values(everything.values * [np.nan, np.nan, 1, np.nan, np.nan, np.nan])
-    assert list(repeatability(gauge)) == ["s_um"]
-    assert repeatability(gauge)["s_um"] < repeatability(everything)["s_um"]
-
-
-def test_uncertainty_of_an_error_is_its_scatter_over_repetitions():
-    draws = [sizes(table(rng))["s_um"] for rng in np.random.default_rng(12).spawn(60)]
-    scatter = np.std([each.rms for each in draws], ddof=1)
-    assert np.mean([each.uncertainty for each in draws]) == pytest.approx(scatter, rel=0.3)
-
-
-def compared(levels, process):
+def compared(dwells, levels, process):
     rng = np.random.default_rng(13)
-    noise = table(rng)
+    noise = dwells(rng)
     quiet = Told((), (), {}, (), ())
     models = tuple(
         ComparedModel(f"m{place}", noise, noise.with_values(noise.values * level), (), quiet)
@@ -338,16 +248,16 @@ def compared(levels, process):
     return Comparison(("day",), models, floor, {}, {}, left)
 
 
-def test_headroom_is_the_share_of_what_could_fall():
-    found = compared((10.0, 4.0, 1.0), 1.0)
+def test_headroom_is_the_share_of_what_could_fall(dwells):
+    found = compared(dwells, (10.0, 4.0, 1.0), 1.0)
     assert found.headroom(found.models[1], "s_um") == pytest.approx(6 / 9)
     assert found.headroom(found.models[2], "phi_mdeg") == pytest.approx(1.0)
-    assert "67 %" in compared((10.0, 4.0), 1.0).verdict[-1]
-    assert "all that the conditions could explain" in compared((10.0, 1.0), 3.0).verdict[-1]
+    assert "67 %" in compared(dwells, (10.0, 4.0), 1.0).verdict[-1]
+    assert "all that the conditions could explain" in compared(dwells, (10.0, 1.0), 3.0).verdict[-1]
 
 
-def test_no_headroom_is_claimed_where_nothing_could_fall():
-    found = compared((1.0, 0.99), 0.995)
+def test_no_headroom_is_claimed_where_nothing_could_fall(dwells):
+    found = compared(dwells, (1.0, 0.99), 0.995)
     assert found.headroom(found.models[1], "s_um") is None
     assert "a curve over the conditions alone reaches 1." in found.verdict[-2]
 
@@ -355,12 +265,12 @@ def test_no_headroom_is_claimed_where_nothing_could_fall():
 @pytest.mark.parametrize(
     ("level", "moves"), [(0.5, "s falls from"), (1.0, "s stays at"), (2.0, "s rises from")]
 )
-def test_an_error_that_shows_no_change_stays(level, moves):
-    assert moves in compared((1.0, level), 0.5).verdict[-2]
+def test_an_error_that_shows_no_change_stays(dwells, level, moves):
+    assert moves in compared(dwells, (1.0, level), 0.5).verdict[-2]
 
 
-def test_verdict_says_whether_it_is_noise():
-    found = compared((5.0, 1.0), 1.0)
+def test_verdict_says_whether_it_is_noise(dwells):
+    found = compared(dwells, (5.0, 1.0), 1.0)
     assert "5.1 x the noise" in found.verdict[0] or "5.0 x the noise" in found.verdict[0]
     assert "no more than the noise" in found.verdict[1]
 
@@ -381,17 +291,17 @@ def test_without_repeats_wander_may_be_the_rest():
     assert not is_at_floor(1.6, "instrument")
 
 
-def test_without_a_known_floor_nothing_is_called_noise():
-    found = compared((1.0,), 1.0)
+def test_without_a_known_floor_nothing_is_called_noise(dwells):
+    found = compared(dwells, (1.0,), 1.0)
     unknown = replace(found, noise=replace(found.noise, source="unpredictable"))
     assert "the noise is not known" in unknown.verdict[0]
     none = replace(found, noise=NoiseFloor(np.zeros((N, 6)), "instrument"))
     assert "the instrument has no noise" in none.verdict[0]
 
 
-def test_worst_poses_are_apart_and_in_order():
+def test_worst_poses_are_apart_and_in_order(dwells):
     rng = np.random.default_rng(14)
-    observations = table(rng)
+    observations = dwells(rng)
     values = observations.values.copy()
     values[100, 2], values[200, 4], values[300, 0] = 50e-6, 3e-3, 20e-6
     floor = {"s_um": 1.7, "phi_mdeg": 9.9}
@@ -408,8 +318,8 @@ def test_worst_poses_are_apart_and_in_order():
 
 
 @pytest.mark.parametrize(("n", "lags"), [(90, []), (150, ["5 min"]), (400, ["5 min", "15 min"])])
-def test_a_session_is_asked_for_no_longer_lag_than_itself(n, lags):
+def test_a_session_is_asked_for_no_longer_lag_than_itself(dwells, n, lags):
     """Three seconds from one dwell to the next: 4.5, 7.5 and 20 minutes."""
-    asked, _ = conditions(table(np.random.default_rng(8), n=n))
+    asked, _ = conditions(dwells(np.random.default_rng(8), n=n))
     names = [each.name for each in asked if each.topic == "temperature lag"]
     assert names == [f"temperature of link 1, {lag} late" for lag in lags]

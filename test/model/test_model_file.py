@@ -15,7 +15,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
-from wrist_stiffness.model.parameters import Estimate, si_factor
+from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.shipped import shipped_file
 
@@ -302,56 +302,6 @@ def test_model_without_its_table(tmp_path):
     (tmp_path / "m.yaml").write_text("schema: 1\nname: x\ntable: {path: no.npz}\neffects: []\n")
     with pytest.raises(TableError, match="no such file"):
         load_model(tmp_path / "m.yaml")
-
-
-@pytest.mark.parametrize("law", catalogue().values(), ids=lambda law: law.id)
-def test_every_law_speaks_to_a_technician_and_has_sane_parameters(law):
-    for place in law.places:
-        text = law.sentence.format(place=place)
-        assert len(text) > 20
-        assert "{" not in text
-        keys = [p.key for p in law.parameters(place)]
-        assert keys
-        assert len(set(keys)) == len(keys)
-        for p in law.parameters(place):
-            assert p.lower <= p.mean <= p.upper
-            assert 0.0 < p.scale < np.inf
-            assert si_factor(p.key) > 0.0
-    assert len(law.check) > 20
-    assert len(law.excited_by) > 10
-
-
-CATALOGUE = """
-    link_stiffness bushing_stiffness drive_compliance mount_compliance frame_compliance
-    platform_compliance gravity joint_clearance flange_contact bushing_hardening joint_friction
-    backlash encoder_offset encoder_eccentricity transmission_error axis_misalignment
-    thermal_expansion thermal_softening creep cable_wrench load_bias load_scale
-    load_cross_talk load_misalignment load_point measurement_frame target_mounting drift time_delay
-    inertia
-"""
-
-
-def test_the_catalogue_is_complete():
-    assert " ".join(sorted(catalogue())) == " ".join(sorted(CATALOGUE.split()))
-
-
-@pytest.mark.parametrize(
-    ("key", "factor"),
-    [
-        ("clearance_um", 1e-6),
-        ("offset_mdeg", np.pi / 180e3),
-        ("x_um_per_N", 1e-6),
-        ("turn_x_mdeg_per_Nm", np.pi / 180e3),
-        ("shift_x_um_per_h", 1e-6 / 3600.0),
-        ("expansion_ppm_per_K", 1e-6),
-        ("mx_1_Nmm_per_rad", 1e-3),
-        ("order", 1.0),
-        ("m", 1.0),
-        ("per_N", 1.0),
-    ],
-)
-def test_units_in_names(key, factor):
-    assert si_factor(key) == pytest.approx(factor, rel=1e-15)
 
 
 def test_other_packages_offer_laws_by_entry_point(monkeypatch, tmp_path):

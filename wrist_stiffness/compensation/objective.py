@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.vectors import skew, triad
 
 DEPENDENT = 1e-6

@@ -8,8 +8,8 @@ import numpy as np
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.workspace import Workspace
 
 LONGEST_STEP_S = 0.1

@@ -13,8 +13,8 @@ from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.progress import Progress
 

@@ -26,9 +26,9 @@ from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
 from wrist_stiffness.lookup.verification import interpolation_errors, unseen_poses
 from wrist_stiffness.mechanism.components import ELASTIC, ElasticComponents
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.progress import Progress, silent

@@ -19,8 +19,8 @@ from wrist_stiffness.fem.factor import Factor, factorise
 from wrist_stiffness.fem.parts import ElasticBody, Part, Solid, assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.mechanism.components import CARRIER, PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.kinematics import Configuration
 
 FRAMES = (
     "link_1_root",

@@ -11,8 +11,8 @@ import numpy as np
 
 from wrist_stiffness.errors import TableError
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import ContactOperators
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from wrist_stiffness.lookup.readout import fit_platform_error
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import ContactOperators
 from wrist_stiffness.mechanism.vectors import cross
 

@@ -16,9 +16,10 @@ from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.biharmonic import BiharmonicSpline, Kernel
 from wrist_stiffness.lookup.operators import unpack
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
-from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism
+from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.mechanism.statics import ContactOperators, component_shares, contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace

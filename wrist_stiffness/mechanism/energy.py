@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import (
     component_rotations,
     turned_flexibilities,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 
 LIMB_1 = ("joint_1", "link_1", "joint_2")
 LIMB_2_BASE = ("joint_5", "link_2", "joint_4")

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.cones import GRAM_ROUNDING
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.contact import settle
 from wrist_stiffness.mechanism.influence import LIMB_1, LIMB_2
-from wrist_stiffness.mechanism.kinematics import BODIES, Configuration, Mechanism
+from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.vectors import skew
 
 IDENTITY = np.eye(3)

@@ -20,8 +20,8 @@ from wrist_stiffness.mechanism.components import (
     Array,
     ElasticComponents,
 )
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.influence import Influence, influence
-from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
 from wrist_stiffness.mechanism.vectors import below, beside, block_diagonal
 
 N_ELASTIC = len(ELASTIC)

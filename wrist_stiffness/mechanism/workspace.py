@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
-from wrist_stiffness.mechanism.kinematics import Configuration, Mechanism, angles_text
+from wrist_stiffness.mechanism.kinematics import Mechanism, angles_text
 from wrist_stiffness.mechanism.single_pose import SinglePoseKinematics
 from wrist_stiffness.mechanism.vectors import triad
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.single_pose import GROUPS
 from wrist_stiffness.model.contribution import Contribution, together
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT

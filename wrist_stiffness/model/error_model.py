@@ -15,7 +15,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.model.batch import Recent, predicted
 from wrist_stiffness.model.block import Block, Load, Sample

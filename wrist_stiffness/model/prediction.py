@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.single_motion import exp_one, log_one
 from wrist_stiffness.model.contribution import LEFT_OUT
 

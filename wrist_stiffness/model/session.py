@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.model.block import Load, Sample
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.prediction import Prediction

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.influence import Influence
-from wrist_stiffness.mechanism.kinematics import BODIES, Configuration
 from wrist_stiffness.mechanism.statics import ContactOperators, component_rotations, slides
 from wrist_stiffness.mechanism.vectors import block_diagonal, dot
 from wrist_stiffness.model.block import Block

@@ -11,8 +11,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import LINKS, Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import triad
 from wrist_stiffness.model.error_model import Prediction

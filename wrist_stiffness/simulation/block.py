@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.statics import component_rotations
 from wrist_stiffness.simulation.heat import HEATED
 

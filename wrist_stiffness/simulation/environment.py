@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.kinematics import Configuration
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.vectors import cross
 
 FORCE_TOLERANCE = 1e-9

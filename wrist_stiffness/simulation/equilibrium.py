@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.influence import Influence, influence
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import (
     ContactOperators,
     component_rotations,

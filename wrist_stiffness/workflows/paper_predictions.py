@@ -9,8 +9,8 @@ import numpy as np
 from wrist_stiffness.lookup.rated_load import rated_wrench
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import component_shares, contact_operators
 from wrist_stiffness.workflows.paper_figures import TO_PAPER_UNITS, PaperExperiment
 

@@ -15,9 +15,9 @@ import numpy as np
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, ENDS, JOINTS, LINKS, Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.energy import component_screws
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.kinematics import Configuration
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.vectors import cross, unit
 from wrist_stiffness.workflows.budget import Push
