@@ -26,7 +26,7 @@ def test_suspects_stand_beside_findings_and_are_called_not_proven():
     lines = adding_lines(worth_hearing([PLAY, AXIS, DRIFT], False))
     assert [line.split(":")[0].strip() for line in lines[2:]] == [PLAY.name, DRIFT.name]
     assert lines[2].endswith("(found)")
-    assert "s 1.25 +- 0.4 um, phi 0.5 +- 0.2 mdeg (suspect, not proven)" in lines[3]
+    assert "s 1.25 +- 0.40 um, phi 0.50 +- 0.20 mdeg (suspect, not proven)" in lines[3]
 
 
 def test_without_suspects_nothing_is_added():

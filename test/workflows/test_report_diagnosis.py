@@ -84,8 +84,8 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "s from 7.5 to 1.3 µm (noise floor 1.2)",
         "joint_3 has play",
         "To be sure: rock it by hand",
-        "12.1 ± 0.4",
-        "3.2 ± 0.3 µm",
+        "12.10 ± 0.40",
+        "3.20 ± 0.30 µm",
         "the nodes can correct it where they get its signal",
         "another session",
         "registration: 700 µm of s",
@@ -155,7 +155,7 @@ def test_suspects_are_ranked_and_called_not_proven(observations):
     page = page_of(RESULT, observations, contributions=(found, tolerance, suspect))
     _, section = page.split("What adds most to the error", 1)
     section, _ = section.split("</section>", 1)
-    assert section.index("6.25 ± 0.5") < section.index("1.75 ± 0.5")
+    assert section.index("6.25 ± 0.50") < section.index("1.75 ± 0.50")
     assert section.index("drift@pose_sensor") < section.index("suspect, not proven")
     assert "link_stiffness" not in section
     assert "What adds most" not in page_of(RESULT, observations, contributions=(found, tolerance))

@@ -284,7 +284,7 @@ def _sizes(sizes: Mapping[str, tuple[float, float]]) -> str:
     parts = []
     for key, (size, error) in sizes.items():
         name, _, unit = key.rpartition("_")
-        parts.append(f"{name} {size:.3g} +- {error:.2g} {unit}")
+        parts.append(f"{name} {plus_minus(size, error)} {unit}")
     return ", ".join(parts)
 
 

@@ -12,6 +12,7 @@ from wrist_stiffness.campaign.noise_floor import noise_floor
 from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.workflows.fit_report import plus_minus
 from wrist_stiffness.workflows.pictures.dependence import draw_against
 from wrist_stiffness.workflows.pictures.errors import Bars, draw_bars
 from wrist_stiffness.workflows.provenance import Provenance
@@ -172,7 +173,8 @@ def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]
 
 def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
     rows = [
-        (name, f"{value:.4g} ± {error:.2g}") for name, (value, error) in finding.parameters.items()
+        (name, typeset(plus_minus(value, error)))
+        for name, (value, error) in finding.parameters.items()
     ]
     for q in quantities:
         if q.key in finding.buys:
@@ -180,7 +182,7 @@ def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
             rows.append(
                 (
                     f"error of {q.name} on the part put aside falls by",
-                    f"{gain:.3g} ± {error:.2g} {unit_of(q.unit)}",
+                    typeset(f"{plus_minus(gain, error)} {unit_of(q.unit)}"),
                 )
             )
     rows += [
@@ -218,7 +220,7 @@ def _adding(parts: Sequence[Contribution], quantities: tuple[Quantity, ...]) -> 
     rows = []
     for each in parts:
         sizes = [each.sizes[q.key] for q in quantities]
-        cells = [f"{size:.3g} ± {error:.2g}" for size, error in sizes]
+        cells = [typeset(plus_minus(size, error)) for size, error in sizes]
         rows.append((each.name, *cells, PROVEN[each.kind]))
     titles = ("effect", *(f"{q.name} [{unit_of(q.unit)}]" for q in quantities), "")
     caption = "RMS of what each adds, beyond what a new set-up would take up. Look at the first."
