@@ -23,6 +23,13 @@ from wrist_stiffness.model.error_model import ErrorModel
 LOST = 8.0
 """Robust standard deviations from its dwell's median at which one measurement is a lost beam."""
 
+WILD = 1e3
+"""The same beyond which a measurement tells nothing of how much its dwell changes."""
+
+CHANGING_SHARE, MOST_CHANGING = 0.5, 4.0
+"""What a dwell's own root mean square adds to that, which settling and creep make larger than usual,
+and up to how many usual standard deviations it is believed."""
+
 FEWEST_FOR_NOISE = 30
 """Steps between neighbouring measurements of dwells from which their scatter is known."""
 
@@ -208,9 +215,10 @@ def _lost(values: Array, parts: Cut) -> Mask:
         off = np.abs(column[rows] - middle[label])
         usual = MAD_TO_SIGMA * float(np.nanmedian(off)) if np.isfinite(off).any() else 0.0
         # A dwell in which the wrist settles or creeps is no dropout: its own spread counts too.
-        own = np.sqrt(np.bincount(label, np.nan_to_num(np.minimum(off, 1e3 * usual)) ** 2))
+        own = np.sqrt(np.bincount(label, np.nan_to_num(np.minimum(off, WILD * usual)) ** 2))
         own /= np.sqrt(np.maximum(count, 1))
-        lost[rows] |= off > LOST * np.maximum(usual, 0.5 * np.minimum(own, 4.0 * usual)[label])
+        own = CHANGING_SHARE * np.minimum(own, MOST_CHANGING * usual)
+        lost[rows] |= off > LOST * np.maximum(usual, own[label])
     return lost
 
 

@@ -65,7 +65,7 @@ def describe(model: Model, which: int, rng: np.random.Generator) -> Finding:
     candidate = entered.hypothesis.candidate
     others, ranked = _in_its_place(model, which)
     own = ranked[0]
-    members = indistinguishable(others, ranked, model.dimension, model.settings)
+    members = indistinguishable(ranked, model.dimension, model.settings)
     scale = float(background(own.remaining, model.dimension))
     fitted = estimate(model.evidence, others, own.hypothesis, scale)
     names = [p.name for p in candidate.parameters] + [p.name for p in candidate.shape]

@@ -13,6 +13,9 @@ ROUNDS = 15
 LEAST = 1e-3
 """Directions weaker than this share of the strongest could follow a single lost beam."""
 
+MOST_DIRECTIONS = 0.25
+"""Of the measured values: more directions would follow the noise of all of them."""
+
 RIDGE = 1e-9
 """Keeps a direction solvable that only lost units show."""
 
@@ -53,7 +56,7 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> Mask
     values = np.where(measured, observations.values, 0.0)
     size = robust_scale(observations.values)
     rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
-    basis = leading_directions(rows, int(0.25 * measured.sum()), LEAST)
+    basis = leading_directions(rows, int(MOST_DIRECTIONS * measured.sum()), LEAST)
     target = (values / size).reshape(-1)
     weight = np.ones(n)
     distance = np.zeros(n)

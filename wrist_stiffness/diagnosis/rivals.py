@@ -1,6 +1,5 @@
 """Classes: effects that these data cannot tell apart."""
 
-from wrist_stiffness.diagnosis.projection import Base
 from wrist_stiffness.diagnosis.ranking import Ranked
 from wrist_stiffness.diagnosis.settings import Settings
 from wrist_stiffness.diagnosis.structure import background
@@ -12,9 +11,7 @@ MISFIT_RATIO = 2.0
 """A rival may leave this much more structure than the best one, if both laws are inexact."""
 
 
-def indistinguishable(
-    base: Base, ranked: list[Ranked], dimension: float, settings: Settings
-) -> list[Ranked]:
+def indistinguishable(ranked: list[Ranked], dimension: float, settings: Settings) -> list[Ranked]:
     """List the best candidate and all that explain the observations about as well.
 
     Against noise alone a rival falls behind by the usual criterion.  Where even the best leaves
@@ -23,8 +20,6 @@ def indistinguishable(
 
     Parameters
     ----------
-    base : Base
-        The rest of the model.
     ranked : list of Ranked
         Candidates for this place, best first.
     dimension : float
