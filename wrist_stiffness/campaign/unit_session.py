@@ -27,8 +27,8 @@ WILD = 1e3
 """The same beyond which a measurement tells nothing of how much its dwell changes."""
 
 CHANGING_SHARE, MOST_CHANGING = 0.5, 4.0
-"""Share of a dwell's own root mean square that counts as its scatter where it is more than the usual
-one, and how many usual ones it may be: settling and creep make it larger, as lost beams do."""
+"""Share of a dwell's own root mean square that counts as its scatter where it is more than usual,
+and how many usual ones it may be: settling and creep make it larger, as lost beams do."""
 
 FEWEST_FOR_NOISE = 30
 """Steps between neighbouring measurements of dwells from which their scatter is known."""
