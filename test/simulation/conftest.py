@@ -1,5 +1,7 @@
 """A wrist of plausible size for tests: made from springs, not from finite elements."""
 
+import importlib
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.vectors import skew
 from wrist_stiffness.mechanism.workspace import Workspace
 
+BENCH = Path(__file__).parents[2] / "bench" / "hidden_effects"
 GEOMETRY = Path(__file__).parent / "orthogonal_wrist.yaml"
 SECTORS = 8
 BUSHING_RADIAL, BUSHING_TILT = 3e-7, 5e-3  # m/N and rad/(N m)
@@ -104,3 +107,11 @@ def weight(mass, place):
 def wrist():
     """Return the function that makes a table."""
     return make_wrist
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """Return a function that imports a file of the benchmark."""
+    sys.path.insert(0, str(BENCH))
+    yield importlib.import_module
+    sys.path.remove(str(BENCH))

@@ -1,23 +1,10 @@
 """Tables beside the benchmark: what is asked once stays, and orders are what they say."""
 
-import importlib
 import json
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-BENCH = Path(__file__).parents[2] / "bench" / "hidden_effects"
-
-
-@pytest.fixture(scope="module")
-def bench():
-    """Return a function that imports a file of the benchmark."""
-    sys.path.insert(0, str(BENCH))
-    yield importlib.import_module
-    sys.path.remove(str(BENCH))
 
 
 def counted(case):

@@ -1,9 +1,5 @@
 """Tools of bench/hidden_effects on which its scores rest."""
 
-import importlib
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import binomtest, kstest
@@ -12,16 +8,6 @@ from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.residual import BasePose
 from wrist_stiffness.workflows.simulate import simulate_recording
-
-BENCH = Path(__file__).parents[2] / "bench" / "hidden_effects"
-
-
-@pytest.fixture(scope="module")
-def bench():
-    """Return a function that imports a file of the benchmark."""
-    sys.path.insert(0, str(BENCH))
-    yield importlib.import_module
-    sys.path.remove(str(BENCH))
 
 
 @pytest.mark.parametrize("sees", ["pose", "points", "pointing"])
