@@ -17,7 +17,7 @@ class LoadScale(Law):
     stage = "load"
     places = ("load_sensor",)
     sentence = "the load sensor reads too much (or too little) by a constant factor"
-    check = "hang a reference weight on the platform: does the sensor say its newtons, not kg or kN?"
+    check = "hang a reference weight on the platform: does the sensor say newtons, not kg or kN?"
     excited_by = "loads of several sizes beside a known weight"
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
