@@ -134,7 +134,7 @@ def calibrate_model(
     """
     output = writable(output)
     parent = load_model(model)
-    sessions = read_sessions(recordings, parent.table, progress)
+    sessions = read_sessions(recordings, [parent], progress)
     step = run.step(model, sessions)
     again = was_fitted_to(parent, sessions)
     found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)

@@ -182,7 +182,7 @@ def compare(
     names = unique_names(models)
     loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]
     table = loaded[0][1].table
-    sessions = read_sessions(recordings, table, progress("reading"))
+    sessions = read_sessions(recordings, [model for _, model in loaded], progress("reading"))
     comparison = compare_models(
         loaded, list(sessions.values()), np.random.default_rng(SEED), progress("comparing")
     )

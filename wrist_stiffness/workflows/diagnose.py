@@ -173,7 +173,7 @@ def diagnose_recordings(
         If the model or a recording cannot be used.
     """
     loaded = load_model(model)
-    sessions = read_sessions(recordings, loaded.table, progress("reading"))
+    sessions = read_sessions(recordings, [loaded], progress("reading"))
     known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
     rng = np.random.default_rng(SEED)
     answer = diagnose_sessions(known, list(sessions.values()), rng, tell=tell)

@@ -301,7 +301,7 @@ def extend_model(
     """
     output = writable(output)
     parent = load_model(model)
-    sessions = read_sessions(recordings, parent.table, progress)
+    sessions = read_sessions(recordings, [parent], progress)
     measured = tuple(sessions.values())
     covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
     effect = addition.effect(sorted(covariates))

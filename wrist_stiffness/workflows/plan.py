@@ -210,7 +210,7 @@ def plan_between_rivals(
     noise = rivals.noise(model.table)
     earlier = []
     if recordings is not None:
-        sessions = read_sessions(recordings, model.table, silent)
+        sessions = read_sessions(recordings, [model], silent)
         earlier = [as_experiment(model, session) for session in sessions.values()]
     return model, _planned(model, question, loads, noise, options, earlier, progress)
 

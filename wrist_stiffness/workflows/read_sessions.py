@@ -16,7 +16,7 @@ from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.refitted import BUILT, SET_UP
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.model.contribution import LEFT_OUT
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256
 from wrist_stiffness.progress import Progress
@@ -42,7 +42,7 @@ class Recordings:
 
 
 def read_sessions(
-    recordings: Recordings, table: Table, progress: Progress
+    recordings: Recordings, models: Sequence[ErrorModel], progress: Progress
 ) -> dict[Path, MeasuredSession]:
     """Read recordings with measured poses, each a session with a name of its own.
 
@@ -50,8 +50,9 @@ def read_sessions(
     ----------
     recordings : Recordings
         What to read.
-    table : Table
-        Of the wrist.
+    models : sequence of ErrorModel
+        What the command works with.  The table is that of the first; what a recording has no signal
+        for is said of all.
     progress : callable
         Told recordings done and in all.
 
@@ -73,7 +74,7 @@ def read_sessions(
         progress(done, len(paths))
         session = read_session(
             path,
-            table,
+            models[0].table,
             remaps=recordings.topics,
             joints=(motors.motor_1, motors.motor_2),
             frames=recordings.settings.frames,
@@ -81,7 +82,9 @@ def read_sessions(
         )
         same = first.setdefault(measured_sha256(session), path)
         if same == path:
-            found[path] = _with_remarks(session, _without_meaning(session))
+            found[path] = _with_remarks(
+                session, [*_without_meaning(session), *_without_signal(session, models)]
+            )
         else:
             said = f"{path} holds the same measurements: used once"
             found[same] = _with_remarks(found[same], [said])
@@ -109,6 +112,16 @@ def _without_meaning(session: MeasuredSession) -> list[str]:
         f"note {CALIBRATED!r} names {', '.join(map(str, names))}, without effect; what is refitted "
         f"are {', '.join(known)}"
     ]
+
+
+def _without_signal(session: MeasuredSession, models: Sequence[ErrorModel]) -> list[str]:
+    """Return a warning for each effect that the models must leave out, for want of a signal.
+
+    A signal is there in all samples or in none, so the first one tells.
+    """
+    first = session.block.take(slice(0, 1))
+    warnings = (warning for model in models for warning in model.batch(first).warnings)
+    return list(dict.fromkeys(each for each in warnings if each.endswith(LEFT_OUT)))
 
 
 def was_fitted_to(model: ErrorModel, sessions: Mapping[Path, MeasuredSession]) -> bool:
