@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -33,6 +34,9 @@ and how many usual ones it may be: settling and creep make it larger, as lost be
 FEWEST_FOR_NOISE = 30
 """Steps between neighbouring measurements of dwells from which their scatter is known."""
 
+FINEST = 1e-9
+"""What no instrument tells apart [m, rad]."""
+
 
 @dataclass(frozen=True, eq=False)
 class UnitSession:
@@ -55,7 +59,7 @@ class UnitSession:
         Scatter of one measurement, NaN where it is not known [m, rad].
     wander : (6,) float
         Slow scatter beside it, which no mean over a dwell makes smaller: what the instrument states
-        beyond the white scatter [m, rad].
+        beyond the white scatter, or what its digits hide where they hide that one [m, rad].
     """
 
     name: str
@@ -173,7 +177,9 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     stated = np.zeros(6) if session.covariance is None else np.diag(session.covariance)
     label = np.where(lost, -1, parts.label)
     mean, count = _means(values, label, units)
-    white = _white(values, label, parts, stated)
+    steps = _steps(values, label, parts)
+    white = _white(steps, stated)
+    beside = np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0))
     return UnitSession(
         session.name,
         parts,
@@ -182,7 +188,7 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         np.maximum(count.max(axis=1), 1.0),
         int(lost.sum()),
         white,
-        np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0)),
+        np.maximum(beside, np.where(white == 0.0, _rounding(steps), 0.0)),
     )
 
 
@@ -214,6 +220,9 @@ def _lost(values: Array, parts: Cut) -> Mask:
         middle = column[order[np.minimum(first + good // 2, len(order) - 1)]]
         off = np.abs(column[rows] - middle[label])
         usual = MAD_TO_SIGMA * float(np.nanmedian(off)) if np.isfinite(off).any() else 0.0
+        if usual == 0.0:
+            # Digits coarser than the noise: one of them up or down is no lost beam.
+            usual = float(np.min(off, initial=np.inf, where=off > 0.0))
         # A dwell in which the wrist settles or creeps is no dropout: its own spread counts too.
         own = np.sqrt(np.bincount(label, np.nan_to_num(np.minimum(off, WILD * usual)) ** 2))
         own /= np.sqrt(np.maximum(count, 1))
@@ -222,15 +231,29 @@ def _lost(values: Array, parts: Cut) -> Mask:
     return lost
 
 
-def _white(values: Array, label: Labels, parts: Cut, stated: Array) -> Array:
-    """Return the scatter of one measurement from neighbours in dwells, else as stated, (6,)."""
+def _steps(values: Array, label: Labels, parts: Cut) -> list[Array]:
+    """Return the steps between neighbours in dwells, for each component those that were seen."""
     inside = (label[1:] == label[:-1]) & (label[1:] >= 0) & parts.dwell[label[1:]]
     step = np.abs(np.diff(values, axis=0)[inside])
-    white = np.full(values.shape[1], np.nan)
-    for column, each in enumerate(step.T):
-        good = each[np.isfinite(each)]
-        if len(good) >= FEWEST_FOR_NOISE:
-            white[column] = MAD_TO_SIGMA / np.sqrt(2.0) * np.median(good)
+    return [each[np.isfinite(each)] for each in step.T]
+
+
+def _white(steps: Sequence[Array], stated: Array) -> Array:
+    """Return the scatter of one measurement from steps in dwells, else as stated, (6,)."""
+    white = np.full(len(steps), np.nan)
+    for column, each in enumerate(steps):
+        if len(each) >= FEWEST_FOR_NOISE:
+            white[column] = MAD_TO_SIGMA / np.sqrt(2.0) * np.median(each)
         elif stated[column] > 0.0:
             white[column] = np.sqrt(stated[column])
     return white
+
+
+def _rounding(steps: Sequence[Array]) -> Array:
+    """Return the scatter of what digits hide, by the smallest steps that they show, (6,).
+
+    Shifts share their digits, and so do turns: in a component that never changes none shows.
+    """
+    smallest = [np.min(each, initial=np.inf, where=each > 0.0) for each in steps]
+    digit = np.where(np.isfinite(smallest), np.maximum(smallest, FINEST), FINEST)
+    return np.repeat(digit.reshape(2, 3).max(axis=1), 3) / np.sqrt(12.0)

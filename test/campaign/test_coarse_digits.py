@@ -1,0 +1,59 @@
+"""An instrument whose digits are coarser than its noise scatters by what these hide."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.observing import observe
+from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+
+THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
+
+DIGIT = 3e-5
+"""Of the instrument [m]; far more than the noise, 0.7 um, which else would even it out a little."""
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+@pytest.fixture(scope="module")
+def session(model):
+    return read_session(THURSDAY, model.table)
+
+
+def test_what_digits_hide_is_the_scatter_of_a_mean(model, session):
+    """No mean over a dwell makes it smaller: a platform at rest shows the same digit again."""
+    fine = as_units(model, session)
+    coarse = as_units(model, replace(session, shift=np.round(session.shift / DIGIT) * DIGIT))
+    assert coarse.white[:3].tolist() == [0.0, 0.0, 0.0]
+    assert coarse.wander[:3] == pytest.approx(DIGIT / np.sqrt(12.0), rel=1e-6)
+    hidden = (coarse.shift - fine.shift)[coarse.cut.dwell]
+    assert np.sqrt(np.mean(hidden**2)) == pytest.approx(DIGIT / np.sqrt(12.0), rel=0.2)
+
+
+def test_coordinates_share_their_digits(model, session):
+    """Of 50 um so few are crossed at rest that one coordinate never changes."""
+    coarse = as_units(model, replace(session, shift=np.round(session.shift / 5e-5) * 5e-5))
+    assert coarse.wander[:3] == pytest.approx(5e-5 / np.sqrt(12.0), rel=1e-6)
+
+
+def test_a_digit_up_or_down_is_no_lost_beam(model, session):
+    coarse = as_units(model, replace(session, shift=np.round(session.shift / DIGIT) * DIGIT))
+    assert coarse.lost == as_units(model, session).lost
+
+
+def test_units_of_an_instrument_without_scatter_can_be_weighed(model, session):
+    """A fit divides by the scatter: each unit needs one, in every direction."""
+    still = as_units(model, session).cut
+    shift = session.shift.copy()
+    for unit in np.flatnonzero(still.dwell):
+        shift[still.label == unit] = shift[still.label == unit][0]
+    observed = observe(model, [replace(session, shift=shift)])
+    np.linalg.cholesky(observed.observations.covariance)
