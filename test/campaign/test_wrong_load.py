@@ -1,11 +1,16 @@
-"""A load of the wrong sign hides behind axes that are off their drawing, and in stiff parts."""
+"""A wrong load hides behind axes that are off their drawing, and in stiff or soft parts."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.comparing import wrong_load as module
+from wrist_stiffness.campaign.comparing.wiring import MISTAKES, Suspicion
+from wrist_stiffness.campaign.comparing.wrong_load import doubts_load, wrong_load
+from wrist_stiffness.campaign.fitting.calibrate import calibrate
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.campaign.unit_session import as_units
@@ -23,18 +28,7 @@ def explained(base, absorbed, findings=()):
     return SimpleNamespace(diagnosis=result, base=base, absorbed=absorbed)
 
 
-@pytest.mark.parametrize(
-    ("sign", "hidden", "words"),
-    [
-        (-1.0, (), "with the load's sign turned the error falls"),
-        (1.0, (HiddenEffect("bushing_stiffness", "joint_1", "plain", 3.0, 5),), ""),
-    ],
-    ids=["wrong sign", "soft bushing"],
-)
-def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
-    model, in_the_cell, sign, hidden, words
-):
-    """A bushing four times as soft asks as well, and is no mistake."""
+def of_a_wrong_base(in_the_cell, table, hidden=()):
     settings = CellSettings(
         rate_hz=10.0,
         program_seconds=60.0,
@@ -43,7 +37,22 @@ def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
         base_seed=3,
         hidden=hidden,
     )
-    session = in_the_cell(model.table, settings, 3)
+    return in_the_cell(table, settings, 3)
+
+
+@pytest.mark.parametrize(
+    ("sign", "hidden", "words"),
+    [
+        (-1.0, (), "with the load's sign turned a fit leaves"),
+        (1.0, (HiddenEffect("bushing_stiffness", "joint_1", "plain", 3.0, 5),), ""),
+    ],
+    ids=["wrong sign", "soft bushing"],
+)
+def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
+    model, in_the_cell, sign, hidden, words
+):
+    """A bushing four times as soft asks as well, and is no mistake."""
+    session = of_a_wrong_base(in_the_cell, model.table, hidden)
     block = replace(session.block, load=sign * session.block.load)
     measured = replace(session, block=block)
     base = fit_base(model, (as_units(model, measured),))
@@ -51,6 +60,44 @@ def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
     told = mistake_beside(model, answer, [measured], np.random.default_rng(0), asked.append)
     assert asked == ["asking for a wrong load"]
     assert words in told if words else told == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda b: replace(b, load=b.load / 9.80665), "with the load times 9.81 a fit leaves"),
+        (
+            lambda b: replace(b, load_on_platform=not b.load_on_platform),
+            "with the load in the other frame a fit leaves",
+        ),
+    ],
+    ids=["kg", "frame"],
+)
+def test_a_whole_fit_tells_what_it_would_else_take_up(model, in_the_cell, wrong, words):
+    sound = of_a_wrong_base(in_the_cell, model.table)
+    measured = (replace(sound, block=wrong(sound.block)),)
+    found = calibrate(model, measured)
+    told = wrong_load(model, found.model, measured, np.random.default_rng(0), found)
+    assert words in told
+    right, wrong_fit = (
+        float(number) for number in re.search(r"leaves (\S+) um of s, not (\S+),", told).groups()
+    )
+    assert wrong_fit == pytest.approx(found.after["s_um"], rel=0.01)
+    assert right == pytest.approx(calibrate(model, (sound,)).after["s_um"], rel=0.02)
+
+
+@pytest.mark.slow
+def test_what_no_whole_fit_bears_out_is_not_told(model, in_the_cell, monkeypatch):
+    """A bushing four times as soft: parts are far from their drawing, and the load is right."""
+    soft = HiddenEffect("bushing_stiffness", "joint_1", "plain", 3.0, 5)
+    measured = (of_a_wrong_base(in_the_cell, model.table, (soft,)),)
+    found = calibrate(model, measured)
+    assert doubts_load(found)
+    rng = np.random.default_rng(0)
+    suspicion = Suspicion(MISTAKES[0], 0.4, "the error falls")
+    monkeypatch.setattr(module, "suspicion_in", lambda *_: suspicion)
+    assert wrong_load(model, found.model, measured, rng, found) == ""
 
 
 @pytest.mark.parametrize(
@@ -68,7 +115,7 @@ def test_a_usual_answer_asks_for_no_wrong_load(
 ):
     """It takes a second or more."""
     done = []
-    monkeypatch.setattr(diagnose, "mistake_in", lambda *_: done.append(1) or "")
+    monkeypatch.setattr(diagnose, "wrong_load", lambda *_: done.append(1) or "")
     base = SimpleNamespace(effects=lambda session: ())
     findings = (SimpleNamespace(members=members),)
     taken = (TakenUp(name, {}, "flexibility_percent", -90.0, deviations),)

@@ -121,7 +121,8 @@ def test_a_mistake_is_looked_for_where_much_is_left(monkeypatch, left, asked):
     found = SimpleNamespace(diagnosis=result, contributions=(), absorbed=())
     done = []
     monkeypatch.setattr(diagnose, "diagnose_sessions", lambda *_, **__: found)
-    monkeypatch.setattr(diagnose, "mistake_in", lambda *_: done.append(1) or MISTAKE)
+    monkeypatch.setattr(diagnose, "suspicion_in", lambda *_: done.append(1))
+    monkeypatch.setattr(diagnose, "told_mistake", lambda _: MISTAKE)
     recordings = Recordings([Path(__file__).parents[1] / "data" / "wrist_b.mcap"], {})
     model = shipped_file("config/palmieri2015_model.yaml")
     told = diagnose.diagnose_recordings(model, recordings, Run("diagnose", "2026-01-01"))

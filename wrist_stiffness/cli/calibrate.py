@@ -94,6 +94,7 @@ def _run(arguments: argparse.Namespace) -> int:
         this_run(),
         arguments.hold_out,
         Progress("calibrate"),
+        Progress("a likely mistake put right"),
     )
     print("\n".join(found.lines()))
     print(f"\nwritten: {arguments.output}")

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.atomic_file import require_room
-from wrist_stiffness.campaign.comparing.compare import mistake_in
+from wrist_stiffness.campaign.comparing.compare import suspicion_in
+from wrist_stiffness.campaign.comparing.wiring import told_mistake
+from wrist_stiffness.campaign.comparing.wrong_load import doubts_load, wrong_load
 from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
-from wrist_stiffness.campaign.fitting.free_effects import answering_as
+from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.fit_report import (
@@ -104,6 +107,7 @@ def calibrate_model(
     run: Run,
     hold_out: bool = False,
     progress: Progress = silent,
+    asking: Progress = silent,
 ) -> Calibrated:
     """Fit a model to recordings and write it as it holds for the newest one.
 
@@ -121,6 +125,8 @@ def calibrate_model(
         Whether to judge by a part that a first fit has not seen.
     progress : callable
         Told steps done and steps at most.
+    asking : callable
+        The same of a second fit, where a mistake of the load is likely.
 
     Returns
     -------
@@ -140,16 +146,24 @@ def calibrate_model(
     found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
     calibrated = Calibrated(found, tuple(sessions.values()), output, "")
-    if not calibrated.errors.at_floor:
-        # What is wrong with positions or angles shows in the model as it was; what is wrong with
-        # the load hides there behind axes that are a little off their drawing.
-        tried = (
-            mistake_in(each, calibrated.sessions, np.random.default_rng(SEED))
-            for each in (parent, answering_as(parent, child))
-        )
-        calibrated = replace(calibrated, mistake=next(filter(None, tried), ""))
     save_model(child, output)
-    return calibrated
+    start = unfitted(parent) if again else parent
+    return replace(calibrated, mistake=_mistake(start, child, calibrated, asking))
+
+
+def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, asking: Progress) -> str:
+    """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
+
+    What is wrong with positions or angles shows in the model as it was; what is wrong with the load
+    hides there behind axes that are a little off their drawing.
+    """
+    sessions, mistake, much = calibrated.sessions, "", not calibrated.errors.at_floor
+    if much:
+        mistake = told_mistake(suspicion_in(start, sessions, np.random.default_rng(SEED)))
+    if not mistake and (much or doubts_load(calibrated.calibration)):
+        rng = np.random.default_rng(SEED)
+        mistake = wrong_load(start, child, sessions, rng, calibrated.calibration, asking)
+    return mistake
 
 
 def writable(output: str | Path) -> Path:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparing.compare import mistake_in
-from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING
-from wrist_stiffness.campaign.fitting.free_effects import answering_as, unfitted
+from wrist_stiffness.campaign.comparing.compare import suspicion_in
+from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING, told_mistake
+from wrist_stiffness.campaign.comparing.wrong_load import wrong_load
+from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import ANSWERS_LOAD
 from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
@@ -213,13 +214,13 @@ def mistake_beside(
     mistake = ""
     if _leaves_much(answer.diagnosis):
         tell("asking for wrong signs, units and names")
-        mistake = mistake_in(known, sessions, rng)
+        mistake = told_mistake(suspicion_in(known, sessions, rng))
     if not mistake and _doubts_load(answer):
         # Axes that are off their drawing hide a wrong load, and so do parts that it made as stiff
         # as they can be: so it is asked with the axes as fitted and the stiffness of before.
         tell("asking for a wrong load")
         fitted = known.with_effects(*answer.base.effects(0))
-        mistake = mistake_in(answering_as(known, fitted), sessions, rng)
+        mistake = wrong_load(known, fitted, sessions, rng)
     return mistake
 
 

@@ -10,7 +10,7 @@ from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Compari
 from wrist_stiffness.campaign.comparing.headroom import held_out_process
 from wrist_stiffness.campaign.comparing.sentences import tell
 from wrist_stiffness.campaign.comparing.set_up import without_set_up
-from wrist_stiffness.campaign.comparing.wiring import told_mistake
+from wrist_stiffness.campaign.comparing.wiring import Suspicion, suspected, told_mistake
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
@@ -70,7 +70,7 @@ def compare_models(
     left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
     floor = noise_floor(left)
     best, (observed, refitted, _) = models[-1][1], tables[-1]
-    mistake = told_mistake(best, observed, calibrated, refitted, floor.rms(refitted))
+    suspicion = suspected(best, observed, calibrated, refitted, floor.rms(refitted))
     progress(len(models) + 1, steps)
     compared = []
     for (name, _), (observed, refitted, absorbed) in zip(models, tables, strict=True):
@@ -84,14 +84,14 @@ def compare_models(
         repeatability(tables[0][1]),
         repeatability(by_side(tables[0][1])),
         {key: size.rms for key, size in sizes(left).items()},
-        mistake,
+        told_mistake(suspicion),
     )
 
 
-def mistake_in(
+def suspicion_in(
     model: ErrorModel, sessions: Sequence[MeasuredSession], rng: np.random.Generator
-) -> str:
-    """Return the mistake of signs, units or names that explains most of an error; empty for none.
+) -> Suspicion | None:
+    """Return the mistake of signs, units or names that explains most of an error; None for none.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def mistake_in(
     calibrated = said_calibrated(sessions)
     observed, refitted, _ = _prepared(model, sessions, cuts, calibrated)
     floor = noise_floor(refitted.with_values(held_out_process(refitted, rng)))
-    return told_mistake(model, observed, calibrated, refitted, floor.rms(refitted))
+    return suspected(model, observed, calibrated, refitted, floor.rms(refitted))
 
 
 def _prepared(

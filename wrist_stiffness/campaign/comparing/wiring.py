@@ -1,8 +1,9 @@
 """Signs, units and names that a cell got wrong: which of them would explain the error.
 
 No set-up explains a load of the wrong sign, and no effect is as large.  So the few usual mistakes
-are tried on what was measured, and one that explains most of the error is told.  It is never
-applied: whoever wired the cell has to look.
+are tried on what was measured, and one that explains most of the error is told; one that explains
+part of it may be asked by a whole fit (`wrong_load`).  None is ever applied: whoever wired the cell
+has to look.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import sizes
 from wrist_stiffness.campaign.comparing.set_up import without_set_up
+from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.diagnosis import Observations
@@ -28,6 +30,10 @@ WORTH_ASKING = 2.0
 
 CLEAR = 0.5
 """A mistake is told if s or phi without it is less than this share of what it is with it."""
+
+HINTED = 0.9
+"""The same from which on a mistake is worth a whole fit: a right load leaves 0.3 to 0.7 of what
+axes bent to the wrong one leave, another wrong one 0.95 and more."""
 
 GROWN = 1.05
 """A mistake is none if s or phi without it is more than that times as large."""
@@ -62,6 +68,12 @@ class Mistake:
         """Return the session without the mistake."""
         cut = replace(session.cut, block=self.block(session.block))
         return replace(session, cut=cut, shift=self.shift_factor * session.shift)
+
+    def measured_right(self, session: MeasuredSession) -> MeasuredSession:
+        """Return a session as it was measured without the mistake."""
+        return replace(
+            session, block=self.block(session.block), shift=self.shift_factor * session.shift
+        )
 
     def concerns(self, session: UnitSession) -> bool:
         """Tell whether the session could have it: a measured rotation names its own motors."""
@@ -100,14 +112,42 @@ MISTAKES = (
 )
 
 
-def told_mistake(
+@dataclass(frozen=True)
+class Suspicion:
+    """A mistake that explains part of an error.
+
+    Parameters
+    ----------
+    mistake : Mistake
+        The one that explains most.
+    share : float
+        What is left without it of s or of phi, whichever falls more.
+    fall : str
+        How the error falls.
+    """
+
+    mistake: Mistake
+    share: float
+    fall: str
+
+    @property
+    def clear(self) -> bool:
+        """Whether nothing else explains so much."""
+        return self.share < CLEAR
+
+    def told(self, fall: str) -> str:
+        """Return the sentence for a technician, with this or another account of the fall."""
+        return f"{LOOK_FIRST}: with {self.mistake.without} {fall}; {self.mistake.check}"
+
+
+def suspected(
     model: ErrorModel,
     observed: Observed,
     calibrated: Sequence[str],
     left: Observations,
     floor: dict[str, float],
-) -> str:
-    """Return the mistake that explains most of the error in a sentence, empty for none.
+) -> Suspicion | None:
+    """Return the mistake that explains most of the error, None if none explains any of it.
 
     Parameters
     ----------
@@ -125,26 +165,28 @@ def told_mistake(
     before = {key: size.rms for key, size in sizes(left).items()}
     over = _over(before, floor)
     if max(over.values(), default=0.0) < WORTH_ASKING:
-        return ""
-    best = (CLEAR, "")
+        return None
+    best = None
     for mistake in MISTAKES:
         after = _without(mistake, model, observed, calibrated)
         if any(after[key] > LARGER * before[key] for key in after):
             continue
         over_after = _over(after, floor, mistake.shift_factor)
         share = _share(over, over_after)
-        if share < best[0]:
+        if share < (best.share if best else HINTED):
             fall = " and ".join(
                 f"from {_times(over[q.key])} to {_times(over_after[q.key])} the noise of {q.name}"
                 if q.key == "s_um" and mistake.shift_factor > 1.0
                 else f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
                 for q in left.reported
             )
-            best = (
-                share,
-                f"{LOOK_FIRST}: with {mistake.without} the error falls {fall}; {mistake.check}",
-            )
-    return best[1]
+            best = Suspicion(mistake, share, f"the error falls {fall}")
+    return best
+
+
+def told_mistake(suspicion: Suspicion | None) -> str:
+    """Return a clear mistake in a sentence; empty for none, or one that is not clear."""
+    return suspicion.told(suspicion.fall) if suspicion and suspicion.clear else ""
 
 
 def _times(ratio: float) -> str:
