@@ -12,6 +12,7 @@ from wrist_stiffness.workflows.verdict import (
     conditions_in_words,
     correction_of,
     unexplained_share,
+    verdict_lines,
 )
 
 GROWTH = Finding(
@@ -58,3 +59,20 @@ def test_conditions_are_told_in_words_and_what_the_user_named_by_its_name():
     told = conditions_in_words(("approach_2", "held_s", "clamp_bar", "T_link_1"))
     assert told == "approach direction of motor 2, hold time, clamp_bar, T_link_1"
     assert set(CONDITIONS) == {*OWN, *FORCES, *MOMENTS}
+
+
+def test_what_was_named_at_first_is_no_rest_of_nothing():
+    withdrawn = replace(answer("unknown", 0.0), findings=())
+    assert unexplained_share(withdrawn) == "what was named at first and did not hold"
+
+
+@pytest.mark.parametrize(
+    ("after", "words"),
+    [
+        (1.4, "Nothing is missing: what is left is noise."),
+        (1.8, "what is left is 1.8 times the noise and depends on nothing that was recorded"),
+    ],
+)
+def test_nothing_missing_says_when_more_than_the_noise_is_left(after, words):
+    (told,) = verdict_lines(replace(answer("none", 0.0, after), findings=()))
+    assert words in told

@@ -99,7 +99,7 @@ def _require_parameters(law: Law, place: str) -> None:
     for component in law.places:
         try:
             scales = {each.key: each.scale for each in law.parameters(component)}
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             said = f"{type(error).__name__}: {error}"
             raise InputError(f"{place}: parameters({component!r}): {said}") from error
         for key, scale in scales.items():

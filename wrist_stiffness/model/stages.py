@@ -341,13 +341,13 @@ def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contributio
         raise
     except WristError as error:
         raise InputError(f"{effect.name}: {error}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         told = f"{effect.name}: {type(error).__name__}: {error}"
         raise InputError(told + _line_in(effect.law.file, error)) from error
     return added, state
 
 
-def _line_in(file: Path | None, error: Exception) -> str:
+def _line_in(file: Path | None, error: BaseException) -> str:
     """Return which line of a user's own file an error came through last, empty for none."""
     lines = [at.lineno for at in extract_tb(error.__traceback__) if Path(at.filename) == file]
     return f" ({file.name}, line {lines[-1]})" if file is not None and lines else ""

@@ -38,6 +38,13 @@ def conditions_in_words(names: Iterable[str]) -> str:
 def verdict_lines(result: Diagnosis) -> list[str]:
     """Return the verdict in one or two sentences."""
     if result.verdict == "none":
+        ratio = over_floor(result.after, result.noise_floor)
+        if ratio > WITH_WANDER:
+            return [
+                f"Nothing is missing that these recordings show: what is left is {ratio:.2g} times "
+                "the noise and depends on nothing that was recorded; slow wander of the instrument "
+                "looks like this."
+            ]
         return ["Nothing is missing: what is left is noise."]
     found = "; ".join(class_of(each) for each in result.findings)
     if result.verdict == "effect":
@@ -55,6 +62,8 @@ def unexplained_share(result: Diagnosis) -> str:
     """Return how much no known effect explains, so that a small rest does not read as nothing."""
     share = 100.0 * result.unexplained.energy_share
     if share == 0.0:
+        if result.verdict == "unknown" and not result.findings:
+            return "what was named at first and did not hold"
         return "nothing of the structure above the noise"
     amount = f"{share:.0f}" if share >= 1.0 else f"{share:.1g}"
     text = f"{amount} % of the structure above the noise"

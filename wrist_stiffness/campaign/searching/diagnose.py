@@ -29,6 +29,8 @@ from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
 from wrist_stiffness.campaign.searching.stepwise import MOST_EXTRAS
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.campaign.searching.telling import (
+    buys_anything,
+    chance_is_none,
     explained,
     rejudged,
     sized,
@@ -127,10 +129,12 @@ def diagnose_sessions(
         return refit(fitter, base, named, chosen.sealed_share, search.first_cost, saw_all)
 
     place, result, judged = _judged(search, ask, judge)
+    result = chance_is_none(result)
     base, named = _begun(place, result)
     final = judged.base
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
     result = rejudged(withdrawn(result, effects), judged.stages)
+    result = withdrawn(result, [each.name for each in result.findings if buys_anything(each)])
     kept = tuple(effects[each.name] for each in result.findings)
     absorbed = taken_up(final, [session.name for session in sessions])
     result = replace(result, absorbed=tuple(each.sentence for each in absorbed))

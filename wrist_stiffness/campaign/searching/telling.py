@@ -15,8 +15,12 @@ from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.candidates import SHARE
 from wrist_stiffness.diagnosis import Diagnosis
+from wrist_stiffness.diagnosis.result import Finding
 from wrist_stiffness.diagnosis.sealed import HeldOut, bought
 from wrist_stiffness.model.effect import Effect
+
+CLEARLY = 2.0
+"""Standard uncertainties of a gain by which the part put aside is worse, and not by chance."""
 
 
 def withdrawn(result: Diagnosis, kept: Collection[str]) -> Diagnosis:
@@ -44,6 +48,28 @@ def withdrawn(result: Diagnosis, kept: Collection[str]) -> Diagnosis:
     ]
     unexplained = replace(result.unexplained, evidence="; ".join(sentences))
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
+
+
+def chance_is_none(result: Diagnosis) -> Diagnosis:
+    """Return an answer that calls noise what is no more than it.
+
+    An effect that resamples do not choose again, where without it no structure stands above the
+    noise, was chance.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        Of the statistics.
+    """
+    nothing = not result.findings and result.unexplained.energy_share == 0.0
+    return replace(result, verdict="none") if nothing else result
+
+
+def buys_anything(finding: Finding) -> bool:
+    """Tell whether a finding makes the part put aside better, or at least not clearly worse."""
+    gains = finding.buys.values()
+    worse = any(gain < -CLEARLY * sigma for gain, sigma in gains)
+    return not worse or any(gain > sigma for gain, sigma in gains)
 
 
 def valued(result: Diagnosis, fitted: BaseFit, whole: Collection[str] = ()) -> Diagnosis:
