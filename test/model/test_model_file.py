@@ -255,6 +255,7 @@ def test_bad_law_files_give_one_line(tmp_path, own, text):
         ("return Contribution(both=np.full((1, 6), np.nan)), None", "both is not finite"),
         ("return None, None", "twist@platform: AttributeError"),
         ("return 3", "twist@platform: TypeError"),
+        ("raise SystemExit(0)", "twist@platform: SystemExit: 0"),
         ("return at.screw(place, np.zeros(6) + at.covariate('wind')[:, None]), None", None),
     ],
 )

@@ -90,7 +90,8 @@ class Diagnosed:
         out += _table(result)
         for place, finding in enumerate(result.findings, 1):
             out += ["", *_finding_lines(place, finding)]
-        out += adding_lines(worth_hearing(self.answer.contributions, result.verdict == "unknown"))
+        unknown = result.verdict == "unknown"
+        out += adding_lines(worth_hearing(self.answer.contributions, unknown, result.after))
         if result.unexplained.evidence:
             out += ["", f"not explained: {unexplained_share(result)}"]
             out.append(f"  {result.unexplained.evidence}")

@@ -7,7 +7,7 @@ is ranked by what it adds beyond what a new set-up would take up.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -84,10 +84,13 @@ def ranked(found: Iterable[Contribution]) -> tuple[Contribution, ...]:
     return tuple(sorted(found, key=lambda each: -each.signal))
 
 
-def worth_hearing(parts: Sequence[Contribution], something_left: bool) -> list[Contribution]:
+def worth_hearing(
+    parts: Sequence[Contribution], something_left: bool, left: Mapping[str, float]
+) -> list[Contribution]:
     """Return what people should hear of: findings and suspects, and what else is likeliest.
 
-    Nothing where findings say it all.
+    Nothing where findings say it all.  A guess that is larger than all that is left could only be
+    true beside another that cancels it.
 
     Parameters
     ----------
@@ -95,10 +98,16 @@ def worth_hearing(parts: Sequence[Contribution], something_left: bool) -> list[C
         Largest first.
     something_left : bool
         Whether something is left that no finding explains.
+    left : dict of str to float
+        Error that is left, by the key of the quantity.
     """
     kinds = ("finding", "suspect", "possible") if something_left else ("finding", "suspect")
     heard = [each for each in parts if each.kind in kinds]
-    likeliest = [each for each in heard if each.kind == "possible"][:MOST_POSSIBLE]
+    likeliest = [
+        each
+        for each in heard
+        if each.kind == "possible" and all(size <= left[q] for q, (size, _) in each.sizes.items())
+    ][:MOST_POSSIBLE]
     heard = [each for each in heard if each.kind != "possible" or each in likeliest]
     return [] if all(each.kind == "finding" for each in heard) else heard
 

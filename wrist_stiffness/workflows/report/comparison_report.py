@@ -139,10 +139,17 @@ def _levels(compared: Compared) -> Table:
         rows.append(
             (
                 f"{model.name}: share of what could be explained",
-                *("-" if share is None else f"{100 * share:.0f} %" for share in shares),
+                *(_share(share) for share in shares),
             )
         )
     return Table("What the error is to be judged by.", head, tuple(rows))
+
+
+def _share(share: float | None) -> str:
+    """Return a share of what the conditions could explain; a memory may explain more than they."""
+    if share is None:
+        return "-"
+    return "all" if share >= 1.0 else f"{100.0 * share:.0f} %"
 
 
 def _depends(compared: Compared) -> tuple[Part, ...]:

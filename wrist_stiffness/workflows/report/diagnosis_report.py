@@ -126,7 +126,9 @@ def report_of_diagnosis(
     sections = [
         Section("Findings", tuple(_findings(result, quantities))),
         Section("How much it brings", _fall(result, quantities)),
-        *_adding(worth_hearing(contributions, result.verdict == "unknown"), quantities),
+        *_adding(
+            worth_hearing(contributions, result.verdict == "unknown", result.after), quantities
+        ),
         Section("Where it shows", _depends(shown)),
         Section("What remains", _remains(result)),
         Section("What these recordings cannot show", _not_excited(result)),
