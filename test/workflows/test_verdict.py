@@ -64,6 +64,9 @@ def test_conditions_are_told_in_words_and_what_the_user_named_by_its_name():
 def test_what_was_named_at_first_is_no_rest_of_nothing():
     withdrawn = replace(answer("unknown", 0.0), findings=())
     assert unexplained_share(withdrawn) == "what was named at first and did not hold"
+    assert verdict_lines(withdrawn)[0].startswith("Something may be missing, too little to be told")
+    left = replace(withdrawn, unexplained=Unexplained((), 0.3, "more is left than the noise"))
+    assert verdict_lines(left) == ["Something is missing that no known effect explains."]
 
 
 @pytest.mark.parametrize(

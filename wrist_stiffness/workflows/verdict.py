@@ -55,6 +55,8 @@ def verdict_lines(result: Diagnosis) -> list[str]:
             "Something else that no known effect explains. As long as it is not understood, what "
             "is named may stand in for it: check it on the machine before you add it.",
         ]
+    if result.unexplained.energy_share == 0.0:
+        return ["Something may be missing, too little to be told from chance by these recordings."]
     return ["Something is missing that no known effect explains."]
 
 

@@ -8,7 +8,6 @@ import pytest
 from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.campaign.searching.telling import (
     buys_anything,
-    chance_is_none,
     explained,
     rejudged,
     sized,
@@ -93,22 +92,6 @@ def test_the_furthest_of_several_parameters_is_told():
     axis = Effect(find_law("axis_misalignment"), "joint_4").with_values({"shift_u_um": 2e3})
     (told,) = sized(answer(finding(axis.name, 5.0)), [axis]).findings
     assert told.evidence == "; far beyond its usual size: shift_u_um = 2e+03"
-
-
-@pytest.mark.parametrize(
-    ("share", "findings", "verdict"),
-    [
-        (0.0, (), "none"),
-        (0.3, (), "unknown"),
-        (0.0, (finding("backlash@motor_1", 5.0),), "unknown"),
-    ],
-)
-def test_what_leaves_no_structure_without_it_was_chance(share, findings, verdict):
-    doubt = "mount_compliance@motor_1 explains it best, but only 44 % of the resamples choose it"
-    asked = replace(answer(*findings), verdict="unknown", unexplained=Unexplained((), share, doubt))
-    told = chance_is_none(asked)
-    assert told == replace(asked, verdict=verdict)
-    assert told.unexplained.evidence == doubt
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,6 @@ from wrist_stiffness.campaign.searching.stepwise import MOST_EXTRAS
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
 from wrist_stiffness.campaign.searching.telling import (
     buys_anything,
-    chance_is_none,
     explained,
     rejudged,
     sized,
@@ -129,7 +128,6 @@ def diagnose_sessions(
         return refit(fitter, base, named, chosen.sealed_share, search.first_cost, saw_all)
 
     place, result, judged = _judged(search, ask, judge)
-    result = chance_is_none(result)
     base, named = _begun(place, result)
     final = judged.base
     effects = {each.name: each for each in final.effects(0) if each.name in final.extras}

@@ -50,21 +50,6 @@ def withdrawn(result: Diagnosis, kept: Collection[str]) -> Diagnosis:
     return replace(result, verdict="unknown", findings=stay, after=after, unexplained=unexplained)
 
 
-def chance_is_none(result: Diagnosis) -> Diagnosis:
-    """Return an answer that calls noise what is no more than it.
-
-    An effect that resamples do not choose again, where without it no structure stands above the
-    noise, was chance.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        Of the statistics.
-    """
-    nothing = not result.findings and result.unexplained.energy_share == 0.0
-    return replace(result, verdict="none") if nothing else result
-
-
 def buys_anything(finding: Finding) -> bool:
     """Tell whether a finding makes the part put aside better, or at least not clearly worse."""
     gains = finding.buys.values()
