@@ -33,3 +33,14 @@ def test_the_verdict_comes_first_and_the_file_says_the_same(capsys, tmp_path):
 def test_a_recording_that_is_not_there_is_one_line(capsys, tmp_path):
     assert main(["diagnose", str(tmp_path / "none.mcap")]) == 2
     assert "none.mcap" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--each", "--report", "x.html"], "--report draws one wrist"),
+        (["--scheduler", "tcp://localhost:1"], "add --each"),
+    ],
+)
+def test_options_for_many_wrists_are_refused_before_any_work(options, named, refused):
+    assert named in refused("diagnose", "monday.mcap", *options)

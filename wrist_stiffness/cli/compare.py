@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from wrist_stiffness.cli.fleet_options import add_fleet_options, for_each
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 
@@ -41,16 +42,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         "(default: the shipped wrist's)",
     )
     parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
-    parser.add_argument(
-        "--each",
-        action="store_true",
-        help="every recording is of a wrist of its own: one line for each, in parallel",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="with --each: a running Dask scheduler, tcp://HOST:PORT (default: this machine)",
-    )
+    add_fleet_options(parser)
     add_recording_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
     parser.set_defaults(run=_run)
@@ -59,17 +51,14 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.cli.this_run import this_run
-    from wrist_stiffness.errors import InputError
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.workflows.json_file import write_json
 
     models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
     recordings = recordings_named(arguments.recordings, arguments)
-    if arguments.each:
+    if for_each(arguments):
         from wrist_stiffness.workflows.compare_fleet import compare_each
 
-        if arguments.report:
-            raise InputError("--report draws one wrist; leave out --each")
         fleet = compare_each(
             models, recordings, this_run(), arguments.scheduler, Progress("recordings")
         )
@@ -77,8 +66,6 @@ def _run(arguments: argparse.Namespace) -> int:
     else:
         from wrist_stiffness.workflows.compare import compare
 
-        if arguments.scheduler:
-            raise InputError("--scheduler spreads many recordings over machines: add --each")
         found = compare(models, recordings, this_run(), Progress)
         lines, values = found.lines(), found.as_values()
     print("\n".join(lines))

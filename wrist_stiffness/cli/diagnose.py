@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from wrist_stiffness.cli.fleet_options import add_fleet_options, for_each
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
 
@@ -22,6 +23,7 @@ EPILOG = """\
 examples:
   wrist-stiffness diagnose monday tuesday --model my_wrist.yaml --report why.html
   wrist-stiffness diagnose monday --json why.json
+  wrist-stiffness diagnose all_wrists --each --json fleet.json
 
 next: 'extend MODEL --effect NAME@COMPONENT' adds what was found; 'plan --diagnosis why.json' says
 what to record where rivals remain."""
@@ -41,6 +43,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     parser.add_argument("--model", metavar="FILE", help="model file (default: the shipped wrist's)")
     parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
+    add_fleet_options(parser)
     add_recording_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
     parser.set_defaults(run=_run)
@@ -53,19 +56,24 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.workflows.diagnose import diagnose_recordings
     from wrist_stiffness.workflows.json_file import write_json
 
-    with Status() as status:
-        found = diagnose_recordings(
-            arguments.model or shipped_file("config/palmieri2015_model.yaml"),
-            recordings_named(arguments.recordings, arguments),
-            this_run(),
-            Progress,
-            status,
+    model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
+    recordings = recordings_named(arguments.recordings, arguments)
+    if for_each(arguments):
+        from wrist_stiffness.workflows.diagnose_fleet import diagnose_each
+
+        fleet = diagnose_each(
+            model, recordings, this_run(), arguments.scheduler, Progress("recordings")
         )
-    print("\n".join(found.lines()))
+        lines, values = fleet.lines(), fleet.as_values()
+    else:
+        with Status() as status:
+            found = diagnose_recordings(model, recordings, this_run(), Progress, status)
+        lines, values = found.lines(), found.as_values()
+    print("\n".join(lines))
     if arguments.report:
         from wrist_stiffness.workflows.report.page import write_page
 
         write_page(arguments.report, found.report())
     if arguments.json:
-        write_json(arguments.json, found.as_values())
+        write_json(arguments.json, values)
     return EXIT_DONE

@@ -31,7 +31,7 @@ class FleetComparison:
 
     def lines(self) -> list[str]:
         """Return one table for a terminal."""
-        wide = max(len(str(row.path)) for row in self.rows)
+        wide = max(len("recording"), *(len(str(row.path)) for row in self.rows))
         models = {row.result["models"][-1]["model"] for row in self.rows if row.result is not None}
         out = [
             *(f"{name}, RMS with registrations, zeros, tare refitted" for name in models),
@@ -40,8 +40,7 @@ class FleetComparison:
         ]
         for row in self.rows:
             if row.result is None:
-                reason = row.error.removeprefix(f"{row.path}: ").removeprefix(f"{row.path} ")
-                out.append(f"{row.path!s:{wide}}  not compared: {reason}")
+                out.append(f"{row.path!s:{wide}}  not compared: {row.reason}")
             else:
                 out.append(f"{row.path!s:{wide}}{_cells(row.result)}")
         mistakes = [

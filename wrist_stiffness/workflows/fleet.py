@@ -55,6 +55,11 @@ class FleetRow(Generic[Result]):
     result: Result | None
     error: str = ""
 
+    @property
+    def reason(self) -> str:
+        """The error without the path, which a table has before it."""
+        return self.error.removeprefix(f"{self.path}: ").removeprefix(f"{self.path} ")
+
 
 def map_recordings(
     function: Callable[[Path], Result],
