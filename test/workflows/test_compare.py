@@ -134,13 +134,19 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
     assert title.startswith("wrist_7, RMS with registrations")
     assert row.split()[:3] == ["a", "4.9", "0.004"]
     assert told == f"a: {mistake}"
-    assert FleetComparison(rows[1:]).lines()[-1] == "b  not compared: no recording"
+    assert FleetComparison(rows[1:]).lines()[-1].split(maxsplit=1) == [
+        "b",
+        "not compared: no recording",
+    ]
 
 
 @pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])
 def test_a_fleet_names_each_recording_once(error):
     rows = (FleetRow(Path("b/c.mcap"), None, error),)
-    assert FleetComparison(rows).lines()[-1] == "b/c.mcap  not compared: no pose"
+    assert FleetComparison(rows).lines()[-1].split(maxsplit=1) == [
+        "b/c.mcap",
+        "not compared: no pose",
+    ]
 
 
 @pytest.mark.slow
