@@ -33,12 +33,15 @@ def answer(verdict, share, after=1.2):
     [
         ("effect", 0.0021, "0.2 % of the structure above the noise, too little to look for"),
         ("unknown", 0.374, "37 % of the structure above the noise"),
-        ("unknown", 0.0, "nothing of the structure"),
+        ("unknown", 0.0, "what was named at first and did not hold"),
+        ("effect", 0.0, "nothing of the structure"),
     ],
 )
 def test_a_small_rest_does_not_read_as_none(verdict, share, words):
     assert unexplained_share(answer(verdict, share)).startswith(words)
-    assert ("too little" in unexplained_share(answer(verdict, share))) == (verdict == "effect")
+    assert ("too little" in unexplained_share(answer(verdict, share))) == (
+        verdict == "effect" and share > 0.0
+    )
 
 
 def test_a_small_share_of_a_large_error_is_not_called_little():
@@ -65,6 +68,9 @@ def test_what_was_named_at_first_is_no_rest_of_nothing():
     withdrawn = replace(answer("unknown", 0.0), findings=())
     assert unexplained_share(withdrawn) == "what was named at first and did not hold"
     assert verdict_lines(withdrawn)[0].startswith("Something may be missing, too little to be told")
+    beside = verdict_lines(answer("unknown", 0.0))
+    assert beside[0] == "Missing in the model: thermal_expansion@platform."
+    assert beside[1].startswith("Something else may be missing, too little to be told")
     left = replace(withdrawn, unexplained=Unexplained((), 0.3, "more is left than the noise"))
     assert verdict_lines(left) == ["Something is missing that no known effect explains."]
 

@@ -146,12 +146,15 @@ def calibrate_model(
     found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
     calibrated = Calibrated(found, tuple(sessions.values()), output, "")
-    save_model(child, output)
     start = unfitted(parent) if again else parent
-    return replace(calibrated, mistake=_mistake(start, child, calibrated, asking))
+    calibrated = replace(calibrated, mistake=_mistake(start, child, calibrated, hold_out, asking))
+    save_model(child, output)
+    return calibrated
 
 
-def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, asking: Progress) -> str:
+def _mistake(
+    start: ErrorModel, child: ErrorModel, calibrated: Calibrated, hold_out: bool, asking: Progress
+) -> str:
     """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
 
     What is wrong with positions or angles shows in the model as it was; what is wrong with the load
@@ -161,8 +164,8 @@ def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, askin
     if much:
         mistake = told_mistake(suspicion_in(start, sessions, np.random.default_rng(SEED)))
     if not mistake and (much or doubts_load(calibrated.calibration)):
-        rng = np.random.default_rng(SEED)
-        mistake = wrong_load(start, child, sessions, rng, calibrated.calibration, asking)
+        rng, found = np.random.default_rng(SEED), calibrated.calibration
+        mistake = wrong_load(start, child, sessions, rng, found, hold_out, asking)
     return mistake
 
 

@@ -12,7 +12,7 @@ from wrist_stiffness.campaign.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.progress import Progress
 from wrist_stiffness.workflows.compare import compare
-from wrist_stiffness.workflows.fleet import FleetRow, map_recordings
+from wrist_stiffness.workflows.fleet import FleetRow, map_recordings, table_lines, table_values
 from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 
@@ -31,36 +31,20 @@ class FleetComparison:
 
     def lines(self) -> list[str]:
         """Return one table for a terminal."""
-        wide = max(len("recording"), *(len(str(row.path)) for row in self.rows))
         models = {row.result["models"][-1]["model"] for row in self.rows if row.result is not None}
-        out = [
+        titles = f"{'s [um]':>10}{'floor':>8}{'phi [mdeg]':>12}{'floor':>8}  strongest dependence"
+        return [
             *(f"{name}, RMS with registrations, zeros, tare refitted" for name in models),
-            f"{'recording':{wide}}{'s [um]':>10}{'floor':>8}{'phi [mdeg]':>12}{'floor':>8}  "
-            "strongest dependence",
+            *table_lines(self.rows, titles, _cells, "compared", _mistakes),
         ]
-        for row in self.rows:
-            if row.result is None:
-                out.append(f"{row.path!s:{wide}}  not compared: {row.reason}")
-            else:
-                out.append(f"{row.path!s:{wide}}{_cells(row.result)}")
-        mistakes = [
-            f"{row.path}: {sentence}"
-            for row in self.rows
-            if row.result is not None
-            for sentence in row.result["verdict"]
-            if sentence.startswith(LOOK_FIRST)
-        ]
-        return [*out, *(["", *mistakes] if mistakes else [])]
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""
-        return {
-            "schema": 1,
-            "recordings": [
-                {"recording": str(row.path), "error": row.error or None, "comparison": row.result}
-                for row in self.rows
-            ],
-        }
+        return table_values(self.rows, "comparison")
+
+
+def _mistakes(values: dict[str, Any]) -> list[str]:
+    return [sentence for sentence in values["verdict"] if sentence.startswith(LOOK_FIRST)]
 
 
 def _cells(values: dict[str, Any]) -> str:

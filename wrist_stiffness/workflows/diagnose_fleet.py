@@ -11,7 +11,7 @@ from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.progress import Progress
 from wrist_stiffness.workflows.diagnose import diagnose_recordings
 from wrist_stiffness.workflows.fit_report import TITLES
-from wrist_stiffness.workflows.fleet import FleetRow, map_recordings
+from wrist_stiffness.workflows.fleet import FleetRow, map_recordings, table_lines, table_values
 from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import Recordings
 
@@ -30,31 +30,21 @@ class FleetDiagnosis:
 
     def lines(self) -> list[str]:
         """Return one table for a terminal."""
-        wide = max(len("recording"), *(len(str(row.path)) for row in self.rows))
-        titles = "".join(f"{title:>22}{'floor':>8}" for title in TITLES.values())
-        out = [
+        titles = "".join(f"{title:>22}{'floor':>8}" for title in TITLES.values()) + "  missing"
+        return [
             "RMS on the part put aside, before and after what is missing is added",
-            f"{'recording':{wide}}{titles}  missing",
+            *table_lines(
+                self.rows,
+                titles,
+                _cells,
+                "diagnosed",
+                lambda values: [each for each in [values["set_up_mistake"]] if each],
+            ),
         ]
-        for row in self.rows:
-            said = f"  not diagnosed: {row.reason}" if row.result is None else _cells(row.result)
-            out.append(f"{row.path!s:{wide}}{said}")
-        mistakes = [
-            f"{row.path}: {row.result['set_up_mistake']}"
-            for row in self.rows
-            if row.result is not None and row.result["set_up_mistake"]
-        ]
-        return [*out, *(["", *mistakes] if mistakes else [])]
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""
-        return {
-            "schema": 1,
-            "recordings": [
-                {"recording": str(row.path), "error": row.error or None, "diagnosis": row.result}
-                for row in self.rows
-            ],
-        }
+        return table_values(self.rows, "diagnosis")
 
 
 def _cells(values: dict[str, Any]) -> str:
@@ -75,7 +65,8 @@ def _missing(values: dict[str, Any]) -> str:
         best, *others = (f"{each['effect']}@{each['component']}" for each in finding["class"])
         named.append(f"{best} (or {len(others)} more)" if others else best)
     if values["verdict"] == "unknown":
-        named.append("something unknown")
+        doubtful = values["unexplained"]["energy_share"] == 0.0
+        named.append("perhaps something" if doubtful else "something unknown")
     return ", ".join(named) or "nothing"
 
 

@@ -61,6 +61,50 @@ class FleetRow(Generic[Result]):
         return self.error.removeprefix(f"{self.path}: ").removeprefix(f"{self.path} ")
 
 
+def table_lines(
+    rows: Sequence[FleetRow[Result]],
+    titles: str,
+    cells: Callable[[Result], str],
+    undone: str,
+    mistakes: Callable[[Result], Sequence[str]],
+) -> list[str]:
+    """Return a table for a terminal: a line for each recording, and below what is wrong in a cell.
+
+    Parameters
+    ----------
+    rows : sequence of FleetRow
+        In the order of the lines.
+    titles : str
+        Of the columns beside the recording's.
+    cells : callable
+        What stands there of a result.
+    undone : str
+        What was not done where there is none, in a word.
+    mistakes : callable
+        Of a result, sentences that come below.
+    """
+    wide = max([len("recording"), *(len(str(row.path)) for row in rows)])
+    out, below = [f"{'recording':{wide}}{titles}"], []
+    for row in rows:
+        if row.result is None:
+            out.append(f"{row.path!s:{wide}}  not {undone}: {row.reason}")
+            continue
+        out.append(f"{row.path!s:{wide}}{cells(row.result)}")
+        below += [f"{row.path}: {sentence}" for sentence in mistakes(row.result)]
+    return [*out, *(["", *below] if below else [])]
+
+
+def table_values(rows: Sequence[FleetRow[dict[str, Any]]], what: str) -> dict[str, Any]:
+    """Return what programs read of rows: under this name each result, or None and the error."""
+    return {
+        "schema": 1,
+        "recordings": [
+            {"recording": str(row.path), "error": row.error or None, what: row.result}
+            for row in rows
+        ],
+    }
+
+
 def map_recordings(
     function: Callable[[Path], Result],
     paths: Sequence[Path],

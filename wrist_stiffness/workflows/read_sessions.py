@@ -117,9 +117,10 @@ def _without_meaning(session: MeasuredSession) -> list[str]:
 def _without_signal(session: MeasuredSession, models: Sequence[ErrorModel]) -> list[str]:
     """Return a warning for each effect that the models must leave out, for want of a signal.
 
-    A signal is there in all samples or in none, so the first one tells.
+    A signal is there in all samples or in none, so the first one tells, put where any table holds.
     """
     first = session.block.take(slice(0, 1))
+    first = replace(first, theta=np.zeros((1, 2)), load=np.zeros((1, 6)))
     warnings = (warning for model in models for warning in model.batch(first).warnings)
     return list(dict.fromkeys(each for each in warnings if each.endswith(LEFT_OUT)))
 

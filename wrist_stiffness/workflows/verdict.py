@@ -49,14 +49,16 @@ def verdict_lines(result: Diagnosis) -> list[str]:
     found = "; ".join(class_of(each) for each in result.findings)
     if result.verdict == "effect":
         return [f"Missing in the model: {found}."]
+    if result.unexplained.energy_share == 0.0:
+        what = "Something else" if found else "Something"
+        doubt = f"{what} may be missing, too little to be told from chance by these recordings."
+        return [*([f"Missing in the model: {found}."] if found else []), doubt]
     if found:
         return [
             f"Missing in the model: {found}.",
             "Something else that no known effect explains. As long as it is not understood, what "
             "is named may stand in for it: check it on the machine before you add it.",
         ]
-    if result.unexplained.energy_share == 0.0:
-        return ["Something may be missing, too little to be told from chance by these recordings."]
     return ["Something is missing that no known effect explains."]
 
 
@@ -64,7 +66,7 @@ def unexplained_share(result: Diagnosis) -> str:
     """Return how much no known effect explains, so that a small rest does not read as nothing."""
     share = 100.0 * result.unexplained.energy_share
     if share == 0.0:
-        if result.verdict == "unknown" and not result.findings:
+        if result.verdict == "unknown":
             return "what was named at first and did not hold"
         return "nothing of the structure above the noise"
     amount = f"{share:.0f}" if share >= 1.0 else f"{share:.1g}"

@@ -10,7 +10,13 @@ from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Compari
 from wrist_stiffness.campaign.comparing.headroom import held_out_process
 from wrist_stiffness.campaign.comparing.sentences import tell
 from wrist_stiffness.campaign.comparing.set_up import without_set_up
-from wrist_stiffness.campaign.comparing.wiring import Suspicion, suspected, told_mistake
+from wrist_stiffness.campaign.comparing.wiring import (
+    MISTAKES,
+    Mistake,
+    Suspicion,
+    suspected,
+    told_mistake,
+)
 from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
@@ -89,7 +95,10 @@ def compare_models(
 
 
 def suspicion_in(
-    model: ErrorModel, sessions: Sequence[MeasuredSession], rng: np.random.Generator
+    model: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    rng: np.random.Generator,
+    mistakes: Sequence[Mistake] = MISTAKES,
 ) -> Suspicion | None:
     """Return the mistake of signs, units or names that explains most of an error; None for none.
 
@@ -101,6 +110,8 @@ def suspicion_in(
         In the order of time.
     rng : numpy.random.Generator
         For the noise floor.
+    mistakes : sequence of Mistake, optional
+        Those that are tried.
 
     Raises
     ------
@@ -111,7 +122,7 @@ def suspicion_in(
     calibrated = said_calibrated(sessions)
     observed, refitted, _ = _prepared(model, sessions, cuts, calibrated)
     floor = noise_floor(refitted.with_values(held_out_process(refitted, rng)))
-    return suspected(model, observed, calibrated, refitted, floor.rms(refitted))
+    return suspected(model, observed, calibrated, refitted, floor.rms(refitted), mistakes)
 
 
 def _prepared(

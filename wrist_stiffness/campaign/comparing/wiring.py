@@ -32,7 +32,7 @@ CLEAR = 0.5
 """A mistake is told if s or phi without it is less than this share of what it is with it."""
 
 HINTED = 0.9
-"""The same from which on a mistake is worth a whole fit: a right load leaves 0.3 to 0.7 of what
+"""The same from which on a mistake is worth a whole fit: a right load leaves 0.25 to 0.7 of what
 axes bent to the wrong one leave, another wrong one 0.95 and more."""
 
 GROWN = 1.05
@@ -85,7 +85,7 @@ def _load(factor: float) -> Callable[[Block], Block]:
     return lambda block: replace(block, load=factor * block.load)
 
 
-MISTAKES = (
+LOAD_MISTAKES = (
     Mistake(
         "the load's sign turned",
         "does the sensor show what acts on the platform, or the reaction (acts_on: environment)?",
@@ -98,6 +98,10 @@ MISTAKES = (
         "does the load sensor turn with the platform (wrist_platform) or not (wrist_base)?",
         lambda block: replace(block, load_on_platform=not block.load_on_platform),
     ),
+)
+
+MISTAKES = (
+    *LOAD_MISTAKES,
     Mistake(
         "the motors swapped",
         "--joint names motor 1 first",
@@ -146,6 +150,7 @@ def suspected(
     calibrated: Sequence[str],
     left: Observations,
     floor: dict[str, float],
+    mistakes: Sequence[Mistake] = MISTAKES,
 ) -> Suspicion | None:
     """Return the mistake that explains most of the error, None if none explains any of it.
 
@@ -161,13 +166,15 @@ def suspected(
         Residuals of the units after the refit.
     floor : dict of str to float
         Noise floor by the key of the quantity.
+    mistakes : sequence of Mistake, optional
+        Those that are tried.
     """
     before = {key: size.rms for key, size in sizes(left).items()}
     over = _over(before, floor)
     if max(over.values(), default=0.0) < WORTH_ASKING:
         return None
     best = None
-    for mistake in MISTAKES:
+    for mistake in mistakes:
         after = _without(mistake, model, observed, calibrated)
         if any(after[key] > LARGER * before[key] for key in after):
             continue

@@ -13,7 +13,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import suspicion_in
 from wrist_stiffness.campaign.comparing.set_up import INDEPENDENT
-from wrist_stiffness.campaign.comparing.wiring import CLEAR
+from wrist_stiffness.campaign.comparing.wiring import CLEAR, LOAD_MISTAKES
 from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
 from wrist_stiffness.campaign.fitting.free_effects import answering_as
 from wrist_stiffness.campaign.fitting.result import FittedParameter
@@ -29,6 +29,7 @@ def wrong_load(
     sessions: Sequence[MeasuredSession],
     rng: np.random.Generator,
     found: Calibration | None = None,
+    hold_out: bool = False,
     progress: Progress = silent,
 ) -> str:
     """Return the mistake that a fit hides, in a sentence for a technician; empty for none.
@@ -45,6 +46,8 @@ def wrong_load(
         For the noise floor.
     found : Calibration, optional
         The fit, if it was one; else it is made.
+    hold_out : bool
+        Whether it was judged by a part that it has not seen: then the other one is, too.
     progress : callable, optional
         Told steps of the fit without the mistake, done and at most.
 
@@ -53,12 +56,12 @@ def wrong_load(
     InputError
         If there is too little to compare.
     """
-    suspicion = suspicion_in(answering_as(model, fitted), sessions, rng)
+    suspicion = suspicion_in(answering_as(model, fitted), sessions, rng, LOAD_MISTAKES)
     if suspicion is None:
         return ""
-    before = found or calibrate(model, sessions)
+    before = found or calibrate(model, sessions, hold_out)
     right = tuple(suspicion.mistake.measured_right(session) for session in sessions)
-    after = calibrate(model, right, progress=progress)
+    after = calibrate(model, right, hold_out, progress)
     if _cost(after) >= CLEAR * _cost(before):
         return ""
     left = " and ".join(
