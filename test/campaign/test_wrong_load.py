@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.comparing import wrong_load as module
-from wrist_stiffness.campaign.comparing.wiring import MISTAKES, Suspicion
+from wrist_stiffness.campaign.comparing.wiring import LOAD_MISTAKES, MISTAKES, Suspicion
 from wrist_stiffness.campaign.comparing.wrong_load import doubts_load, wrong_load
 from wrist_stiffness.campaign.fitting.calibrate import calibrate
 from wrist_stiffness.campaign.searching.base_fit import fit_base
@@ -121,3 +121,23 @@ def test_a_usual_answer_asks_for_no_wrong_load(
     taken = (TakenUp(name, {}, "flexibility_percent", -90.0, deviations),)
     mistake_beside(model, explained(base, taken, findings), [], np.random.default_rng(0))
     assert len(done) == asked
+
+
+@pytest.mark.parametrize("hold_out", [False, True])
+def test_the_second_fit_is_judged_as_the_first_and_asked_for_loads_alone(monkeypatch, hold_out):
+    """A part put aside looks worse than one that a fit has seen: half as much was no mistake."""
+    asked, fitted = [], []
+    observations = SimpleNamespace(reported=())
+    found = SimpleNamespace(
+        after={"s_um": 2.0},
+        floor=SimpleNamespace(rms=lambda _: {"s_um": 1.0}),
+        judged=SimpleNamespace(observations=observations),
+        parameters=(),
+    )
+    suspicion = Suspicion(MISTAKES[0], 0.4, "the error falls")
+    monkeypatch.setattr(module, "suspicion_in", lambda *a: asked.append(a[3]) or suspicion)
+    monkeypatch.setattr(module, "answering_as", lambda *_: None)
+    monkeypatch.setattr(module, "calibrate", lambda *a: fitted.append(a[2]) or found)
+    assert wrong_load(None, None, (), np.random.default_rng(0), None, hold_out) == ""
+    assert fitted == [hold_out, hold_out]
+    assert asked == [LOAD_MISTAKES]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
@@ -100,3 +101,13 @@ def test_what_stood_in_for_an_effect_gives_way_to_it(tmp_path, recorded):
     assert values(found["calibrated"].parameters) == pytest.approx(values(found["bare"].parameters))
     mass = next(each for each in found["calibrated"].own if each.key == "mass_g")
     assert abs(mass.value - MASS_G) < 3.5 * mass.sigma < 0.5 * MASS_G
+
+
+def test_no_model_is_written_where_asking_for_a_mistake_fails(recorded, tmp_path, monkeypatch):
+    def refused(*_):
+        raise InputError("too little to compare")
+
+    monkeypatch.setattr(calibrate, "_mistake", refused)
+    with pytest.raises(InputError, match="too little"):
+        calibrate_model(SHIPPED, Recordings([recorded(1)], {}), tmp_path / "mine.yaml", RUN)
+    assert not (tmp_path / "mine.yaml").exists()

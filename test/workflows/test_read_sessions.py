@@ -15,6 +15,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter, open_recording, topics
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows import read_sessions as read_sessions_module
 from wrist_stiffness.workflows.provenance import Run
 from wrist_stiffness.workflows.read_sessions import (
     Recordings,
@@ -103,3 +104,14 @@ def test_an_effect_that_a_recording_has_no_signal_for_is_said_of_that_recording(
     said = ("lifted@frame: covariate clamp_bar is missing, left out",)
     assert (without.name, without.remarks) == ("tuesday.mcap", said)
     assert (clamped.name, clamped.remarks) == ("thursday.mcap", ())
+
+
+def test_a_missing_signal_is_said_where_the_recording_begins_out_of_range(model):
+    law = FormulaLaw("lifted", "frame", np.eye(6)[2], "um * clamp_bar", ("clamp_bar",), ("um",))
+    lifted = model.with_effects(Effect(law, "frame").with_values({"um": 2.0}))
+    (session,) = read([THURSDAY.with_name("tuesday.mcap")], model).values()
+    theta = session.block.theta.copy()
+    theta[0] = 1.4
+    beyond = replace(session, block=replace(session.block, theta=theta))
+    assert not lifted.accepts(beyond.block)[0]
+    assert len(read_sessions_module._without_signal(beyond, [lifted])) == 1

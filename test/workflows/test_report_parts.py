@@ -5,6 +5,7 @@ from wrist_stiffness.campaign.comparing.conditions import Condition
 from wrist_stiffness.campaign.comparing.sentences import Change, Statement
 from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.workflows.report import comparison_report
 from wrist_stiffness.workflows.report.parts import against
 
 
@@ -23,3 +24,10 @@ def test_a_picture_shows_the_change_of_which_one_is_surest():
     shown = against(statement, [("model", observations)])
     assert shown.label.startswith("phi about +y")
     assert dict(shown.residuals)["model"] == pytest.approx([-30.0, 30.0, -30.0, 30.0])
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(None, "-"), (0.884, "88 %"), (1.0, "all"), (2.39, "all"), (-0.2, "-20 %")]
+)
+def test_a_share_is_never_more_than_all(share, text):
+    assert comparison_report._share(share) == text
