@@ -56,7 +56,7 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
 def rotation_vector(rotation: Array) -> Array:
     """Return the rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3).
 
-    For small angles to the last digit, and in a third of SciPy's time.
+    For small angles to the last digit, and of many in a tenth of SciPy's time.
     """
     # Twice the sine of the angle times the axis.
     w = np.empty(rotation.shape[:-1])
