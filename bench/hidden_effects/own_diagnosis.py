@@ -50,9 +50,20 @@ def own_diagnosis_mcap(riddle: Riddle, words: Dictionary | None = None) -> Answe
 
 def diagnosed(riddle: Riddle, session: MeasuredSession) -> Answer:
     """Return the answer of the project to a first day."""
+    return diagnosed_sessions(riddle, [session], riddle.case.seed)
+
+
+def diagnosed_sessions(
+    riddle: Riddle | None, sessions: Sequence[MeasuredSession], seed: int
+) -> Answer:
+    """Return the answer of the project to some days; without a riddle it explains no other."""
     model = ErrorModel("benchmark", wrist(), "closed_form")
-    found = diagnose_sessions(model, [session], np.random.default_rng(riddle.case.seed))
+    found = diagnose_sessions(model, sessions, np.random.default_rng(seed))
     result = found.diagnosis
+    if riddle is None:
+        classes = tuple(finding.names for finding in result.findings)
+        nothing = np.zeros((0, 6))
+        return Answer(result.verdict, classes, (nothing, nothing))
     extended = model.with_effects(*refitted(found.base, found.effects), *found.effects)
     one, two = (predicted(extended, day) for day in riddle.days)
     suspected = [e for e in found.suspected.effects(0) if e.law.id not in REGISTRATIONS]

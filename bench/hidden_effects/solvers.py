@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from bench_wrist import Array
@@ -50,6 +51,8 @@ class Answer:
         How much each name may add to the error, in any unit; where empty the classes' order counts.
     explained_with_suspects : ((u, 6), (u, 6)) float, optional
         The same as `explained` with all suspects in the model.
+    details : dict
+        Further figures for the results file.
     """
 
     verdict: str
@@ -58,6 +61,7 @@ class Answer:
     not_excited: tuple[str, ...] = ()
     suspects: dict[str, float] = field(default_factory=dict)
     explained_with_suspects: tuple[Array, ...] = ()
+    details: dict[str, Any] = field(default_factory=dict)
 
 
 Solver = Callable[[Riddle, Dictionary], Answer]
