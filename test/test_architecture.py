@@ -26,10 +26,11 @@ ROOMS_USED = {
     "progress": set(),
     "atomic_file": set(),
     "shipped": set(),
+    "topics": set(),
     "__main__": {"cli"},
     "__init__": set(),
 }
-COMMON = {"errors", "atomic_file", "progress"}
+COMMON = {"errors", "atomic_file", "progress", "topics"}
 ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both

@@ -17,10 +17,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness import topics
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.recording import RecordingWriter, open_recording, topics
+from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.recording.messages import Float64, Message, Point, Pose, Quaternion
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect

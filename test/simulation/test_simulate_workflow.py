@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness import topics
 from wrist_stiffness.cli import simulate as command
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.cli.simulate import in_usual_units
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table_file import save_table
-from wrist_stiffness.recording import open_recording, read_samples, topics
+from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.simulation.catalogue import CATALOGUE
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.workflows import simulate as workflow

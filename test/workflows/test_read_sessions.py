@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wrist_stiffness import topics
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.recording import RecordingWriter, open_recording, topics
+from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows import read_sessions as read_sessions_module

@@ -43,7 +43,7 @@ def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordi
     InputError
         If an option cannot be read.
     """
-    from wrist_stiffness.recording.topics import parse_topic_remaps
+    from wrist_stiffness.topics import parse_topic_remaps
     from wrist_stiffness.workflows.read_sessions import Recordings
 
     settings, _ = settings_named(arguments)

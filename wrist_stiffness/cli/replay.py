@@ -55,8 +55,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.recording.reader import open_recording
-    from wrist_stiffness.recording.topics import parse_topic_remaps
     from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.topics import parse_topic_remaps
     from wrist_stiffness.workflows.json_file import write_json
     from wrist_stiffness.workflows.output_changes import output_changes
     from wrist_stiffness.workflows.replay import replay

@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.compensation.contact_policy import ContactGuard
 from wrist_stiffness.compensation.correction import Correction, as_applied, correct
-from wrist_stiffness.compensation.intake import COMMAND, CORRECTED_FRAME
+from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.safety import (
@@ -24,6 +24,7 @@ from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_poin
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load
+from wrist_stiffness.topics import CORRECTED_FRAME
 
 TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
 

@@ -8,15 +8,10 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import (
-    BASE_FRAME,
-    PLATFORM_FRAME,
-    Frames,
-    SensorFrame,
-    frame_name,
-)
+from wrist_stiffness.compensation.intake import Frames, SensorFrame, frame_name
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
 KEYS = {"parent", "position_mm", "rpy_deg", "acts_on"}
 

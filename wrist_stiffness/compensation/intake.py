@@ -14,10 +14,8 @@ from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
-BASE_FRAME = "wrist_base"
-PLATFORM_FRAME = "wrist_platform"
-CORRECTED_FRAME = "wrist_corrected"
 JOINT_STATE, COMMAND = "joint state", "command"
 
 

@@ -8,14 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import (
-    BASE_FRAME,
-    PLATFORM_FRAME,
-    SensorFrame,
-    frame_name,
-)
+from wrist_stiffness.compensation.intake import SensorFrame, frame_name
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
 UNIT_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's norm from one."""

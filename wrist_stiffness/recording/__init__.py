@@ -6,8 +6,8 @@ Nothing here needs a ROS installation: MCAP comes from the package ``mcap``, the
 
 from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.samples import Samples, read_samples
-from wrist_stiffness.recording.topics import parse_topic_remaps
 from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.topics import parse_topic_remaps
 
 __all__ = [
     "Recording",

@@ -15,8 +15,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness import topics as names
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording import topics as names
 from wrist_stiffness.recording.collector import (
     Collector,
     Extract,

@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from wrist_stiffness.compensation.intake import BASE_FRAME, MotorNames
+from wrist_stiffness.compensation.intake import MotorNames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import ParameterEntry
 from wrist_stiffness.errors import WristError
@@ -36,6 +36,7 @@ from wrist_stiffness.ros.parameters import declare, model_path
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run, tell
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.topics import BASE_FRAME
 from wrist_stiffness.workflows.node_list import LARGEST_SEED, RATES_HZ, UNANSWERED
 
 PARAMETERS = (

@@ -16,9 +16,9 @@ from geometry_msgs.msg import (
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.topics import BASE_FRAME
 
 
 def nanoseconds(stamp: Time) -> int:

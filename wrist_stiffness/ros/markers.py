@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation, Slerp
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import LINKS, Array
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -17,6 +16,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import triad
 from wrist_stiffness.model.error_model import Prediction
 from wrist_stiffness.ros.conversions import pose_message, time_message
+from wrist_stiffness.topics import BASE_FRAME
 
 STEEL = ColorRGBA(r=0.45, g=0.5, b=0.55, a=1.0)
 RIGID = ColorRGBA(r=0.6, g=0.6, b=0.6, a=0.4)

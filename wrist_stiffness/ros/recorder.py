@@ -9,9 +9,10 @@ from typing import Any
 
 from rclpy.node import Node
 
+from wrist_stiffness import topics
 from wrist_stiffness.compensation.parameters import ParameterEntry
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.recording import RecordingWriter, topics
+from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.channel import Channel, channel_of
 from wrist_stiffness.recording.messages import (
     Bool,
@@ -57,18 +58,18 @@ TOPICS: dict[str, type[Message]] = {
     topics.MOTOR_COMMANDS: JointState,
     topics.MOTOR_TRAJECTORY: JointTrajectory,
     topics.RECORDING_NOTES: String,
-    "/cell_simulator/platform_pose_true": PoseStamped,
-    "/pose_error_predicted": PoseWithCovarianceStamped,
-    "/pose_error/s_um": Float64,
-    "/pose_error/phi_mdeg": Float64,
-    "/motor_commands_corrected": JointState,
-    "/motor_positions_corrected": Float64MultiArray,
-    "/motor_trajectory_corrected": JointTrajectory,
-    "/pose_error_residual": PoseWithCovarianceStamped,
-    "/pose_error_residual/task_point": PoseWithCovarianceStamped,
-    "/model_residual": PoseWithCovarianceStamped,
-    "/model_alarm": Bool,
-    "/diagnostics": DiagnosticArray,
+    topics.PLATFORM_POSE_TRUE: PoseStamped,
+    topics.POSE_ERROR_PREDICTED: PoseWithCovarianceStamped,
+    topics.POSE_ERROR_S_UM: Float64,
+    topics.POSE_ERROR_PHI_MDEG: Float64,
+    topics.MOTOR_COMMANDS_CORRECTED: JointState,
+    topics.MOTOR_POSITIONS_CORRECTED: Float64MultiArray,
+    topics.MOTOR_TRAJECTORY_CORRECTED: JointTrajectory,
+    topics.POSE_ERROR_RESIDUAL: PoseWithCovarianceStamped,
+    topics.POSE_ERROR_RESIDUAL_TASK: PoseWithCovarianceStamped,
+    topics.MODEL_RESIDUAL: PoseWithCovarianceStamped,
+    topics.MODEL_ALARM: Bool,
+    topics.DIAGNOSTICS: DiagnosticArray,
     topics.JOINT_STATES: JointState,
 }
 """The joint states last: who sees them heard knows that all the others are heard."""

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.mechanism.components import Array
@@ -23,6 +22,7 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovarianceStamped,
     WrenchStamped,
 )
+from wrist_stiffness.topics import BASE_FRAME
 
 
 class JointSample(NamedTuple):

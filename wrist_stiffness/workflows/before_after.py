@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import CORRECTED_FRAME, MotorNames
+from wrist_stiffness.compensation.intake import MotorNames
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.lookup.table import Table
@@ -16,11 +16,13 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.recording.messages import JointState, PoseStamped, PoseWithCovarianceStamped
 from wrist_stiffness.recording.reader import open_recording
-from wrist_stiffness.recording.topics import MOTOR_COMMANDS
-
-TRUE_POSE = "/cell_simulator/platform_pose_true"
-CORRECTED = "/motor_commands_corrected"
-RESIDUAL = "/pose_error_residual"
+from wrist_stiffness.topics import (
+    CORRECTED_FRAME,
+    MOTOR_COMMANDS,
+    MOTOR_COMMANDS_CORRECTED,
+    PLATFORM_POSE_TRUE,
+    POSE_ERROR_RESIDUAL,
+)
 
 SETTLED_NS = 300_000_000
 """A pose counts once its command has rested this long: the motors' lag is no elastic error."""
@@ -136,7 +138,9 @@ def _read(
     residuals: dict[int, Array] = {}
     switched_ns: int | None = None
     source = open_recording(recording)
-    for topic, _, message in source.messages([MOTOR_COMMANDS, TRUE_POSE, CORRECTED, RESIDUAL]):
+    for topic, _, message in source.messages(
+        [MOTOR_COMMANDS, PLATFORM_POSE_TRUE, MOTOR_COMMANDS_CORRECTED, POSE_ERROR_RESIDUAL]
+    ):
         if isinstance(message, JointState):
             stamp = message.header.stamp_ns
             if topic == MOTOR_COMMANDS:
@@ -150,7 +154,7 @@ def _read(
             p = message.pose.pose.position
             residuals[message.header.stamp_ns] = np.array([p.x, p.y, p.z])
     if not commands or not poses:
-        raise RecordingError(f"{recording}: it has no {MOTOR_COMMANDS} or no {TRUE_POSE}")
+        raise RecordingError(f"{recording}: it has no {MOTOR_COMMANDS} or no {PLATFORM_POSE_TRUE}")
     if switched_ns is None:
         raise RecordingError(f"{recording}: no command was corrected")
     return commands, poses, residuals, switched_ns

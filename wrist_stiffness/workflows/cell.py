@@ -13,6 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
+from wrist_stiffness import topics
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.progress import Progress, silent
@@ -43,14 +44,14 @@ CELL_PARAMETERS: dict[str, dict[str, ParameterValue]] = {
 """The virtual cell's loads are weights: they do not depend on the motion, so there is no loop."""
 
 SPOKEN = (
-    "/pose_error_predicted",
-    "/motor_commands_corrected",
-    "/model_residual",
-    "/load_estimate",
-    "/joint_states",
-    "/motor_commands",
-    "/platform_pose_measured",
-    "/cell_simulator/platform_pose_true",
+    topics.POSE_ERROR_PREDICTED,
+    topics.MOTOR_COMMANDS_CORRECTED,
+    topics.MODEL_RESIDUAL,
+    topics.LOAD_ESTIMATE,
+    topics.JOINT_STATES,
+    topics.MOTOR_COMMANDS,
+    topics.PLATFORM_POSE,
+    topics.PLATFORM_POSE_TRUE,
 )
 """What the recorder must know of before it listens: of whom it does not know it hears nothing."""
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness import topics
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.recording import RecordingWriter, topics
+from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.fixed_layout import FixedLayout
 from wrist_stiffness.recording.messages import (

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.load_history import LoadIntake
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
@@ -20,16 +19,16 @@ from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import Header, JointState, PoseWithCovarianceStamped
 from wrist_stiffness.recording.reader import open_recording
-from wrist_stiffness.recording.topics import (
+from wrist_stiffness.topics import (
+    BASE_FRAME,
     COVARIATES,
     JOINT_STATES,
     LOAD_ESTIMATE,
+    POSE_ERROR_PREDICTED,
     TEMPERATURES,
 )
 from wrist_stiffness.workflows.replay import pose_message
 from wrist_stiffness.workflows.signals_ahead import SignalsAhead
-
-PREDICTED = "/pose_error_predicted"
 
 LATE_LOADS = 3
 """A live node may lag by this many loads at one joint state."""
@@ -95,7 +94,7 @@ def compare_runs(live: str | Path, replayed: str | Path, model: str | Path) -> R
 def _predictions(path: str | Path) -> dict[int, PoseWithCovarianceStamped]:
     return {
         message.header.stamp_ns: message
-        for _, _, message in open_recording(path).messages([PREDICTED])
+        for _, _, message in open_recording(path).messages([POSE_ERROR_PREDICTED])
         if isinstance(message, PoseWithCovarianceStamped)
     }
 

@@ -44,7 +44,7 @@ from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
-from wrist_stiffness.recording.topics import MOTOR_COMMANDS
+from wrist_stiffness.topics import MOTOR_COMMANDS
 
 ROWS_A_REPORT = 1000
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness import topics
 from wrist_stiffness.campaign.reading.csv_columns import (
     LOAD,
     MOTORS,
@@ -23,11 +24,10 @@ from wrist_stiffness.campaign.reading.csv_columns import (
     reader_of,
 )
 from wrist_stiffness.campaign.reading.marker_poses import LEAST_MARKERS
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.recording import RecordingWriter, topics
+from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
@@ -46,6 +46,7 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
+from wrist_stiffness.topics import BASE_FRAME
 
 NAN = float("nan")
 HUGE = 1e6

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from wrist_stiffness import topics
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.campaign.planning.earlier import as_experiment
 from wrist_stiffness.campaign.planning.information import MeasurementNoise
@@ -24,7 +25,6 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.recording import topics
 from wrist_stiffness.recording.messages import JointTrajectory, JointTrajectoryPoint
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.workflows.pictures.plan import draw_plan

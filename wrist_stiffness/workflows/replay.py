@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.intake import BASE_FRAME, CORRECTED_FRAME
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
@@ -39,25 +38,27 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.recording.reader import Recording, open_recording
-from wrist_stiffness.recording.topics import (
+from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.topics import (
+    BASE_FRAME,
+    CORRECTED_FRAME,
     COVARIATES,
     JOINT_STATES,
     LOAD_ESTIMATE,
     MOTOR_COMMANDS,
+    MOTOR_COMMANDS_CORRECTED,
+    MOTOR_POSITIONS_CORRECTED,
     MOTOR_TRAJECTORY,
+    MOTOR_TRAJECTORY_CORRECTED,
+    POSE_ERROR_PREDICTED,
+    POSE_ERROR_RESIDUAL,
+    POSE_ERROR_RESIDUAL_TASK,
     TEMPERATURES,
     TF_STATIC,
 )
-from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.workflows.parameter_file import node_settings
 from wrist_stiffness.workflows.signals_ahead import SignalsAhead
 
-POSE_ERROR_PREDICTED = "/pose_error_predicted"
-POSE_ERROR_RESIDUAL = "/pose_error_residual"
-POSE_ERROR_RESIDUAL_TASK = "/pose_error_residual/task_point"
-MOTOR_COMMANDS_CORRECTED = "/motor_commands_corrected"
-MOTOR_POSITIONS_CORRECTED = "/motor_positions_corrected"
-MOTOR_TRAJECTORY_CORRECTED = "/motor_trajectory_corrected"
 OUTPUTS = (
     POSE_ERROR_PREDICTED,
     POSE_ERROR_RESIDUAL,

@@ -15,7 +15,7 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.recording.reader import Recording
-from wrist_stiffness.recording.topics import COVARIATES
+from wrist_stiffness.topics import COVARIATES
 
 LOOKAHEAD_NS = 1_000_000_000
 """Signals are read this far ahead: by stamp they may belong to a sample logged before them."""

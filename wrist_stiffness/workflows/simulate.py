@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness import topics
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.progress import Progress
-from wrist_stiffness.recording import RecordingWriter, topics
+from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.simulation.blind import ToldScale, draw
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect

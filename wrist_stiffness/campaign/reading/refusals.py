@@ -9,14 +9,14 @@ import numpy as np
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.registration import agreement, put_right
 from wrist_stiffness.campaign.reading.signals import Stamps
-from wrist_stiffness.compensation.intake import BASE_FRAME
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import Samples
-from wrist_stiffness.recording.topics import (
+from wrist_stiffness.topics import (
+    BASE_FRAME,
     JOINT_STATES,
     LOAD_ESTIMATE,
     PLATFORM_MARKERS,

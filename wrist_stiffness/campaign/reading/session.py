@@ -45,7 +45,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
-from wrist_stiffness.recording.topics import (
+from wrist_stiffness.topics import (
     MOTOR_COMMANDS,
 )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.compensation.intake import BASE_FRAME, PLATFORM_FRAME, Frames
+from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.static_transforms import (
     StaticTransform,
     sensor_frames,
@@ -16,7 +16,7 @@ from wrist_stiffness.compensation.static_transforms import (
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording.messages import TFMessage, TransformStamped
 from wrist_stiffness.recording.reader import Recording
-from wrist_stiffness.recording.topics import TF_STATIC
+from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME, TF_STATIC
 
 MOST_NAMED = 6
 """Frames that one hint lists."""

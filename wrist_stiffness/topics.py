@@ -1,10 +1,19 @@
-"""Standard topic names, and the map to the names in somebody's recording."""
+"""The one place of topic and frame names, and the map to the names in somebody's recording.
+
+A name is that of a wrist in the root namespace, as it stands in a recording.  Live nodes use it
+relative to their own namespace (`relative`), so that two wrists live side by side.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from wrist_stiffness.errors import InputError
+
+BASE_FRAME = "wrist_base"
+PLATFORM_FRAME = "wrist_platform"
+CORRECTED_FRAME = "wrist_corrected"
+"""No frame: marks a command that was corrected, so that no second corrector does it again."""
 
 JOINT_STATES = "/joint_states"
 LOAD_ESTIMATE = "/load_estimate"
@@ -16,7 +25,27 @@ FRAME_POSE = "/frame_pose_measured"
 MOTOR_COMMANDS = "/motor_commands"
 MOTOR_TRAJECTORY = "/motor_trajectory"
 RECORDING_NOTES = "/recording_notes"
-TF_STATIC = "/tf_static"
+TF, TF_STATIC = "/tf", "/tf_static"
+
+POSE_ERROR_PREDICTED = "/pose_error_predicted"
+POSE_ERROR_S_UM = "/pose_error/s_um"
+POSE_ERROR_PHI_MDEG = "/pose_error/phi_mdeg"
+WRIST_MARKERS = "/wrist_markers"
+ROBOT_DESCRIPTION = "/robot_description"
+MOTOR_COMMANDS_CORRECTED = "/motor_commands_corrected"
+MOTOR_POSITIONS_CORRECTED = "/motor_positions_corrected"
+MOTOR_TRAJECTORY_CORRECTED = "/motor_trajectory_corrected"
+POSE_ERROR_RESIDUAL = "/pose_error_residual"
+POSE_ERROR_RESIDUAL_TASK = "/pose_error_residual/task_point"
+MODEL_RESIDUAL = "/model_residual"
+MODEL_ALARM = "/model_alarm"
+WRIST_STATUS = "/wrist_status"
+DIAGNOSTICS = "/diagnostics"
+PLATFORM_POSE_TRUE = "/cell_simulator/platform_pose_true"
+"""Of the virtual cell alone."""
+
+GLOBAL_TOPICS = (TF, TF_STATIC, DIAGNOSTICS)
+"""One for all robots of a graph, by the conventions of tf2 and of the diagnostics' viewers."""
 
 STANDARD_TOPICS = (
     JOINT_STATES,
@@ -31,6 +60,11 @@ STANDARD_TOPICS = (
     TF_STATIC,
 )
 """Topics that are read; besides these, any topic below ``/covariates/``."""
+
+
+def relative(topic: str) -> str:
+    """Return the name by which a node says or hears a topic within its namespace."""
+    return topic if topic in GLOBAL_TOPICS else topic.removeprefix("/")
 
 
 def parse_topic_remaps(remaps: Iterable[str]) -> dict[str, str]:
