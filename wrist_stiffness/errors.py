@@ -54,3 +54,7 @@ class RecordingError(WristError):
 
 class StaleLoadError(InputError):
     """No load estimate belongs to a joint state: none yet, or the newest is too old."""
+
+
+class StaleCommandError(InputError):
+    """A command is too old to be obeyed: it waited while the node, or its sender, was held up."""

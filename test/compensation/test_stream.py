@@ -133,7 +133,7 @@ def test_disabled_commands_pass_unchanged_to_the_bit(model):
     ("options", "fault"),
     [
         ({"load": None, "seconds": 0.6}, StaleLoadError),
-        ({"theta": np.array([2.0, 0.0])}, UnreachablePoseError),
+        ({"theta": np.array([1.35, 0.0])}, UnreachablePoseError),
         ({"load": 20.0 * DOWN}, None),
     ],
     ids=["stale load", "out of the domain", "load beyond range"],
@@ -258,7 +258,8 @@ def test_the_correction_does_not_drive_past_a_joint_limit(model, objective):
     assert np.all(np.degrees(command.theta) >= lower - 1e-9)
     assert np.all(np.degrees(command.theta) <= upper + 1e-9)
     assert np.allclose(np.abs(command.theta - THETA), 0.25 * np.abs(wanted), rtol=1e-6)
-    outside = THETA + np.array([1.0, 0.0]) * np.sign(wanted[0]) * 0.01
+    within_a_step = 0.25 * abs(wanted[0]) + 0.5 * table.geometry.limits.encoder_step
+    outside = THETA + np.array([1.0, 0.0]) * np.sign(wanted[0]) * within_a_step
     moved = corrector(narrow).settle(theta=outside).theta
     assert np.abs(moved[0]) <= np.abs(outside[0]) + ROUNDING
 
@@ -347,8 +348,8 @@ def test_a_trajectory_is_corrected_whole_or_not_at_all(model, objective):
     wanted = [point + target(model, objective, point) for point in points]
     assert np.allclose(positions(good), wanted, rtol=0, atol=ROUNDING)
     assert good.fault is None
-    bad = answer([*points, [2.0, 0.0]])
-    assert positions(bad) == [*points, [2.0, 0.0]]
+    bad = answer([*points, [1.35, 0.0]])
+    assert positions(bad) == [*points, [1.35, 0.0]]
     assert isinstance(bad.fault, UnreachablePoseError)
     twice = answer(points, "wrist_corrected")
     assert positions(twice) == points

@@ -139,7 +139,7 @@ UNSAFE = {
     "no load yet": (None, THETA, "", "StaleLoadError"),
     "stale load": (SECOND - 2 * SECOND // 3, THETA, "", "StaleLoadError"),
     "corrected already": (SECOND, THETA, "wrist_corrected", "InputError"),
-    "out of the domain": (SECOND, (2.0, 0.0), "", "UnreachablePoseError"),
+    "out of the domain": (SECOND, (1.35, 0.0), "", "UnreachablePoseError"),
 }
 
 
@@ -215,12 +215,12 @@ def test_a_whole_trajectory_is_corrected_point_by_point(graph, corrector, model)
 
 def test_a_trajectory_is_corrected_whole_or_not_at_all(graph, corrector):
     send_load(graph, corrector, SECOND)
-    graph.publish("/motor_trajectory", trajectory(SECOND, [(0.0, 0.0), (2.0, 0.0)]))
+    graph.publish("/motor_trajectory", trajectory(SECOND, [(0.0, 0.0), (1.35, 0.0)]))
     graph.publish("/motor_trajectory", trajectory(SECOND, [(0.0, float("nan"))]))
     graph.publish("/motor_trajectory", trajectory(SECOND, [(0.3, 0.0)]))
     graph.until(lambda: len(graph.heard["/motor_trajectory_corrected"]) == 2, "trajectories")
     first, second = graph.heard["/motor_trajectory_corrected"]
-    assert [point.positions.tolist() for point in first.points] == [[0.0, 0.0], [0.0, 2.0]]
+    assert [point.positions.tolist() for point in first.points] == [[0.0, 0.0], [0.0, 1.35]]
     assert len(second.points) == 1
     assert second.points[0].positions[1] != 0.3
 

@@ -134,7 +134,7 @@ def test_trajectories_are_corrected_as_by_the_node(tmp_path, capsys):
     """A zero stamp says "at once": when it was logged.  The second plan is out of the domain."""
     points = tuple(JointTrajectoryPoint((0.1 * i, 0.2), (0.3, 0.1), (), (), i) for i in range(3))
     plan = JointTrajectory(Header(0), MOTORS, points)
-    wild = JointTrajectory(Header(0), MOTORS, (JointTrajectoryPoint((9.0, 0.2)),))
+    wild = JointTrajectory(Header(0), MOTORS, (JointTrajectoryPoint((1.35, 0.2)),))
     timeline = [*TIMELINE, (31, "/motor_trajectory", plan), (31, "/motor_trajectory", wild)]
     source = write(tmp_path / "in", timeline)
     assert main(["replay", str(source), "-o", str(tmp_path / "out")]) == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -12,7 +12,9 @@ from wrist_stiffness.compensation.contact_policy import ContactGuard
 from wrist_stiffness.compensation.correction import Correction, as_applied, correct
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.perishable import require_within_limits
 from wrist_stiffness.compensation.pose import seen_from
+from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import (
     AppliedCorrection,
     guard_weight,
@@ -20,8 +22,13 @@ from wrist_stiffness.compensation.safety import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
-from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point
-from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point, neighbours
+from wrist_stiffness.errors import (
+    InputError,
+    SingularPoseError,
+    UnreachablePoseError,
+    WristError,
+)
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.topics import CORRECTED_FRAME
@@ -90,11 +97,14 @@ class CorrectionStream(Stream):
     ----------
     contact : ContactGuard
         Whether the load says that there is contact.
+    active : bool
+        False where a correction, though enabled, is to fade out: of a node that is not active.
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings, enabled: bool) -> None:
         super().__init__(model, settings)
         self.contact = ContactGuard()
+        self.active = True
         self._applied = AppliedCorrection()
         self._held = np.zeros(2)
         self._enabled = enabled
@@ -113,6 +123,22 @@ class CorrectionStream(Stream):
     def enabled(self, enabled: bool) -> None:
         self._enabled = enabled
         self.contact.forget()
+
+    @property
+    def correcting(self) -> bool:
+        """Whether commands are corrected now."""
+        return self._enabled and self.active
+
+    @property
+    def applied(self) -> Array:
+        """What is added to the commands now (2,) [rad]."""
+        return self._applied.value
+
+    def resume(self, paused_s: float) -> None:
+        """Correct again after a pause [s], in which the correction faded as time passed."""
+        self._applied.fade(paused_s, self.settings.safety)
+        self._held = np.zeros(2)
+        self.active = True
 
     def tare(self) -> Load:
         """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
@@ -148,7 +174,8 @@ class CorrectionStream(Stream):
         Raises
         ------
         InputError
-            If a motor is missing or an angle is not finite: such a command is not to be forwarded.
+            If a motor is missing, an angle is not finite or beyond the joint limits: such a command
+            is not to be forwarded.
         """
         theta = self._motor_angles(names, positions)
         theta_dot = self.settings.motors.speeds(names, velocities)
@@ -157,17 +184,20 @@ class CorrectionStream(Stream):
             self._applied.reset()
             self._held = np.zeros(2)
             self._remember(stamp_ns, theta, None, theta_dot)
-            twice = InputError(TWICE) if self.enabled else None
+            twice = InputError(TWICE) if self.correcting else None
             return CorrectedCommand(frame_id, sent, theta, None, twice)
         correction: Correction | None = None
         fault: WristError | None = None
         load: Load | None = None
         held = np.zeros(2)
-        if self.enabled:
+        if self.correcting:
             try:
                 load = self._load(stamp_ns)
-                found = self._found(stamp_ns, load, theta, theta_dot, self._held, self._play)
-                held, correction = found.delta, self._faded(found)
+                running = self.running_model()
+                found = self._found(
+                    running, self.settings, stamp_ns, load, theta, theta_dot, self._held, self._play
+                )
+                held, correction = found.delta, self._faded(running, self.settings, found)
             except WristError as error:
                 fault = error
         self._held = held
@@ -175,10 +205,10 @@ class CorrectionStream(Stream):
         if correction is not None:
             correction = as_applied(correction, delta)
         forgotten = self._remember(stamp_ns, theta + delta, load, theta_dot)
-        if self.enabled:
+        if self.correcting:
             fault = fault or forgotten
         sent[list(self.settings.motors.places(names))] = theta + delta
-        marked = self.enabled or bool(np.any(delta))
+        marked = self.correcting or bool(np.any(delta))
         return CorrectedCommand(
             CORRECTED_FRAME if marked else frame_id, sent, theta + delta, correction, fault
         )
@@ -213,23 +243,69 @@ class CorrectionStream(Stream):
         Raises
         ------
         InputError
-            If a motor is missing or named twice: it is not to be forwarded.
+            If a motor is missing, named twice or driven beyond its joint limits: it is not to be
+            forwarded.
         """
-        places = self.settings.motors.places(names, "trajectory")
-        unchanged = tuple(points)
-        if not self.enabled:
-            return CorrectedTrajectory(frame_id, unchanged, None)
-        try:
-            if frame_id == CORRECTED_FRAME:
-                raise InputError(TWICE)
-            load = self._load(stamp_ns)
-            corrected = tuple(
-                corrected_point(self._corrected_at(stamp_ns, load, point, places), places, point)
-                for point in points
-            )
-        except WristError as error:
-            return CorrectedTrajectory(CORRECTED_FRAME, unchanged, error)
-        return CorrectedTrajectory(CORRECTED_FRAME, corrected, None)
+        work = self.trajectory_work(stamp_ns, frame_id, names, points)
+        while True:
+            try:
+                next(work)
+            except StopIteration as finished:
+                result: CorrectedTrajectory = finished.value
+                return result
+
+    def trajectory_work(
+        self,
+        stamp_ns: int,
+        frame_id: str,
+        names: Sequence[str],
+        points: Sequence[PlannedPoint],
+    ) -> Generator[None, None, CorrectedTrajectory]:
+        """Do what `on_trajectory` does in small steps, between which commands may be corrected.
+
+        Model, memory, settings and load are those of the first step.
+        """
+        motors, settings, model = self.settings.motors, self.settings, self.model
+        places = motors.places(names, "trajectory")
+        running: RunningModel | None = None
+        fault: WristError | None = None
+        correcting = self.correcting
+        if correcting:
+            try:
+                if frame_id == CORRECTED_FRAME:
+                    raise InputError(TWICE)
+                load, running = self._load(stamp_ns), self.running_model().snapshot()
+            except WristError as error:
+                fault = error
+        done = []
+        for point in points:
+            if model is not None:
+                limits = model.table.geometry.limits
+                require_within_limits("trajectory", point.positions[list(places)], limits, motors)
+            yield
+            if running is None or fault is not None:
+                continue
+            speed = point.velocities[list(places)] if len(point.velocities) else None
+            corrected: list[Array] = []
+            try:
+                for theta in neighbours(point, places):
+                    try:
+                        found = self._planned(running, settings, stamp_ns, load, theta, speed)
+                    except (UnreachablePoseError, SingularPoseError):
+                        if not corrected:
+                            raise
+                        # Beside the point, at the border, the correction has faded to none.
+                        found = theta
+                    corrected.append(found)
+                    yield
+            except WristError as error:
+                fault = error
+            else:
+                done.append(corrected_point(point, places, corrected))
+        if running is None or fault is not None:
+            mark = CORRECTED_FRAME if correcting else frame_id
+            return CorrectedTrajectory(mark, tuple(points), fault)
+        return CorrectedTrajectory(CORRECTED_FRAME, tuple(done), None)
 
     def residual_at_task_point(self, correction: Correction) -> tuple[Array, Array] | None:
         """Return the residual as seen from the geometry's tool point.
@@ -255,6 +331,9 @@ class CorrectionStream(Stream):
         theta = self.settings.motors.angles(names, positions, COMMAND)
         if not all(map(isfinite, positions)):
             raise InputError(f"{COMMAND}: position {list(positions)} is not finite")
+        if self.model is not None:
+            limits = self.model.table.geometry.limits
+            require_within_limits(COMMAND, theta, limits, self.settings.motors)
         return theta
 
     def _remember(
@@ -288,8 +367,10 @@ class CorrectionStream(Stream):
         limits = self.running_model().model.table.geometry.limits
         return self.settings.safety.deadband_steps * limits.encoder_step
 
+    @staticmethod
     def _found(
-        self,
+        running: RunningModel,
+        settings: StreamSettings,
         stamp_ns: int,
         load: Load,
         theta: Array,
@@ -298,26 +379,26 @@ class CorrectionStream(Stream):
         play: float = 0.0,
     ) -> Correction:
         """Return the correction that meets the objective; refused beyond the limit."""
-        running = self.running_model()
         table = running.model.table
         platform = table.geometry.platform
-        objective = Objective(self.settings.objective, platform.normal, platform.tool_point)
+        objective = Objective(settings.objective, platform.normal, platform.tool_point)
         predict = running.preview(stamp_ns, load, theta_dot)
         correction = correct(predict, table.workspace, theta, objective, held, play)
         largest = max(map(abs, correction.delta.tolist()))
-        if largest > self.settings.correction_limit:
+        if largest > settings.correction_limit:
             raise InputError(
                 f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
-                f"{np.degrees(self.settings.correction_limit):g} deg"
+                f"{np.degrees(settings.correction_limit):g} deg"
             )
         return correction
 
-    def _faded(self, correction: Correction) -> Correction:
+    @staticmethod
+    def _faded(
+        running: RunningModel, settings: StreamSettings, correction: Correction
+    ) -> Correction:
         """Return the correction as the guards let it through."""
-        table = self.running_model().model.table
-        weight = guard_weight(
-            table.workspace, correction.prediction.configuration, self.settings.safety
-        )
+        table = running.model.table
+        weight = guard_weight(table.workspace, correction.prediction.configuration, settings.safety)
         return as_applied(correction, weight * correction.delta)
 
     def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
@@ -327,15 +408,16 @@ class CorrectionStream(Stream):
         limits = self.model.table.geometry.limits
         return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
 
-    def _corrected_at(
-        self, stamp_ns: int, load: Load, point: PlannedPoint, places: Sequence[int]
-    ) -> Callable[[Array], Array]:
-        """Return the corrected angles as a function of the planned ones, near a point."""
-        limits = self.running_model().model.table.geometry.limits
-        theta_dot = point.velocities[list(places)] if len(point.velocities) else None
-
-        def corrected(theta: Array) -> Array:
-            delta = self._faded(self._found(stamp_ns, load, theta, theta_dot)).delta
-            return within_joint_limits(theta, delta, limits)
-
-        return corrected
+    def _planned(
+        self,
+        running: RunningModel,
+        settings: StreamSettings,
+        stamp_ns: int,
+        load: Load,
+        theta: Array,
+        theta_dot: Array | None,
+    ) -> Array:
+        """Return the corrected angles for planned ones."""
+        found = self._found(running, settings, stamp_ns, load, theta, theta_dot)
+        delta = self._faded(running, settings, found).delta
+        return within_joint_limits(theta, delta, running.model.table.geometry.limits)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
@@ -70,9 +72,16 @@ class RunningModel:
         session = self._session_at(stamp_ns)
         if session is None:
             return self._predict(theta, load)
-        prediction = session.advance(self._sample(stamp_ns, theta, load, theta_dot))
+        sample = self._sample(stamp_ns, theta, load, theta_dot)
+        prediction = _told(lambda: session.advance(sample))
         self._last_ns = stamp_ns
         return prediction
+
+    def snapshot(self) -> RunningModel:
+        """Return the same with the memory as it is now; what comes later changes only this one."""
+        taken = copy(self)
+        taken._session = copy(self._session)
+        return taken
 
     @property
     def remembers(self) -> bool:
@@ -86,12 +95,14 @@ class RunningModel:
         session = self._session_at(stamp_ns)
         if session is None:
             return lambda theta: self._predict(theta, load)
-        return lambda theta: session.preview(self._sample(stamp_ns, theta, load, theta_dot))
+        return lambda theta: _told(
+            lambda: session.preview(self._sample(stamp_ns, theta, load, theta_dot))
+        )
 
     def _predict(self, theta: Array, load: Load) -> Prediction:
         # The flanges that touched last are a good guess.  It saves time and leaves no trace: the
         # forces are solved for once more from the flanges that are found, whatever the guess was.
-        prediction = self.model.predict(theta, load, self._active)
+        prediction = _told(lambda: self.model.predict(theta, load, self._active))
         self._active = prediction.active
         return prediction
 
@@ -109,3 +120,13 @@ class RunningModel:
             temperatures=self._temperatures.at(stamp_ns),
             covariates=self._covariates.at(stamp_ns),
         )
+
+
+def _told(predict: Callable[[], Prediction]) -> Prediction:
+    """Predict; a user's own law may fail in any way, and that is a fault like others."""
+    try:
+        return predict()
+    except WristError:
+        raise
+    except Exception as error:
+        raise InputError(f"the model fails: {type(error).__name__}: {error}") from error

@@ -70,7 +70,7 @@ def guard_weight(
 def within_joint_limits(theta: Array, delta: Array, limits: Limits) -> Array:
     """Return the corrected angles (2,), never driven past a joint limit by the correction.
 
-    A command that is beyond a limit already is not made worse; refusing it is not our affair.
+    A command that is a little beyond a limit already is not made worse.
     """
     lowest = np.minimum(limits.joint_lower, theta)
     highest = np.maximum(limits.joint_upper, theta)
@@ -92,9 +92,19 @@ class AppliedCorrection:
         self._applied = np.zeros(2)
         self._stamp_ns: int | None = None
 
+    @property
+    def value(self) -> Array:
+        """What was added to the last command (2,) [rad]."""
+        return self._applied
+
     def reset(self) -> None:
         """Begin at zero again."""
         self._applied = np.zeros(2)
+
+    def fade(self, seconds: float, settings: SafetySettings) -> None:
+        """Move towards zero for a time [s] in which no command came."""
+        reach = settings.slew * seconds
+        self._applied = self._applied - between(self._applied, -reach, reach)
 
     def advance(
         self, stamp_ns: int, theta: Array, wanted: Array, limits: Limits, settings: SafetySettings

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.errors import InputError, SingularPoseError, UnreachablePoseError
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
 STEP = 5e-3
@@ -71,66 +71,72 @@ def planned_point(
     return PlannedPoint(*(np.array(values, dtype=float) for values in named.values()))
 
 
+def neighbours(point: PlannedPoint, places: Sequence[int]) -> list[Array]:
+    """Return the motor angles whose corrections say how a point of the corrected path moves.
+
+    Parameters
+    ----------
+    point : PlannedPoint
+        Of the plan.
+    places : (2,) sequence of int
+        Where the motors stand among the joints.
+
+    Returns
+    -------
+    list of (2,) float
+        The point itself, then one step ahead and one back along its speed and along its
+        acceleration, where the plan has them and they are not zero [rad].
+    """
+    at = list(places)
+    theta = point.positions[at]
+    found = [theta]
+    for derivative in (point.velocities, point.accelerations):
+        if len(derivative) and derivative[at].any():
+            step = STEP / float(np.linalg.norm(derivative[at])) * derivative[at]
+            found += [theta + step, theta - step]
+    return found
+
+
 def corrected_point(
-    corrected: Callable[[Array], Array], places: Sequence[int], point: PlannedPoint
+    point: PlannedPoint, places: Sequence[int], corrected: Sequence[Array]
 ) -> PlannedPoint:
     """Return a point of the corrected path with the derivatives that belong to it.
 
     Where a plan runs through theta(t), the motors run through c(theta(t)), at the speed
-    c' theta_dot and the acceleration c' theta_ddot + c'' (theta_dot, theta_dot).
+    c' theta_dot and the acceleration c' theta_ddot + c'' (theta_dot, theta_dot), by central
+    differences.
 
     Parameters
     ----------
-    corrected : callable
-        Corrected motor angles at angles (2,) [rad].
-    places : (2,) sequence of int
-        Where the motors stand among the joints.
     point : PlannedPoint
         Of the plan.
+    places : (2,) sequence of int
+        Where the motors stand among the joints.
+    corrected : sequence of (2,) float
+        Corrected motor angles at the point's `neighbours` [rad].
 
     Returns
     -------
     PlannedPoint
         Other joints unchanged; speeds and accelerations where the plan has them.
-
-    Raises
-    ------
-    WristError
-        If the point itself cannot be corrected.
     """
     at = list(places)
-    theta = point.positions[at]
-    there = corrected(theta)
+    there, beside = corrected[0], iter(corrected[1:])
     positions = point.positions.copy()
     positions[at] = there
     velocities, accelerations = point.velocities.copy(), point.accelerations.copy()
-    curvature = np.zeros(2)
-    if len(velocities):
-        velocities[at], curvature = _derivatives(corrected, theta, there, point.velocities[at])
+    if len(velocities) and velocities[at].any():
+        size = float(np.linalg.norm(velocities[at]))
+        after, before = next(beside), next(beside)
+        velocities[at] = (after - before) * (0.5 * size / STEP)
+        curvature = (after - 2.0 * there + before) * (size / STEP) ** 2
+    else:
+        curvature = np.zeros(2)
     if len(accelerations):
-        along, _ = _derivatives(corrected, theta, there, point.accelerations[at])
+        along = np.zeros(2)
+        if accelerations[at].any():
+            size = float(np.linalg.norm(accelerations[at]))
+            after, before = next(beside), next(beside)
+            along = (after - before) * (0.5 * size / STEP)
         accelerations[at] = along + curvature
     return replace(point, positions=positions, velocities=velocities, accelerations=accelerations)
-
-
-def _derivatives(
-    corrected: Callable[[Array], Array], theta: Array, there: Array, direction: Array
-) -> tuple[Array, Array]:
-    """First and second derivative along a direction, by central differences."""
-    size = float(np.linalg.norm(direction))
-    if size == 0.0:
-        return np.zeros(2), np.zeros(2)
-
-    def beside(angles: Array) -> Array:
-        try:
-            return corrected(angles)
-        except (UnreachablePoseError, SingularPoseError):
-            # At the border of the domain the correction has faded to none.
-            return angles
-
-    step = STEP / size * direction
-    after, before = beside(theta + step), beside(theta - step)
-    return (
-        (after - before) * (0.5 * size / STEP),
-        (after - 2.0 * there + before) * (size / STEP) ** 2,
-    )

@@ -1,0 +1,69 @@
+"""What a command must be to be forwarded: fresh, and within the joint limits."""
+
+from __future__ import annotations
+
+from math import degrees
+
+from wrist_stiffness.compensation.intake import MotorNames
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.errors import InputError, StaleCommandError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Limits
+
+
+def require_fresh(what: str, stamp_ns: int, now_ns: int, limit_s: float) -> None:
+    """Refuse a command that is older than a limit, as ros2_control's reference timeout does.
+
+    Parameters
+    ----------
+    what : str
+        For the message.
+    stamp_ns, now_ns : int
+        When it was made, and now, by the same clock [ns].
+    limit_s : float
+        Oldest command that is obeyed [s]; 0 for any.  As far ahead of the clock, a stamp says that
+        two clocks differ.
+
+    Raises
+    ------
+    StaleCommandError
+        With the age and the limit.
+    """
+    age_s = (now_ns - stamp_ns) / NANOSECONDS
+    if limit_s and abs(age_s) > limit_s:
+        where = (
+            f"{age_s:.3f} s old" if age_s > 0.0 else f"stamped {-age_s:.3f} s ahead of the clock"
+        )
+        raise StaleCommandError(f"{what}: {where}, the limit is {limit_s:g} s; not forwarded")
+
+
+def require_within_limits(what: str, theta: Array, limits: Limits, motors: MotorNames) -> None:
+    """Refuse angles beyond the joint limits by more than one encoder step.
+
+    Less than a step is the limit itself, as far as the drive can tell.
+
+    Parameters
+    ----------
+    what : str
+        For the message.
+    theta : (2,) float
+        Motor angles [rad].
+    limits : Limits
+        Of the joints.
+    motors : MotorNames
+        For the message.
+
+    Raises
+    ------
+    InputError
+        With the motor, its angle and its limits.
+    """
+    names, lower, upper = (motors.motor_1, motors.motor_2), limits.joint_lower, limits.joint_upper
+    for name, angle, low, high in zip(
+        names, theta.tolist(), lower.tolist(), upper.tolist(), strict=True
+    ):
+        if not low - limits.encoder_step <= angle <= high + limits.encoder_step:
+            raise InputError(
+                f"{what}: {name} at {degrees(angle):.6g} deg is beyond its limits of "
+                f"{degrees(low):g} to {degrees(high):g} deg; not forwarded"
+            )
