@@ -25,12 +25,13 @@ ROOMS_USED = {
     "errors": set(),
     "progress": set(),
     "atomic_file": set(),
+    "inputs": set(),
     "shipped": set(),
     "topics": set(),
     "__main__": {"cli"},
     "__init__": set(),
 }
-COMMON = {"errors", "atomic_file", "progress", "topics"}
+COMMON = {"errors", "atomic_file", "inputs", "progress", "topics"}
 ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both

@@ -102,16 +102,24 @@ def test_frames_are_read_in_millimetres_and_degrees():
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("[1]", "no mapping by frame_id"),
-        ("{ft: {}}", "ft: parent None"),
-        ("{ft: 3}", "ft: 3 is no mapping"),
-        ("{ft: {parent: tool0}}", "ft: parent 'tool0'"),
+        ("[1]", "is not a mapping"),
+        ("{ft: {}}", "ft: parent is missing"),
+        ("{ft: 3}", "ft: 3 is not a mapping"),
+        ("{ft: {parent: tool0}}", "ft.parent: 'tool0'"),
         ("{ft: {parent: wrist_base, yaw: 3}}", "ft: unknown key yaw"),
-        ("{ft: {parent: wrist_base, acts_on: robot}}", "ft: acts_on 'robot'"),
-        ("{ft: {parent: wrist_base, position_mm: [1, 2]}}", "ft: position_mm"),
-        ("{ft: {parent: wrist_base, rpy_deg: [1, 2, .nan]}}", "ft: rpy_deg"),
-        ("{wrist_base: {parent: wrist_base}}", "wrist_base is fixed"),
-        ("{", "not YAML"),
+        ("{ft: {parent: wrist_base, acts_on: robot}}", "ft.acts_on: 'robot'"),
+        ("{ft: {parent: wrist_base, position_mm: [1, 2]}}", "ft.position_mm: "),
+        ("{ft: {parent: wrist_base, rpy_deg: [1, 2, .nan]}}", "ft.rpy_deg: "),
+        ("{wrist_base: {parent: wrist_base}}", "wrist_base: is fixed"),
+        ("{", "not a YAML file"),
+        ("{ft: {parent: 2001-13-99}}", "'2001-13-99' is not one of"),
+        ("[" * 5000, "nested deeper than 32"),
+        (
+            f"{{ft: {{parent: wrist_base, position_mm: [1, 2, {'9' * 500}]}}}}",
+            "not a list of 3 finite",
+        ),
+        ("a: &a [*a]", "anchor &a is not read"),
+        ("a: !!timestamp x", "tag tag:yaml.org,2002:timestamp is not read"),
     ],
 )
 def test_wrong_frames_are_refused_with_the_reason(text, reason):

@@ -53,17 +53,17 @@ CASES = {
     "parallel neighbours": (
         "axes.joint_2",
         [1.0, 0.0, 0.0],
-        ".axes: home axes of joint_1 and joint_2 are parallel",
+        "axes: home axes of joint_1 and joint_2 are parallel",
     ),
     "coplanar home axes": (
         "axes.joint_3",
         [0.0, 0.6, 0.8],
-        ".axes: home pose is singular: |D| = 0.00e+00 below 1e-06",
+        "axes: home pose is singular: |D| = 0.00e+00 below 1e-06",
     ),
     "normal along b": (
         "platform.normal",
         [0.0, 1.0, 0.0],
-        ".axes: home axes of joint_2 and the platform normal",
+        "axes: home axes of joint_2 and the platform normal",
     ),
     "coplanar readouts": (
         "platform.readout_points_mm",
@@ -78,7 +78,7 @@ CASES = {
     "three readouts": (
         "platform.readout_points_mm",
         [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
-        ": 3 rows, needs a list of at least 4",
+        ": 3 entries, needs a list of at least 4",
     ),
     "readout of two": (
         "platform.readout_points_mm",
@@ -94,7 +94,7 @@ CASES = {
         "links.link_2.overhang_mm",
         2.0,
         (
-            ".links.link_2.motor_bore_mm: 5.4 does not fit into the bar (section_axial_mm "
+            "links.link_2.motor_bore_mm: 5.4 does not fit into the bar (section_axial_mm "
             "and twice overhang_mm leave 4)"
         ),
     ),
@@ -121,7 +121,7 @@ CASES = {
     "gap at a motor": (
         "bushings.joint_1.outer_gap_um",
         0.0,
-        ".bushings.joint_1: unknown key outer_gap_um",
+        "bushings.joint_1: unknown key outer_gap_um",
     ),
     "incompressible": (
         "materials.steel.poisson",
@@ -205,5 +205,5 @@ CASES = {
 def test_value_that_cannot_be_is_named_with_its_limit(place, value, message):
     found = refused(changed(tuple(place.split(".")), value))
     # What is wrong with two values together may stand at the other one, or at their block.
-    assert found.startswith(f"wrist.yaml.{place.rpartition('.')[0]}") or "home axes" in found
+    assert found.startswith(f"wrist.yaml: {place.rpartition('.')[0]}") or "home axes" in found
     assert message in found

@@ -132,7 +132,8 @@ def test_a_step_has_added_an_effect_of_the_file_or_one_that_was_taken_out_since(
 def test_a_step_that_has_added_no_effect_is_one_line(tmp_path, name, why):
     """The next fit would take what was found for a tolerance, and leave it out."""
     path = write(tmp_path, GOOD + STEP.replace("NAME", name))
-    there = rf"m.yaml.lineage\[0\].added: {name} is neither .* nor one of the catalogue: {why}"
+    place = rf"m.yaml, line 20: lineage\[0\].added: {name}"
+    there = f"{place} is neither .* nor one of the catalogue: {why}"
     with pytest.raises(InputError, match=there):
         load_model(path)
 
@@ -201,7 +202,7 @@ def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
         ("[0, 0, 0, 1, 0, 0]", "[0, 0, 1]", "is not a list of 6 finite numbers"),
         ("[0, 0, 0, 1, 0, 0]", "[0, 0, 0, 0, 0, 0]", "is not six finite numbers, one not zero"),
         ("tanh(fz", "tang(fz", "column 12: unknown function tang"),
-        ("[humidity]", "humidity", "is not a list of names"),
+        ("[humidity]", "humidity", "covariates: .humidity. is not a list"),
         ("[humidity]", "[humidity, fz]", "the name fz is in use"),
         ("[humidity]", "['a b', humidity]", "'a b' is not a name"),
         ("[humidity]", "[]", "column 37: unknown name humidity"),
@@ -301,7 +302,7 @@ def test_a_model_without_a_file_of_its_table_cannot_be_saved(model, tmp_path):
 
 def test_model_without_its_table(tmp_path):
     (tmp_path / "m.yaml").write_text("schema: 1\nname: x\ntable: {path: no.npz}\neffects: []\n")
-    with pytest.raises(TableError, match="no such file"):
+    with pytest.raises(TableError, match="No such file"):
         load_model(tmp_path / "m.yaml")
 
 

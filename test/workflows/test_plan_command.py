@@ -138,10 +138,13 @@ def test_what_no_load_can_settle_is_a_no_and_writes_nothing(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"schema": 2}, "found.json.schema: 2 is not 1"),
-        ({"findings": {}}, "found.json.findings: {} is not a list"),
+        ({"schema": 2}, "found.json: schema: 2 is not 1"),
+        ({"findings": {}}, "found.json: findings: {} is not a list"),
         ({"noise_floor": {"s_um": 0.0, "phi_mdeg": 1.0}}, "noise_floor.s_um: 0.0 is not above 0"),
-        ({"findings": [{"class": [], "parameters": {}}]}, "findings[0].class: is empty"),
+        (
+            {"findings": [{"class": [], "parameters": {}}]},
+            "findings[0].class: 0 entries, needs a list of at least 1",
+        ),
         (
             {"findings": [{"class": [{"effect": "magic", "component": "joint_1"}]}]},
             "findings[0].class[0]: unknown effect 'magic'",

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ import numpy as np
 
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import TableError, WristError
+from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.lookup.operators import column_count
 from wrist_stiffness.lookup.table import EVALUATIONS, MAP_COLUMNS, Table, TableHeader
 from wrist_stiffness.mechanism.components import (
@@ -32,8 +35,8 @@ from wrist_stiffness.mechanism.components import (
 SCHEMA = 1
 MAGIC = "wrist_stiffness table"
 
-ZIP = b"PK"
-"""How the archive that is an `.npz` file begins."""
+LARGEST_BYTES = 256 << 20
+"""Unpacked; the shipped table of 961 poses has 4 million."""
 
 UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; moment) at O in F"
 
@@ -103,30 +106,7 @@ def load_table(path: str | Path) -> Table:
     TableError
         If the file is missing, no table, of another version, damaged or contradictory.
     """
-    try:
-        # Opened here, because numpy leaves a damaged file open.
-        with open(path, "rb") as stream:
-            # NumPy would take any other file for a pickle, and advise to trust it.
-            if stream.read(len(ZIP)) != ZIP:
-                raise TableError(f"{path}: damaged or not a table: not an .npz file")
-            stream.seek(0)
-            with np.load(stream, allow_pickle=False) as archive:
-                arrays = {key: archive[key] for key in archive.files}
-    except FileNotFoundError as error:
-        raise TableError(f"{path}: no such file") from error
-    except OSError as error:
-        raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (
-        ValueError,
-        zipfile.BadZipFile,
-        EOFError,
-        KeyError,
-        AttributeError,
-        zlib.error,
-    ) as error:
-        raise TableError(
-            f"{path}: damaged or not a table: {' '.join(str(error).split())}"
-        ) from error
+    arrays = _read_arrays(path)
     try:
         header = json.loads(str(arrays.pop("header")))
     except (KeyError, ValueError) as error:
@@ -155,6 +135,52 @@ def load_table(path: str | Path) -> Table:
         raise TableError(f"{path}: {error}") from error
     _check(table, path)
     return table
+
+
+def _read_arrays(path: str | Path) -> dict[str, Array]:
+    """Return what an `.npz` file holds, sizes checked before any of it is unpacked."""
+    # Opened here, because numpy leaves a damaged file open.
+    with open_input(path, TableError) as stream:
+        try:
+            with zipfile.ZipFile(stream) as archive:
+                parts = archive.infolist()
+                if (total := sum(part.file_size for part in parts)) > LARGEST_BYTES:
+                    raise TableError(
+                        f"{path}: states {total} bytes unpacked, more than {LARGEST_BYTES}"
+                    )
+                return {part.filename.removesuffix(".npy"): _array(archive, part) for part in parts}
+        except OSError as error:
+            raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
+        except (
+            ValueError,
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            KeyError,
+            struct.error,
+            NotImplementedError,
+            RuntimeError,
+        ) as error:
+            raise TableError(
+                f"{path}: damaged or not a table: {' '.join(str(error).split())}"
+            ) from error
+
+
+def _array(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> Array:
+    with archive.open(part) as stream:
+        version = np.lib.format.read_magic(stream)
+        if version != (1, 0):
+            raise ValueError(f"{part.filename}: npy version {version} is not 1.0")
+        shape, fortran, kind = np.lib.format.read_array_header_1_0(stream)
+        if kind.hasobject:
+            raise ValueError(f"{part.filename}: objects are not read")
+        # Python's whole numbers, that do not overflow.
+        if prod(shape) * kind.itemsize != part.file_size - stream.tell():
+            raise ValueError(
+                f"{part.filename}: shape {shape} is not that of its {part.file_size} bytes"
+            )
+        array = np.frombuffer(stream.read(), kind)
+        return array.reshape(shape, order="F" if fortran else "C")
 
 
 def _check(table: Table, path: str | Path) -> None:

@@ -1,20 +1,35 @@
 """Read and check a geometry file (YAML).
 
 Units are in the keys; every block says where its values come from (`source`).  A message names the
-file, the key, the value and the limit.
+file, the line, the key, the value and the limit.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from wrist_stiffness.errors import GeometryError
+from wrist_stiffness.inputs.document import Node, node_of, read_yaml
+from wrist_stiffness.inputs.schema import (
+    Quantity,
+    Schema,
+    direction,
+    list_of,
+    mapping_of,
+    nullable,
+    number,
+    record,
+    text,
+    vector,
+    version,
+)
 from wrist_stiffness.mechanism.components import JOINTS, LINKS, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.geometry import (
     BushingDimensions,
@@ -25,12 +40,43 @@ from wrist_stiffness.mechanism.geometry import (
     PlatformDimensions,
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
+from wrist_stiffness.mechanism.vectors import unit
 
 SCHEMA = 1
 SOURCES = ("paper", "assumed", "calibrated", "measured")
 READOUT_SPREAD = 0.1
 """Least ratio of the readout points' spreads: Eqs. (1)-(10) amplify errors on flat sets."""
+
+LENGTH = Quantity(number(above=0.0))
+
+MATERIAL = record(
+    {
+        "young_GPa": Quantity(number(above=0.0)),
+        "poisson": number(above=-1.0, below=0.5),
+        "density_kg_m3": Quantity(number(above=0.0)),
+        "expansion_1e-6_K": Quantity(number()),
+    },
+    sources=SOURCES,
+    make=Material,
+)
+SITE = record(
+    {
+        "gravity_m_s2": Quantity(vector()),
+        "reference_temperature_degC": Quantity(number(above=-273.15)),
+    },
+    sources=SOURCES,
+)
+LIMITS = record(
+    {
+        **dict.fromkeys(("joint_lower_deg", "joint_upper_deg"), Quantity(vector(2))),
+        "operative_tilt_deg": Quantity(number(above=0.0, below=180.0)),
+        "map_margin": number(at_least=1.0, below=10.0),
+        "singularity": number(above=0.0, below=1.0),
+        **dict.fromkeys(("force_N", "moment_Nm", "encoder_step_deg"), Quantity(number(above=0.0))),
+    },
+    sources=SOURCES,
+    make=Limits,
+)
 
 T = TypeVar("T")
 
@@ -54,11 +100,11 @@ def load_geometry(path: str | Path) -> Geometry:
         If the file cannot be read, a key is missing, unknown or outside its limits, or the home
         pose is singular.
     """
-    return geometry_from_values(read_yaml(path, GeometryError), str(path))
+    return geometry_of(read_yaml(path, GeometryError))
 
 
 def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> Geometry:
-    """Build a geometry from the file's values.
+    """Build a geometry from the file's values, for example those in a table.
 
     Parameters
     ----------
@@ -75,50 +121,49 @@ def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> 
     Raises
     ------
     GeometryError
-        If a key is missing, unknown or outside its limits, or the home pose is singular.
+        As `load_geometry`.
     """
-    root = Block(values, place, GeometryError, SOURCES)
-    schema = root.number("schema")
-    if schema != SCHEMA:
-        raise GeometryError(
-            f"{place}.schema: {schema:g} is not {SCHEMA}, the version that this program reads"
-        )
-    materials = _each(root.block("materials"), _material)
-    axes_block = root.block("axes")
-    axes = {joint: axes_block.direction(joint) for joint in JOINTS}
-    axes_block.done()
-    bushings_block, links_block = root.block("bushings"), root.block("links")
-    bushings = {joint: _bushing(bushings_block.block(joint), joint, materials) for joint in JOINTS}
-    bushings_block.done()
-    links = {link: _link(links_block.block(link), materials) for link in LINKS}
-    links_block.done()
-    platform, load_point = _platform(root.block("platform"), materials)
-    limits = _limits(root.block("limits"))
-    site = root.block("site")
-    gravity = site.vector("gravity_m_s2")
-    temperature = site.number("reference_temperature_degC", above=-273.15)
-    site.done()
-    name, status = root.text("name"), root.text("status", SOURCES)
-    if "note" in root.values:
-        root.text("note")
-    root.no_more_keys()
+    return geometry_of(node_of(values, place, GeometryError))
+
+
+def geometry_of(root: Node) -> Geometry:
+    """Build a geometry from an opened file; as `load_geometry`."""
+    materials: dict[str, Material] = {}
+
+    def material(node: Node) -> Material:
+        return materials[text(*materials)(node)]
+
+    def read_materials(node: Node) -> None:
+        materials.update(mapping_of(MATERIAL, SOURCES)(node))
+
+    link, bushing = _link(material), _bushing(material)
+    values = record(
+        {
+            "schema": version(SCHEMA),
+            "materials": read_materials,
+            "name": text(),
+            "status": text(*SOURCES),
+            "axes": _each(JOINTS, _axis),
+            "links": _each(LINKS, link),
+            "bushings": _each(JOINTS, bushing),
+            "platform": _platform(material),
+            "limits": _limits,
+            "site": SITE,
+        },
+        {"note": text()},
+    )(root)
+    platform, load_point = values["platform"]
     geometry = Geometry(
-        name=name,
-        status=status,
-        axes=axes,
-        links=links,
-        bushings=bushings,
+        **{key: values[key] for key in ("name", "status", "axes", "links", "bushings", "limits")},
+        **values["site"],
         platform=platform,
-        limits=limits,
-        gravity=gravity,
-        reference_temperature=temperature,
         load_point=load_point,
-        sha256=_checksum(values),
+        sha256=_checksum(root.plain),
     )
     try:
         mechanism_of(geometry)
     except GeometryError as error:
-        raise GeometryError(f"{place}.axes: {error}") from error
+        raise root["axes"].refuse(str(error)) from error
     return geometry
 
 
@@ -151,138 +196,115 @@ def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, int) else value
 
 
-def _each(block: Block, build: Callable[[Block], T]) -> dict[str, T]:
-    built = {key: build(block.block(key)) for key in block.values}
-    block.done()
-    return built
+def _each(names: tuple[str, ...], schema: Schema[T]) -> Schema[dict[str, T]]:
+    return record(dict.fromkeys(names, schema), sources=SOURCES)
 
 
-def _material(block: Block) -> Material:
-    material = Material(
-        young=block.number("young_GPa", 1e9, above=0.0),
-        poisson=block.number("poisson", above=-1.0, below=0.5),
-        density=block.number("density_kg_m3", above=0.0),
-        expansion=block.number("expansion_1e-6_K", 1e-6),
+def _axis(node: Node) -> Array:
+    return unit(direction(node))
+
+
+def _link(material: Schema[Material]) -> Schema[LinkDimensions]:
+    lengths = ("arc_radius_mm", "section_radial_mm", "section_axial_mm", "overhang_mm")
+    bores = ("motor_bore_mm", "platform_bore_mm")
+    schema = record(
+        {**dict.fromkeys((*lengths, *bores), LENGTH), "material": material},
+        sources=SOURCES,
+        make=LinkDimensions,
     )
-    block.done()
-    return material
 
-
-def _of_material(block: Block, materials: dict[str, Material]) -> Material:
-    return materials[block.text("material", tuple(materials))]
-
-
-def _link(block: Block, materials: dict[str, Material]) -> LinkDimensions:
-    link = LinkDimensions(
-        arc_radius=block.number("arc_radius_mm", 1e-3, above=0.0),
-        section_radial=block.number("section_radial_mm", 1e-3, above=0.0),
-        section_axial=block.number("section_axial_mm", 1e-3, above=0.0),
-        overhang=block.number("overhang_mm", 1e-3, above=0.0),
-        motor_bore=block.number("motor_bore_mm", 1e-3, above=0.0),
-        platform_bore=block.number("platform_bore_mm", 1e-3, above=0.0),
-        material=_of_material(block, materials),
-    )
-    block.done()
-    for key, bore in (("motor_bore_mm", link.motor_bore), ("platform_bore_mm", link.platform_bore)):
+    def read(node: Node) -> LinkDimensions:
+        link = schema(node)
         limit = min(link.section_axial, 2.0 * link.overhang)
-        if bore >= limit:
-            raise GeometryError(
-                f"{block.place}.{key}: {bore * 1e3:g} does not fit into the bar "
-                f"(section_axial_mm and twice overhang_mm leave {limit * 1e3:g})"
+        for key, bore in zip(bores, (link.motor_bore, link.platform_bore), strict=True):
+            if bore >= limit:
+                raise node[key].refuse(
+                    f"{bore * 1e3:g} does not fit into the bar "
+                    f"(section_axial_mm and twice overhang_mm leave {limit * 1e3:g})"
+                )
+        if link.section_radial >= 2.0 * link.arc_radius:
+            raise node["section_radial_mm"].refuse(
+                f"{link.section_radial * 1e3:g} reaches past O "
+                f"(twice arc_radius_mm is {2e3 * link.arc_radius:g})"
             )
-    if link.section_radial >= 2.0 * link.arc_radius:
-        raise GeometryError(
-            f"{block.place}.section_radial_mm: {link.section_radial * 1e3:g} reaches past O "
-            f"(twice arc_radius_mm is {2e3 * link.arc_radius:g})"
-        )
-    return link
+        return link
+
+    return read
 
 
-def _bushing(block: Block, joint: str, materials: dict[str, Material]) -> BushingDimensions:
-    gaps: list[float | None] = [None, None]
-    if joint in PASSIVE_JOINTS:
-        for i, key in enumerate(("inner_gap_um", "outer_gap_um")):
-            # 0 = touching, null = no flange.
-            gaps[i] = block.optional_number(key, 1e-6, at_least=0.0)
-    bushing = BushingDimensions(
-        radius=block.number("radius_mm", 1e-3),
-        pin_diameter=block.number("pin_diameter_mm", 1e-3, above=0.0),
-        length=block.number("length_mm", 1e-3, above=0.0),
-        wall=block.number("wall_mm", 1e-3, above=0.0),
-        flange_diameter=block.number("flange_diameter_mm", 1e-3, above=0.0),
-        flange_thickness=block.number("flange_thickness_mm", 1e-3, above=0.0),
-        inner_gap=gaps[0],
-        outer_gap=gaps[1],
-        material=_of_material(block, materials),
+def _bushing(material: Schema[Material]) -> Schema[BushingDimensions]:
+    lengths = ("pin_diameter_mm", "length_mm", "wall_mm", "flange_diameter_mm")
+    keys: dict[str, Any] = dict.fromkeys((*lengths, "flange_thickness_mm"), LENGTH)
+    keys |= {"radius_mm": Quantity(number()), "material": material}
+    # 0 = touching, null = no flange.
+    gaps = dict.fromkeys(("inner_gap_um", "outer_gap_um"), Quantity(nullable(number(at_least=0.0))))
+    active = record(
+        keys, sources=SOURCES, make=partial(BushingDimensions, inner_gap=None, outer_gap=None)
     )
-    block.done()
-    sleeve = bushing.pin_diameter + 2.0 * bushing.wall
-    if bushing.flange_diameter <= sleeve:
-        raise GeometryError(
-            f"{block.place}.flange_diameter_mm: {bushing.flange_diameter * 1e3:g} is not larger "
-            f"than the sleeve, {sleeve * 1e3:g}"
-        )
-    if abs(bushing.radius) <= bushing.length / 2.0:
-        raise GeometryError(
-            f"{block.place}.radius_mm: {bushing.radius * 1e3:g} puts the bushing over O "
-            f"(half of length_mm is {5e2 * bushing.length:g})"
-        )
-    return bushing
+    passive = record({**keys, **gaps}, sources=SOURCES, make=BushingDimensions)
+
+    def read(node: Node) -> BushingDimensions:
+        is_passive = node.path.rpartition(".")[2] in PASSIVE_JOINTS
+        bushing = passive(node) if is_passive else active(node)
+        sleeve = bushing.pin_diameter + 2.0 * bushing.wall
+        if bushing.flange_diameter <= sleeve:
+            raise node["flange_diameter_mm"].refuse(
+                f"{bushing.flange_diameter * 1e3:g} is not larger than the sleeve, {sleeve * 1e3:g}"
+            )
+        if abs(bushing.radius) <= bushing.length / 2.0:
+            raise node["radius_mm"].refuse(
+                f"{bushing.radius * 1e3:g} puts the bushing over O "
+                f"(half of length_mm is {5e2 * bushing.length:g})"
+            )
+        return bushing
+
+    return read
 
 
-def _platform(block: Block, materials: dict[str, Material]) -> tuple[PlatformDimensions, Array]:
-    normal = block.direction("normal")
-    centre = block.vector("centre_mm", 1e-3)
-    diameter = block.number("diameter_mm", 1e-3, above=0.0)
-    thickness = block.number("thickness_mm", 1e-3, above=0.0)
-    material = _of_material(block, materials)
-    points = _readout_points(block)
-    load_at = block.text("load_at", ("O", "P0"))
+def _platform(material: Schema[Material]) -> Schema[tuple[PlatformDimensions, Array]]:
+    return record(
+        {
+            "normal": _axis,
+            **dict.fromkeys(("centre_mm", "tool_point_mm"), Quantity(vector())),
+            **dict.fromkeys(("diameter_mm", "thickness_mm"), LENGTH),
+            "material": material,
+            "readout_points_mm": Quantity(_readout_points),
+            "load_at": text("O", "P0"),
+        },
+        sources=SOURCES,
+        make=_plate,
+    )
+
+
+def _plate(
+    material: Material, load_at: str, normal: Array, centre: Array, thickness: float, **others: Any
+) -> tuple[PlatformDimensions, Array]:
     # The plate is rigid; its mass follows from its size, hubs and screws are not modelled.
-    mass = material.density * np.pi / 4.0 * diameter**2 * thickness
     platform = PlatformDimensions(
         normal=normal,
         centre=centre,
-        diameter=diameter,
         thickness=thickness,
-        mass=mass,
+        mass=material.density * np.pi / 4.0 * others["diameter"] ** 2 * thickness,
         centre_of_gravity=centre - 0.5 * thickness * normal,
-        tool_point=block.vector("tool_point_mm", 1e-3),
-        readout_points=points,
+        **others,
     )
-    block.done()
     return platform, centre if load_at == "P0" else np.zeros(3)
 
 
-def _readout_points(block: Block) -> Array:
-    key = "readout_points_mm"
-    points = block.rows(key, 1e-3, at_least=4)
+def _readout_points(node: Node) -> Array:
+    points = np.array(list_of(vector(), at_least=4)(node))
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     ratio = spread[2] / spread[0] if spread[0] > 0.0 else 0.0
     if ratio < READOUT_SPREAD:
-        raise GeometryError(
-            f"{block.place}.{key}: nearly coplanar, smallest over largest spread is {ratio:.3f}, "
-            f"below {READOUT_SPREAD}"
+        raise node.refuse(
+            f"nearly coplanar, smallest over largest spread is {ratio:.3f}, below {READOUT_SPREAD}"
         )
     return points
 
 
-def _limits(block: Block) -> Limits:
-    degree = np.pi / 180.0
-    limits = Limits(
-        joint_lower=block.vector("joint_lower_deg", degree, size=2),
-        joint_upper=block.vector("joint_upper_deg", degree, size=2),
-        operative_tilt=block.number("operative_tilt_deg", degree, above=0.0, below=180.0),
-        map_margin=block.number("map_margin", at_least=1.0, below=10.0),
-        singularity=block.number("singularity", above=0.0, below=1.0),
-        force=block.number("force_N", above=0.0),
-        moment=block.number("moment_Nm", above=0.0),
-        encoder_step=block.number("encoder_step_deg", degree, above=0.0),
-    )
-    block.done()
+def _limits(node: Node) -> Limits:
+    limits = LIMITS(node)
     if np.any(limits.joint_lower >= limits.joint_upper):
         low, high = (np.degrees(x).tolist() for x in (limits.joint_lower, limits.joint_upper))
-        raise GeometryError(
-            f"{block.place}.joint_lower_deg: {low} is not below joint_upper_deg, {high}"
-        )
+        raise node["joint_lower_deg"].refuse(f"{low} is not below joint_upper_deg, {high}")
     return limits

@@ -11,9 +11,19 @@ import yaml
 
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inputs.document import Node, read_yaml
+from wrist_stiffness.inputs.opening import open_input
+from wrist_stiffness.inputs.schema import (
+    list_of,
+    mapping_of,
+    number,
+    record,
+    text,
+    vector,
+    version,
+)
 from wrist_stiffness.lookup.table import EVALUATIONS, Evaluation
 from wrist_stiffness.lookup.table_file import load_table
-from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.formula_law import FormulaLaw
@@ -26,6 +36,50 @@ from wrist_stiffness.model.registry import find_law, law_from_file
 SCHEMA = 1
 FORMULA, PYTHON = "formula", "python"
 """Words for `effect:` that announce a user's own law."""
+
+
+def _estimate(node: Node) -> Estimate:
+    if isinstance(node.value, list):
+        value, sigma = vector(2)(node)
+        return Estimate(float(value), float(sigma))
+    return Estimate(number()(node))
+
+
+def _joint(effects: list[str], **values: float) -> JointUncertainty:
+    return JointUncertainty.of_values(tuple(effects), values)
+
+
+PLACED = {"effect": text(), "component": text()}
+PARAMETERS = {"parameters": mapping_of(_estimate)}
+CATALOGUE = record(PLACED, PARAMETERS)
+USERS_LAW = record({**PLACED, "class": text()}, PARAMETERS)
+USERS_FORMULA = record(
+    {**PLACED, "id": text(), "direction": vector(6), "expression": text()},
+    {**PARAMETERS, "covariates": list_of(text())},
+)
+MODEL = record(
+    {
+        "schema": version(SCHEMA),
+        "name": text(),
+        "effects": list_of(lambda node: node),
+        "table": record({"path": text()}, {"checksum": text()}),
+    },
+    {
+        "evaluation": text(*EVALUATIONS),
+        "lineage": list_of(
+            record(
+                dict.fromkeys(("command", "date", "parent_sha256"), text())
+                | {"recordings": mapping_of(text())},
+                {"measured": mapping_of(text()), "added": text()},
+                make=Step,
+            )
+        ),
+        "joint_uncertainty": record(
+            {"effects": list_of(text()), **dict.fromkeys(KEYS, number(at_least=0.0))},
+            make=_joint,
+        ),
+    },
+)
 
 
 def load_model(path: str | Path) -> ErrorModel:
@@ -51,30 +105,30 @@ def load_model(path: str | Path) -> ErrorModel:
         If the table cannot be read.
     """
     path = Path(path)
-    root = Block(read_yaml(path, InputError), str(path), InputError, sources=())
-    schema = root.number("schema")
-    if schema != SCHEMA:
-        raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
-    name = root.text("name")
-    effects = tuple(_effect(block, path.parent) for block in root.blocks("effects"))
-    entry = root.block("table")
-    table_file = path.parent / entry.text("path")
+    root = read_yaml(path, InputError)
+    values = MODEL(root)
+    effects = tuple(_effect(node, path.parent) for node in values["effects"])
+    entry = values["table"]
+    table_file = path.parent / entry["path"]
     table = load_table(table_file)
-    if "checksum" in entry.values and (wanted := entry.text("checksum")) != table.checksum:
-        raise InputError(
-            f"{path}.table.checksum: the model was made for {wanted[:12]}, "
-            f"{entry.text('path')} is {table.checksum[:12]}"
+    if (wanted := entry.get("checksum", table.checksum)) != table.checksum:
+        raise root["table"]["checksum"].refuse(
+            f"the model was made for {wanted[:12]}, {entry['path']} is {table.checksum[:12]}"
         )
-    entry.no_more_keys()
-    evaluation: Evaluation = table.header.evaluation
-    if "evaluation" in root.values:
-        evaluation = root.text("evaluation", EVALUATIONS)  # type: ignore[assignment]
-    lineage = root.blocks("lineage") if "lineage" in root.values else []
-    steps = tuple(_step(block, effects) for block in lineage)
-    joint = _joint(root.block("joint_uncertainty")) if "joint_uncertainty" in root.values else None
-    root.no_more_keys()
+    evaluation: Evaluation = values.get("evaluation", table.header.evaluation)
+    lineage = tuple(values.get("lineage", ()))
+    for position, step in enumerate(lineage):
+        _check_added(root["lineage"].value[position], step.added, effects)
     try:
-        return ErrorModel(name, table, evaluation, effects, table_file, steps, joint)
+        return ErrorModel(
+            values["name"],
+            table,
+            evaluation,
+            effects,
+            table_file,
+            lineage,
+            values.get("joint_uncertainty"),
+        )
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -134,56 +188,36 @@ def file_sha256(path: str | Path) -> str:
         If the file cannot be read.
     """
     try:
-        with Path(path).open("rb") as stream:
+        with open_input(path, InputError) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _effect(block: Block, folder: Path) -> Effect:
-    estimates = _estimates(block)
+def _effect(node: Node, folder: Path) -> Effect:
+    # Which keys an effect has depends on one of them.
+    word = mapping_of(lambda inner: inner.value)(node).get("effect")
+    values = {FORMULA: USERS_FORMULA, PYTHON: USERS_LAW}.get(str(word), CATALOGUE)(node)
+    estimates = values.get("parameters", {})
     try:
-        law = _law(block, folder, list(estimates))
-        effect = Effect(law, block.text("component"), estimates)
-    except InputError as error:
-        if str(error).startswith(block.place):
-            raise
-        raise InputError(f"{block.place}: {error}") from error
-    block.no_more_keys()
-    return effect
-
-
-def _law(block: Block, folder: Path, keys: list[str]) -> Law:
-    name = block.text("effect")
-    if name == PYTHON:
-        return law_from_file(block.text("class"), folder)
-    if name != FORMULA:
-        return find_law(name)
-    covariates = block.take("covariates") if "covariates" in block.values else []
-    if not (isinstance(covariates, list) and all(isinstance(c, str) for c in covariates)):
-        raise InputError(f"{block.place}.covariates: {covariates!r} is not a list of names")
-    return FormulaLaw(
-        block.text("id"),
-        block.text("component"),
-        block.vector("direction", size=6),
-        block.text("expression"),
-        covariates,
-        keys,
-    )
-
-
-def _estimates(block: Block) -> dict[str, Estimate]:
-    if "parameters" not in block.values:
-        return {}
-    inner = block.block("parameters")
-    estimates = {}
-    for key in map(str, inner.values):
-        if isinstance(inner.values.get(key), list):
-            value, sigma = inner.vector(key, size=2)
-            estimates[key] = Estimate(float(value), float(sigma))
+        if word == FORMULA:
+            law: Law = FormulaLaw(
+                values["id"],
+                values["component"],
+                values["direction"],
+                values["expression"],
+                values.get("covariates", []),
+                list(estimates),
+            )
         else:
-            estimates[key] = Estimate(inner.number(key))
-    return estimates
+            law = (
+                law_from_file(values["class"], folder)
+                if word == PYTHON
+                else find_law(values["effect"])
+            )
+        return Effect(law, values["component"], estimates)
+    except InputError as error:
+        raise node.refuse(str(error)) from error
 
 
 def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
@@ -205,44 +239,16 @@ def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
     return own
 
 
-def _joint(block: Block) -> JointUncertainty:
-    names = block.take("effects")
-    if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
-        raise InputError(f"{block.place}.effects: {names!r} is not a list of names")
-    values = {key: block.number(key) for key in KEYS}
-    for key, value in values.items():
-        if value < 0.0:
-            raise InputError(f"{block.place}.{key}: {value:g} is below 0")
-    block.no_more_keys()
-    return JointUncertainty.of_values(tuple(names), values)
-
-
-def _step(block: Block, effects: tuple[Effect, ...]) -> Step:
-    added = block.text("added") if "added" in block.values else ""
-    # An effect of the catalogue may have been taken out of the file since.
+def _check_added(node: Node, added: str, effects: tuple[Effect, ...]) -> None:
+    """Check that a step added an effect of the file, or one of the catalogue taken out since."""
     if added and added not in [effect.name for effect in effects]:
         law, _, component = added.partition("@")
         try:
             Effect(find_law(law), component)
         except InputError as error:
-            raise InputError(
-                f"{block.place}.added: {added} is neither an effect of this file nor one of the "
-                f"catalogue: {error}"
+            raise node["added"].refuse(
+                f"{added} is neither an effect of this file nor one of the catalogue: {error}"
             ) from error
-    step = Step(
-        block.text("command"),
-        block.text("date"),
-        block.text("parent_sha256"),
-        _texts(block.block("recordings")),
-        _texts(block.block("measured")) if "measured" in block.values else {},
-        added,
-    )
-    block.no_more_keys()
-    return step
-
-
-def _texts(block: Block) -> dict[str, str]:
-    return {str(name): block.text(name) for name in block.values}
 
 
 def _relative(target: Path, folder: Path) -> str:

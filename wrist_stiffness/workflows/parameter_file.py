@@ -9,6 +9,7 @@ angle_corrector:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ from wrist_stiffness.compensation.parameters import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.yaml_block import read_yaml
+from wrist_stiffness.inputs.document import Node, node_of, read_yaml
+from wrist_stiffness.inputs.schema import Schema, mapping_of, number, record, text, truth
 
 EVERY_NODE = "/**"
 KEY = "ros__parameters"
@@ -52,53 +54,37 @@ def node_settings(
         If the file is no parameter file, or a parameter is unknown, of another type or out of
         range.
     """
-    content = {} if path is None else read_yaml(path, InputError)
-    if not isinstance(content, Mapping):
-        raise InputError(f"{path}: not a ROS 2 parameter file, expected nodes by name")
+    root = node_of({}, "", InputError) if path is None else read_yaml(path, InputError)
+    nodes = {} if path is None else mapping_of(lambda node: node)(root)
     if path is not None and not any(
-        isinstance(block, Mapping) and KEY in block for block in content.values()
+        isinstance(node.value, dict) and KEY in node.value for node in nodes.values()
     ):
-        raise InputError(f"{path}: not a ROS 2 parameter file, no node in it has {KEY}")
+        raise root.refuse(f"not a ROS 2 parameter file, no node in it has {KEY}")
     names = dict(zip(("motor_1_joint", "motor_2_joint"), joints, strict=False))
-    predictor = _values(path, content, PREDICTOR, (*COMMON, *PREDICTION))
-    corrector = _values(path, content, CORRECTOR, (*COMMON, *CORRECTION))
+    predictor = _values(nodes, PREDICTOR, (*COMMON, *PREDICTION))
+    corrector = _values(nodes, CORRECTOR, (*COMMON, *CORRECTION))
     return prediction_settings(predictor | names), correction_settings(corrector | names)
 
 
 def _values(
-    path: str | Path | None,
-    content: Mapping[Any, Any],
-    node: str,
-    entries: Sequence[ParameterEntry],
+    nodes: Mapping[str, Node], node: str, entries: Sequence[ParameterEntry]
 ) -> dict[str, Any]:
     """Defaults, then what the file says of every node, then of this one."""
     values: dict[str, Any] = {entry.name: entry.default for entry in entries}
-    known = {entry.name: entry for entry in entries}
-    for name, block in content.items():
-        key = str(name).lstrip("/") if name != EVERY_NODE else EVERY_NODE
-        if key not in (EVERY_NODE, node):
-            continue
-        if not isinstance(block, Mapping) or not isinstance(block.get(KEY), Mapping):
-            raise InputError(f"{path}: {name}: expected {KEY} with values by name")
-        for parameter, value in block[KEY].items():
-            if parameter in known:
-                values[parameter] = _checked(f"{path}: {name}", known[parameter], value)
-            elif key == node:
-                raise InputError(f"{path}: {name}: unknown parameter {parameter}")
+    schemas = {entry.name: _schema_of(entry) for entry in entries}
+    for name, block in nodes.items():
+        if name == EVERY_NODE or name.lstrip("/") == node:
+            # What every node is told may be meant for another one.
+            of_all = record({}, schemas, others=name == EVERY_NODE)
+            values |= record({KEY: of_all}, others=True)(block)[KEY]
     return values
 
 
-def _checked(place: str, entry: ParameterEntry, value: Any) -> Any:
-    kind = type(entry.default)
-    # YAML writes 1 for 1.0; ROS itself is stricter.
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
-    if type(value) is not kind:
-        raise InputError(f"{place}: {entry.name}: {value!r} is no {kind.__name__}")
-    if isinstance(value, str):
-        return value
-    if entry.lower is not None and not value >= entry.lower:
-        raise InputError(f"{place}: {entry.name}: {value} is below {entry.lower:g}")
-    if entry.upper is not None and not value <= entry.upper:
-        raise InputError(f"{place}: {entry.name}: {value} is above {entry.upper:g}")
-    return value
+def _schema_of(entry: ParameterEntry) -> Schema[Any]:
+    if isinstance(entry.default, bool):
+        return truth
+    if isinstance(entry.default, str):
+        return text()
+    lower = -inf if entry.lower is None else entry.lower
+    upper = inf if entry.upper is None else entry.upper
+    return number(at_least=lower, at_most=upper)

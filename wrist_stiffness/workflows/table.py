@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from wrist_stiffness.errors import GeometryError, InputError
+from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
-from wrist_stiffness.mechanism.geometry_file import geometry_from_values
-from wrist_stiffness.mechanism.yaml_block import read_yaml
+from wrist_stiffness.mechanism.geometry_file import geometry_of
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.budget import PER_AXIS, Push, budget
 
@@ -86,8 +86,8 @@ def build(
             f"a grid of {per_axis} x {per_axis} is outside {MIN_PER_AXIS} x {MIN_PER_AXIS} "
             f"to {MAX_PER_AXIS} x {MAX_PER_AXIS}"
         )
-    values = read_yaml(geometry, GeometryError)
-    geometry_from_values(values, str(geometry))
+    root = read_yaml(geometry, GeometryError)
+    geometry_of(root)
     settings = BuildSettings(
         evaluation=evaluation,
         interface=interface,  # type: ignore[arg-type]
@@ -96,7 +96,7 @@ def build(
         kernel=kernel,
     )
     store = CondensedStore(output.with_name(f".{output.stem}.parts"))
-    table = save_table(build_table(values, settings, progress, store), output)
+    table = save_table(build_table(root.plain, settings, progress, store), output)
     store.remove()
     return table
 

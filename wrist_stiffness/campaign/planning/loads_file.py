@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inputs.document import Node, read_yaml
+from wrist_stiffness.inputs.schema import (
+    Keys,
+    Quantity,
+    list_of,
+    mapping_of,
+    number,
+    record,
+    text,
+    vector,
+    version,
+)
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
-from wrist_stiffness.mechanism.yaml_block import Block, read_yaml
 
 SCHEMA = 1
 KINDS = ("weight", "actuator")
@@ -162,68 +174,76 @@ def read_loads(path: str | Path, gravity: Array, force_limit: float) -> tuple[So
         If the file cannot be read, a key is missing, unknown or wrong, a name is there twice, or a
         force is beyond the table's range.
     """
-    root = Block(read_yaml(path, InputError), str(path), InputError, sources=())
-    schema = root.number("schema")
-    if schema != SCHEMA:
-        raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
-    entries = root.take("loads")
-    root.no_more_keys()
-    if not isinstance(entries, list):
-        raise InputError(f"{path}.loads: {entries!r} is not a list; write [] for none")
+    root = read_yaml(path, InputError)
     sources: list[Source] = []
-    for number, values in enumerate(entries):
-        block = Block(values, f"{path}.loads[{number}]", InputError, sources=())
-        weight = block.text("kind", KINDS) == "weight"
-        source = _weight(block, gravity, force_limit) if weight else _actuator(block, force_limit)
-        block.no_more_keys()
+    for node in LOADS(root)["loads"]:
+        source = _source(node, gravity, force_limit)
         if source.name in (known.name for known in sources):
-            raise InputError(f"{block.place}.name: {source.name!r} is there twice")
+            raise node["name"].refuse(f"{source.name!r} is there twice")
         sources.append(source)
     return tuple(sources)
 
 
-def _name(block: Block) -> str:
-    name = block.text("name")
+def _name(node: Node) -> str:
+    name = text()(node)
     if not name.strip():
-        raise InputError(f"{block.place}.name: is empty")
+        raise node.refuse("is empty")
     return name
 
 
-def _weight(block: Block, gravity: Array, force_limit: float) -> Weight:
-    weight = Weight(
-        _name(block),
-        block.number("mass_kg", above=0.0),
-        block.vector("point_mm", 1e-3),
-        block.number("change_s", at_least=0.0),
+def _weight(kind: str, **values: Any) -> Weight:
+    return Weight(**values)
+
+
+def _actuator(
+    kind: str, name: str, frame: str, point: Array, change_s: float, **ends: Array
+) -> Actuator:
+    lower, upper = (
+        np.concatenate([ends[f"force_{end}"], ends[f"moment_{end}"]]) for end in ("min", "max")
     )
-    if (pull := weight.mass * float(np.linalg.norm(gravity))) > force_limit:
-        raise InputError(
-            f"{block.place}.mass_kg: {weight.mass:g} weighs {pull:.3g} N, "
-            f"the table ends at {force_limit:g} N"
-        )
-    return weight
+    return Actuator(name, lower, upper, point, frame == "wrist_platform", change_s)
 
 
-def _actuator(block: Block, force_limit: float) -> Actuator:
-    name, frame = _name(block), block.text("frame", FRAMES)
-    limits = [
-        np.concatenate([block.vector(f"force_{end}_N"), block.vector(f"moment_{end}_Nm")])
-        for end in ("min", "max")
-    ]
-    lower, upper = limits
-    for place, kind in ((0, "force"), (3, "moment")):
-        part = slice(place, place + 3)
+COMMON: Keys = {
+    "kind": text(*KINDS),
+    "name": _name,
+    "point_mm": Quantity(vector()),
+    "change_s": number(at_least=0.0),
+}
+WEIGHT = record({**COMMON, "mass_kg": Quantity(number(above=0.0))}, make=_weight)
+ACTUATOR = record(
+    {
+        **COMMON,
+        "frame": text(*FRAMES),
+        **dict.fromkeys(
+            ("force_min_N", "force_max_N", "moment_min_Nm", "moment_max_Nm"), Quantity(vector())
+        ),
+    },
+    make=_actuator,
+)
+LOADS = record({"schema": version(SCHEMA), "loads": list_of(lambda node: node)})
+
+
+def _source(node: Node, gravity: Array, force_limit: float) -> Source:
+    # Which keys a load has depends on one of them.
+    kind = mapping_of(lambda inner: inner.value)(node).get("kind")
+    if kind != "actuator":
+        weight = WEIGHT(node)
+        if (pull := weight.mass * float(np.linalg.norm(gravity))) > force_limit:
+            raise node["mass_kg"].refuse(
+                f"{weight.mass:g} weighs {pull:.3g} N, the table ends at {force_limit:g} N"
+            )
+        return weight
+    actuator = ACTUATOR(node)
+    lower, upper = actuator.lower, actuator.upper
+    for part, key, unit in ((slice(0, 3), "force", "N"), (slice(3, 6), "moment", "Nm")):
         if np.any(lower[part] > upper[part]):
-            raise InputError(
-                f"{block.place}.{kind}_min: {lower[part].tolist()} exceeds "
-                f"{kind}_max {upper[part].tolist()}"
+            raise node[f"{key}_min_{unit}"].refuse(
+                f"{lower[part].tolist()} exceeds {key}_max_{unit} {upper[part].tolist()}"
             )
     if not np.any(lower) and not np.any(upper):
-        raise InputError(f"{block.place}: {name} can apply neither a force nor a moment")
+        raise node.refuse(f"{actuator.name} can apply neither a force nor a moment")
     reach = np.abs(np.concatenate([lower[:3], upper[:3]])).max()
     if reach > force_limit:
-        raise InputError(
-            f"{block.place}.force: {reach:g} N is beyond the table's {force_limit:g} N"
-        )
-    point, change_s = block.vector("point_mm", 1e-3), block.number("change_s", at_least=0.0)
-    return Actuator(name, lower, upper, point, frame == "wrist_platform", change_s)
+        raise node.refuse(f"{reach:g} N is beyond the table's {force_limit:g} N")
+    return actuator

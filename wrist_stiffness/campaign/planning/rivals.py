@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +9,18 @@ import numpy as np
 
 from wrist_stiffness.campaign.planning.information import MeasurementNoise
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inputs.document import Node, read_json
+from wrist_stiffness.inputs.schema import (
+    Quantity,
+    list_of,
+    mapping_of,
+    number,
+    record,
+    text,
+    vector,
+    version,
+)
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.yaml_block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 
@@ -69,48 +77,46 @@ def read_rivals(path: str | Path) -> Rivals:
     InputError
         If the file cannot be read, a key is missing or wrong, or an effect is not of the catalogue.
     """
-    try:
-        values = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"{path}: not a JSON file: {error}") from error
-    root = Block(values, str(path), InputError, sources=())
-    schema = root.number("schema")
-    if schema != SCHEMA:
-        raise InputError(f"{path}.schema: {schema:g} is not {SCHEMA}, the version that is read")
-    floor = root.block("noise_floor")
-    sizes = (
-        floor.number("s_um", 1e-6, above=0.0),
-        floor.number("phi_mdeg", np.pi / 180e3, above=0.0),
+    found = DIAGNOSIS(read_json(path, InputError))
+    floor, silent = found["noise_floor"], found["not_excited"]
+    return Rivals(
+        tuple(found["findings"]),
+        tuple({effect.name: effect for effect in silent}.values()),
+        (floor["s"], floor["phi"]),
     )
-    classes = tuple(_members(block) for block in root.blocks("findings"))
-    silent = (_effect(block) for block in root.blocks("not_excited"))
-    return Rivals(classes, tuple({effect.name: effect for effect in silent}.values()), sizes)
 
 
-def _members(finding: Block) -> tuple[Effect, ...]:
-    effects = [_effect(block) for block in finding.blocks("class")]
-    if not effects:
-        raise InputError(f"{finding.place}.class: is empty")
-    parameters = finding.block("parameters")
-    known = {p.key: p for p in effects[0].parameters}
+def _effect(node: Node) -> Effect:
+    words = record({"effect": text(), "component": text()}, others=True)(node)
+    try:
+        return Effect(find_law(words["effect"]), words["component"])
+    except InputError as error:
+        raise node.refuse(str(error)) from error
+
+
+def _members(node: Node) -> tuple[Effect, ...]:
+    finding = record(
+        {"class": list_of(_effect, at_least=1), "parameters": mapping_of(lambda inner: inner)},
+        others=True,
+    )(node)
+    effects, parameters = finding["class"], finding["parameters"]
     # What the regression calls otherwise than the law is left at its prior mean.
     values = {
-        key: float(np.clip(parameters.vector(key, size=2)[0], known[key].lower, known[key].upper))
-        for key in map(str, parameters.values)
-        if key in known
+        known.key: float(np.clip(vector(2)(parameters[known.key])[0], known.lower, known.upper))
+        for known in effects[0].parameters
+        if known.key in parameters
     }
     return (effects[0].with_values(values), *effects[1:])
 
 
-def _effect(block: Block) -> Effect:
-    name, component = block.text("effect"), block.text("component")
-    return _placed(block, lambda: Effect(find_law(name), component))
-
-
-def _placed(block: Block, make: Callable[[], Effect]) -> Effect:
-    try:
-        return make()
-    except InputError as error:
-        raise InputError(f"{block.place}: {error}") from error
+DIAGNOSIS = record(
+    {
+        "schema": version(SCHEMA),
+        "noise_floor": record(
+            dict.fromkeys(("s_um", "phi_mdeg"), Quantity(number(above=0.0))), others=True
+        ),
+        "findings": list_of(_members),
+        "not_excited": list_of(_effect),
+    },
+    others=True,
+)
