@@ -9,11 +9,11 @@ from closed_loop_restless import Restless, restless
 from closed_loop_truth import PerfectStream, TrueRunningModel
 from numpy.typing import NDArray
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.vectors import skew
@@ -40,7 +40,7 @@ WARM_UP_TIMES, WARM_UP = np.array([0.0, 0.05, 0.4, 0.6, 1.0]), np.array([0.0, 0.
 DEADBAND = SafetySettings().deadband_steps
 """A correction that comes back by less has not turned: it may leave as much [encoder steps]."""
 
-SETTINGS = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+SETTINGS = StreamSettings(supervisor=SupervisorSettings(follow=True))
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import sys
 
 import numpy as np
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
@@ -65,10 +65,10 @@ def run(model: ErrorModel, newtons: float) -> None:
         return rotation @ prediction.configuration.platform @ normal, shift
 
     for drive, play in (("ideal", 0.0), ("encoder", 0.15)):
-        settings = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+        settings = StreamSettings(supervisor=SupervisorSettings(follow=True))
         safety = settings.safety
         settings = StreamSettings(
-            contact=settings.contact, safety=type(safety)(slew=1.0, deadband_steps=play)
+            supervisor=settings.supervisor, safety=type(safety)(slew=1.0, deadband_steps=play)
         )
         stream = CorrectionStream(model, settings, enabled=True)
         before, after, floor, shifts, left = [], [], [], [], []

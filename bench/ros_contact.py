@@ -2,7 +2,7 @@
 
 The tool moves into a one-sided spring and stays.  For every stiffness of the wall, every ratio of
 assumed to true compliance and every delay of the load it is printed how much larger the contact
-force becomes than without correction, for each contact policy and for following every load.
+force becomes than without correction, where the load is judged and where it is followed.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import State, SupervisorSettings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
@@ -29,9 +29,7 @@ SECONDS = 3.0
 OVERLAP_DEG = 0.03
 NAMES = ("motor_1_joint", "motor_2_joint")
 SECOND = 1_000_000_000
-SETTINGS = {policy: ContactSettings(policy) for policy in POLICIES} | {
-    "every load": ContactSettings("gain", gain=1.0)
-}
+SETTINGS = {"judge": SupervisorSettings(), "follow": SupervisorSettings(follow=True)}
 
 
 def with_tool(table: Table, ratio: float) -> Table:
@@ -65,7 +63,7 @@ class Contact:
             stream.loads.add(stamp, "wrist_base", load[:3].tolist(), load[3:].tolist())
             desired = start + (end - start) * min(i / RATE_HZ, 1.0)
             sent = stream.on_command(stamp, "", NAMES, desired.tolist()).theta
-            said |= stream.contact.in_contact
+            said |= stream.supervision.state is State.IN_CONTACT
         return max(float(np.linalg.norm(each[:3])) for each in felt), said
 
 
@@ -84,7 +82,7 @@ def main() -> None:
                 cells = []
                 for name, settings in SETTINGS.items():
                     stream = CorrectionStream(
-                        assumed, StreamSettings(objective="tool_point", contact=settings), True
+                        assumed, StreamSettings(objective="tool_point", supervisor=settings), True
                     )
                     force, said = contact.forces(stream)
                     share = f"{force / plain:.2f}" if plain else "-"

@@ -9,13 +9,13 @@ from itertools import count
 
 import numpy as np
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import Correction, correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model
@@ -52,7 +52,7 @@ def main() -> None:
     second = 1e-3 * np.arange(SAMPLES)
     theta = 0.6 * np.stack([np.sin(2.0 * np.pi * second), np.cos(3.0 * np.pi * second)], axis=1)
     load = Load(np.array([0.3, -0.2, -0.8, 0.005, 0.0, -0.01]))
-    settings = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+    settings = StreamSettings(supervisor=SupervisorSettings(follow=True))
     predicting = PredictionStream(model, settings)
     correcting = CorrectionStream(model, settings, enabled=True)
     for stream in (predicting, correcting):

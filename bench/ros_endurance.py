@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=1000.0, help="of the stream [Hz]")
     options = parser.parse_args()
     module = "wrist_stiffness.ros."
-    corrects = ("--ros-args", "-p", "enabled_on_start:=true", "-p", "contact_policy:=gain")
+    corrects = ("--ros-args", "-p", "enabled_on_start:=true", "-p", "load_policy:=follow")
     with (
         process("-m", module + "pose_error_predictor") as predictor,
         process("-m", module + "angle_corrector", *corrects) as corrector,

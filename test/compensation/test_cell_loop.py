@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
@@ -33,7 +33,7 @@ def pointing_rms(table, play, enabled):
         np.random.default_rng(3),
     )
     settings = StreamSettings(
-        contact=ContactSettings("gain", gain=1.0),
+        supervisor=SupervisorSettings(follow=True),
         safety=SafetySettings(slew=10.0, deadband_steps=play),
         correction_limit=0.2,
     )

@@ -6,23 +6,24 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import State, SupervisorSettings
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.simulation.environment import EnvironmentSpring
 
 NAMES = ("motor_1_joint", "motor_2_joint")
 SECOND = 1_000_000_000
-WEIGHTS = ContactSettings("gain", gain=1.0)
+FOLLOW = SupervisorSettings(follow=True)
+THRESHOLD = SupervisorSettings().limit.force
 TOOL_MM = [0.0, 0.0, 60.0]
 
 
 def pointing_errors(model, play, step, poses=60, seed=7):
     """Return (before, after, floor) of the true normal against the commanded one [rad]."""
     settings = StreamSettings(
-        contact=WEIGHTS, safety=SafetySettings(slew=10.0, deadband_steps=play)
+        supervisor=FOLLOW, safety=SafetySettings(slew=10.0, deadband_steps=play)
     )
     stream = CorrectionStream(model, settings, enabled=True)
     rng = np.random.default_rng(seed)
@@ -84,7 +85,7 @@ def wrists(make_table):
 def contact_forces(truth, model, stiffness, delay_s, contact, rate_hz=50, seconds=3.0):
     """Move the tool into a wall and stay; return the force [N] and the last contact state."""
     model = model.with_evaluation("closed_form")
-    settings = StreamSettings(objective="tool_point", contact=contact or WEIGHTS)
+    settings = StreamSettings(objective="tool_point", supervisor=contact or FOLLOW)
     stream = CorrectionStream(model, settings, enabled=contact is not None)
     tool = truth.geometry.platform.tool_point
     # Turning motor 2 moves the tool, above O, along x.
@@ -105,33 +106,29 @@ def contact_forces(truth, model, stiffness, delay_s, contact, rate_hz=50, second
         stream.loads.add(stamp, "wrist_base", load[:3], load[3:])
         desired = start + (end - start) * min(i / rate_hz, 1.0)
         sent = stream.on_command(stamp, "", NAMES, desired).theta
-        restricted |= stream.contact.in_contact
+        restricted |= stream.supervision.state is State.IN_CONTACT
     return np.array(forces), restricted
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("ratio", [0.7, 1.5])
 @pytest.mark.parametrize(
     ("newton_per_um", "delay_s"), [(0.0, 0.0), (0.02, 0.1), (0.5, 0.0), (10.0, 0.1)]
 )
-def test_in_contact_the_force_stays_or_the_corrector_says_so(
-    wrists, policy, ratio, newton_per_um, delay_s
-):
+def test_in_contact_the_force_stays_or_the_corrector_says_so(wrists, ratio, newton_per_um, delay_s):
     truth, models = wrists
     stiffness = 1e6 * newton_per_um
     plain, _ = contact_forces(truth, models[ratio], stiffness, delay_s, None)
     forces, restricted = contact_forces(
-        truth, models[ratio], stiffness, delay_s, ContactSettings(policy)
+        truth, models[ratio], stiffness, delay_s, SupervisorSettings()
     )
-    threshold = ContactSettings().force
-    assert forces.max() <= 1.2 * max(plain.max(), threshold)
-    assert restricted == bool(forces.max() > threshold)
+    assert forces.max() <= 1.2 * max(plain.max(), THRESHOLD)
+    assert restricted == bool(forces.max() > THRESHOLD)
 
 
 def test_following_every_load_in_contact_raises_the_force(wrists):
     """The loop that the policies guard against is there."""
     truth, models = wrists
     plain, _ = contact_forces(truth, models[1.5], 0.5e6, 0.0, None)
-    forces, _ = contact_forces(truth, models[1.5], 0.5e6, 0.0, WEIGHTS)
+    forces, _ = contact_forces(truth, models[1.5], 0.5e6, 0.0, FOLLOW)
     assert forces.max() > 1.2 * plain.max()

@@ -7,10 +7,10 @@ same commands leave the true platform where it is, and the load is said as it wa
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import catalogue, find_law
@@ -70,7 +70,7 @@ def large(name):
 def driven(model, cell):
     """Return what the corrector sends and hands on along the cell's program."""
     stream = CorrectionStream(
-        model, StreamSettings(contact=ContactSettings("gain", gain=1.0)), enabled=True
+        model, StreamSettings(supervisor=SupervisorSettings(follow=True)), enabled=True
     )
     phase = cell.program.phase(TIME_S)
     sent = []

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.held_signals import HeldSignals
@@ -17,6 +16,7 @@ from wrist_stiffness.compensation.monitor_stream import MonitorStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.supervisor import State, SupervisorSettings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block, Sample
 from wrist_stiffness.model.effect import Effect
@@ -99,7 +99,7 @@ def test_temperatures_reach_the_model_by_their_stamps(warm, model):
 def test_commands_are_corrected_from_the_commanded_history(loose):
     """What is sent takes up the backlash on the side on which the motor comes to rest."""
     settings = StreamSettings(
-        contact=ContactSettings("gain", gain=1.0),
+        supervisor=SupervisorSettings(follow=True),
         safety=SafetySettings(slew=1e3, deadband_steps=0.0),
     )
     stream = CorrectionStream(loose, settings, enabled=True)
@@ -125,7 +125,7 @@ def test_commands_are_corrected_from_the_commanded_history(loose):
 
 
 AT_ONCE = StreamSettings(
-    contact=ContactSettings("gain", gain=1.0),
+    supervisor=SupervisorSettings(follow=True),
     safety=SafetySettings(slew=1e3, deadband_steps=0.0),
 )
 NOT_CORRECTED = {
@@ -214,12 +214,13 @@ def test_a_frozen_contact_comes_back_neither_by_the_residual_nor_by_the_memory(m
     commands = []
     for push in (0.0, 3.0):
         stream = CorrectionStream(creeping, StreamSettings(safety=quick), enabled=True)
-        for i in range(30):
+        for i in range(40):
             stamp = SECOND + i * SECOND // 10
-            force = DOWN[:3] * (1.0 + (push if i >= 10 else 0.0))
+            force = DOWN[:3] + [push if i >= 20 else 0.0, 0.0, 0.0]
             stream.loads.add(stamp, "wrist_base", force, DOWN[3:])
             command = stream.on_command(stamp, "", NAMES, [0.1, 0.2])
-        assert stream.contact.in_contact is (push > 0.0)
+        assert stream.supervision.payload is not None
+        assert (stream.supervision.state is State.IN_CONTACT) is (push > 0.0)
         commands.append(command)
     free, pushed = commands
     assert np.array_equal(free.theta, pushed.theta)

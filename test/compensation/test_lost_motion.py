@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.memory import play
 from wrist_stiffness.model.parameters import Estimate
@@ -19,7 +19,7 @@ SECOND = 1_000_000_000
 WIDTH = float(np.radians(0.06))
 RATE_HZ = 50
 SETTINGS = StreamSettings(
-    contact=ContactSettings("gain", gain=1.0), safety=SafetySettings(slew=1e3, deadband_steps=0.15)
+    supervisor=SupervisorSettings(follow=True), safety=SafetySettings(slew=1e3, deadband_steps=0.15)
 )
 
 

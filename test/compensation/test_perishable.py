@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.perishable import require_fresh
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import InputError, StaleCommandError
 from wrist_stiffness.model.effect import Effect
@@ -18,7 +18,7 @@ from wrist_stiffness.model.registry import find_law
 
 NAMES = ("motor_1_joint", "motor_2_joint")
 SECOND = 1_000_000_000
-EVERY_LOAD = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+EVERY_LOAD = StreamSettings(supervisor=SupervisorSettings(follow=True))
 
 
 @pytest.fixture

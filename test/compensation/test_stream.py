@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction import correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import (
     InputError,
@@ -26,7 +26,7 @@ DOWN = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 ROUNDING = 1e-15  # rad
 
 # Loads of these tests are weights; contact has tests of its own.
-EVERY_LOAD = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+EVERY_LOAD = StreamSettings(supervisor=SupervisorSettings(follow=True))
 
 
 class Driver:
@@ -267,7 +267,7 @@ def test_the_correction_does_not_drive_past_a_joint_limit(model, objective):
 def test_towards_the_border_of_the_domain_the_correction_fades(model, objective):
     """No correction differs from that of its neighbour by more than a smooth fade explains."""
     free = StreamSettings(
-        contact=EVERY_LOAD.contact,
+        supervisor=EVERY_LOAD.supervisor,
         safety=replace(EVERY_LOAD.safety, slew=1e3, deadband_steps=0.0),
     )
     driver = corrector(model, settings=free)
@@ -294,7 +294,7 @@ def test_towards_a_singular_pose_the_correction_fades_and_beyond_it_there_is_non
     header.geometry["limits"] = {**header.geometry["limits"], "singularity": 0.6}
     near = ErrorModel("near", replace(table, header=header), "closed_form")
     free = StreamSettings(
-        contact=EVERY_LOAD.contact,
+        supervisor=EVERY_LOAD.supervisor,
         safety=replace(EVERY_LOAD.safety, slew=1e3, deadband_steps=0.0),
     )
     driver = corrector(near, settings=free)

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 
 NAMES = ("motor_2_joint", "gripper", "motor_1_joint")
 SECOND = 1_000_000_000
-EVERY_LOAD = StreamSettings(contact=ContactSettings("gain", gain=1.0))
+EVERY_LOAD = StreamSettings(supervisor=SupervisorSettings(follow=True))
 # Shares of the correction's own speed and acceleration: truncation and search error of both sides.
 SPEED, ACCELERATION = 1e-3, 0.03
 

@@ -153,7 +153,7 @@ def recorded(graph, wrist, table, path):
 def test_record_diagnose_extend_reload_and_the_true_error_falls(graph, model, tmp_path):
     path, extended = tmp_path / "model.yaml", tmp_path / "extended.yaml"
     save_model(model, path)
-    graph.add(AngleCorrector, model_file=str(path), contact_policy="gain", contact_gain=1.0)
+    graph.add(AngleCorrector, model_file=str(path), load_policy="follow")
     graph.listen(JointState, CORRECTED)
     graph.connected(CORRECTED)
     wrist = Wrist(graph)

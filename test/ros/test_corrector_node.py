@@ -36,9 +36,7 @@ OUTPUTS = {
 }
 
 
-AT_ONCE = {"slew_deg_s": 1000.0, "deadband_steps": 0.0, "contact_gain": 1.0} | {
-    "contact_policy": "gain"
-}
+AT_ONCE = {"slew_deg_s": 1000.0, "deadband_steps": 0.0} | {"load_policy": "follow"}
 ROUNDING = 1e-15  # rad
 
 

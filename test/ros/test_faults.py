@@ -225,8 +225,7 @@ def test_when_the_load_falls_silent_the_correction_fades_to_none(graph, model_pa
         AngleCorrector,
         model_file=str(model_path),
         enabled_on_start=True,
-        contact_policy="gain",
-        contact_gain=1.0,
+        load_policy="follow",
         deadband_steps=0.0,
         slew_deg_s=0.01,
     )

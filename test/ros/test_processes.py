@@ -103,7 +103,7 @@ def test_a_killed_node_comes_back(graph):
 def test_a_killed_corrector_comes_back_and_ramps_from_zero(graph):
     """Nobody forwards while it is away; who comes back does not step to the full correction."""
     node = NODES["angle_corrector"].having(
-        {"enabled_on_start": True, "deadband_steps": 0.0, "contact_policy": "gain"}
+        {"enabled_on_start": True, "deadband_steps": 0.0, "load_policy": "follow"}
     )
     corrected, theta = "/motor_commands_corrected", [0.1, -0.2]
     graph.listen(JointState, corrected)

@@ -13,7 +13,7 @@ FILE = """
     load_age_limit_s: 2
     frames: "{ft: {parent: wrist_platform, position_mm: [0, 0, 40], acts_on: environment}}"
 angle_corrector:
-  ros__parameters: {contact_policy: gain, contact_gain: 1.0, objective: orientation}
+  ros__parameters: {load_policy: follow, slew_deg_s: 1.0, objective: orientation}
 cell_simulator:
   ros__parameters: {anything: 1}
 """
@@ -40,20 +40,20 @@ def test_every_node_then_this_one_then_the_command(tmp_path):
         assert np.array_equal(load.wrench[:3], [0.0, 0.0, -1.0])
         assert load.on_platform
     assert correction.objective == "orientation"
-    assert correction.contact.policy == "gain"
-    assert prediction.contact.policy == "freeze_in_contact"
+    assert correction.supervisor.follow
+    assert not prediction.supervisor.follow
 
 
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("contact_gain: 1.0", "contact_gain: 7.0", "contact_gain: 7.0 is above 1"),
-        ("contact_gain: 1.0", "contact_gain: .nan", "contact_gain: nan is not a finite number"),
-        ("contact_gain: 1.0", "contact_gain: much", "'much' is not a finite number"),
-        ("contact_gain: 1.0", "contact_grain: 1.0", "unknown key contact_grain"),
-        ("contact_policy: gain", "contact_policy: hope", "'hope' is not one of"),
+        ("slew_deg_s: 1.0", "slew_deg_s: 7000.0", "slew_deg_s: 7000.0 is above 1000"),
+        ("slew_deg_s: 1.0", "slew_deg_s: .nan", "slew_deg_s: nan is not a finite number"),
+        ("slew_deg_s: 1.0", "slew_deg_s: much", "'much' is not a finite number"),
+        ("slew_deg_s: 1.0", "slow_deg_s: 1.0", "unknown key slow_deg_s"),
+        ("load_policy: follow", "load_policy: hope", "'hope' is not one of"),
         ("wrist_platform", "gripper", "parent: 'gripper'"),
-        ("ros__parameters: {contact", "parameters: {contact", "ros__parameters is missing"),
+        ("ros__parameters: {load_p", "parameters: {load_p", "ros__parameters is missing"),
         (FILE, "- a list", "is not a mapping"),
         (FILE, "schema: 1\neffects: []", "no node in it has ros__parameters"),
         (FILE, "a: [", "not a YAML file"),

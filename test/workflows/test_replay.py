@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.block import Block
@@ -113,9 +115,9 @@ def test_the_residual_is_what_the_sent_angles_leave(tmp_path):
     """A second command, for the first one's correction starts at zero and changes nothing yet."""
     later = dataclasses.replace(COMMAND, header=Header(90 * MILLISECOND))
     timeline = [*TIMELINE, (90, "/load_estimate", load(89 * MILLISECOND, (0.0, 0.0, -2.0)))]
-    replay(
-        write(tmp_path / "in", [*timeline, (90, "/motor_commands", later)]), MODEL, tmp_path / "out"
-    )
+    follow = StreamSettings(supervisor=SupervisorSettings(follow=True))
+    source = write(tmp_path / "in", [*timeline, (90, "/motor_commands", later)])
+    replay(source, MODEL, tmp_path / "out", (StreamSettings(), follow))
     model = load_model(MODEL)
     sent = outputs(tmp_path / "out", "/motor_commands_corrected")[-1].position
     said = outputs(tmp_path / "out", "/pose_error_residual")[-1].pose.pose.orientation

@@ -8,10 +8,11 @@ from math import isfinite
 
 import numpy as np
 
-from wrist_stiffness.compensation.contact_policy import ContactGuard
 from wrist_stiffness.compensation.correction import Correction, as_applied, correct
 from wrist_stiffness.compensation.intake import COMMAND
+from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.payload import Payload, Thresholds
 from wrist_stiffness.compensation.perishable import require_within_limits
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.running_model import RunningModel
@@ -22,16 +23,24 @@ from wrist_stiffness.compensation.safety import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
+from wrist_stiffness.compensation.supervisor import Held, Supervision, Supervisor
 from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point, neighbours
 from wrist_stiffness.errors import (
     InputError,
     SingularPoseError,
+    StaleLoadError,
     UnreachablePoseError,
     WristError,
 )
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.topics import CORRECTED_FRAME
+
+SCATTERS = 5.0
+"""A load departs when it does so by this many standard deviations of the tare's loads, at least."""
+
+PLAN_WINDOW_NS = 2 * NANOSECONDS
+"""Of the loads before a plan so many are judged: twice what it takes to know a payload [ns]."""
 
 TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
 
@@ -53,6 +62,9 @@ class CorrectedCommand:
     fault : WristError or None
         Why none can be had although correction is on (what was applied before then fades out), or
         why the model could not remember the command.
+    valid : bool
+        Whether the residual holds: the load is known and corrected for in full
+        (`Supervisor.valid`).
     """
 
     frame_id: str
@@ -60,6 +72,7 @@ class CorrectedCommand:
     theta: Array
     correction: Correction | None
     fault: WristError | None
+    valid: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,11 +87,14 @@ class CorrectedTrajectory:
         The motors' angles, speeds and accelerations corrected.
     fault : WristError or None
         Why it passes unchanged although correction is on.
+    valid : bool
+        As of a command, at its start.
     """
 
     frame_id: str
     points: tuple[PlannedPoint, ...]
     fault: WristError | None
+    valid: bool = False
 
 
 class CorrectionStream(Stream):
@@ -95,15 +111,15 @@ class CorrectionStream(Stream):
 
     Attributes
     ----------
-    contact : ContactGuard
-        Whether the load says that there is contact.
+    supervisor : Supervisor
+        Judges what of the load is a payload.
     active : bool
         False where a correction, though enabled, is to fade out: of a node that is not active.
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings, enabled: bool) -> None:
         super().__init__(model, settings)
-        self.contact = ContactGuard()
+        self.supervisor = Supervisor()
         self.active = True
         self._applied = AppliedCorrection()
         self._held = np.zeros(2)
@@ -116,13 +132,30 @@ class CorrectionStream(Stream):
 
     @property
     def enabled(self) -> bool:
-        """Whether commands are corrected; switching it on takes the present load as payload."""
+        """Whether commands are corrected; switching it judges the load anew."""
         return self._enabled
 
     @enabled.setter
     def enabled(self, enabled: bool) -> None:
         self._enabled = enabled
-        self.contact.forget()
+        self.supervisor.forget()
+
+    @property
+    def supervision(self) -> Supervision:
+        """What is believed of the load, to be shown and stored."""
+        return self.supervisor.supervision
+
+    def declare_payload(self, payload: Payload | None) -> None:
+        """Take over what a gripper holds; None for nothing (see `Supervisor`)."""
+        self.supervisor.declare_payload(payload)
+
+    def restore(self, payload: Payload | None) -> None:
+        """Expect a payload that was stored (see `Supervisor`)."""
+        self.supervisor.restore(payload)
+
+    def forget(self) -> None:
+        """Judge the load anew."""
+        self.supervisor.forget()
 
     @property
     def correcting(self) -> bool:
@@ -143,7 +176,9 @@ class CorrectionStream(Stream):
     def tare(self) -> Load:
         """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
         zero = super().tare()
-        self.contact.forget()
+        self.supervisor.forget()
+        scatter = (SCATTERS * self.loads.scatter).reshape(2, 3).max(axis=1)
+        self.supervisor.scatter = Thresholds(*scatter.tolist())
         return zero
 
     def on_command(
@@ -192,14 +227,18 @@ class CorrectionStream(Stream):
         held = np.zeros(2)
         if self.correcting:
             try:
-                load = self._load(stamp_ns)
+                load = self._load(stamp_ns, theta)
                 running = self.running_model()
                 found = self._found(
                     running, self.settings, stamp_ns, load, theta, theta_dot, self._held, self._play
                 )
-                held, correction = found.delta, self._faded(running, self.settings, found)
+                share = self.supervisor.share(found.jacobian.dot(found.delta))
+                held = found.delta
+                correction = self._faded(running, self.settings, found, share)
             except WristError as error:
                 fault = error
+                if isinstance(error, StaleLoadError):
+                    self.supervisor.lost()
         self._held = held
         delta = self._advance(stamp_ns, theta, correction)
         if correction is not None:
@@ -210,7 +249,12 @@ class CorrectionStream(Stream):
         sent[list(self.settings.motors.places(names))] = theta + delta
         marked = self.correcting or bool(np.any(delta))
         return CorrectedCommand(
-            CORRECTED_FRAME if marked else frame_id, sent, theta + delta, correction, fault
+            CORRECTED_FRAME if marked else frame_id,
+            sent,
+            theta + delta,
+            correction,
+            fault,
+            correction is not None and self.supervisor.valid,
         )
 
     def on_trajectory(
@@ -274,7 +318,8 @@ class CorrectionStream(Stream):
             try:
                 if frame_id == CORRECTED_FRAME:
                     raise InputError(TWICE)
-                load, running = self._load(stamp_ns), self.running_model().snapshot()
+                held = self._held_by(stamp_ns, points, places)
+                running = self.running_model().snapshot()
             except WristError as error:
                 fault = error
         done = []
@@ -290,7 +335,7 @@ class CorrectionStream(Stream):
             try:
                 for theta in neighbours(point, places):
                     try:
-                        found = self._planned(running, settings, stamp_ns, load, theta, speed)
+                        found = self._planned(running, settings, stamp_ns, held, theta, speed)
                     except (UnreachablePoseError, SingularPoseError):
                         if not corrected:
                             raise
@@ -305,7 +350,7 @@ class CorrectionStream(Stream):
         if running is None or fault is not None:
             mark = CORRECTED_FRAME if correcting else frame_id
             return CorrectedTrajectory(mark, tuple(points), fault)
-        return CorrectedTrajectory(CORRECTED_FRAME, tuple(done), None)
+        return CorrectedTrajectory(CORRECTED_FRAME, tuple(done), None, held.valid)
 
     def residual_at_task_point(self, correction: Correction) -> tuple[Array, Array] | None:
         """Return the residual as seen from the geometry's tool point.
@@ -355,12 +400,38 @@ class CorrectionStream(Stream):
             return error
         return None
 
-    def _load(self, stamp_ns: int) -> Load:
+    def _load(self, stamp_ns: int, theta: Array) -> Load:
+        """Return the load to correct for."""
         _, measured = self.loads.at(stamp_ns)
+        return self._judged(stamp_ns, theta, measured)
+
+    def _judged(self, stamp_ns: int, theta: Array, measured: Load) -> Load:
+        table = self.running_model().model.table
         # A payload may stand in for it, but a load beyond the table is a fault in any case; turning
         # a wrench changes neither of its sizes, so its frame does not matter.
-        self.running_model().model.table.check_load(measured.wrench)
-        return self.contact.load(stamp_ns, measured, self.settings.contact)
+        table.check_load(measured.wrench)
+        return self.supervisor.judge(
+            stamp_ns,
+            theta.tolist(),
+            measured,
+            table.workspace.configuration(theta).platform,
+            table.geometry,
+            self.settings.supervisor,
+            self.settings.correction_limit,
+        )
+
+    def _held_by(
+        self, stamp_ns: int, points: Sequence[PlannedPoint], places: Sequence[int]
+    ) -> Held:
+        """Return what a plan is corrected for.
+
+        Where no commands come, the loads before the plan are judged as at its first point.
+        """
+        self.loads.at(stamp_ns)
+        start_ns = max(self.supervisor.supervision.stamp_ns, stamp_ns - PLAN_WINDOW_NS)
+        for load_ns, load in self.loads.since(start_ns, stamp_ns) if points else ():
+            self._judged(load_ns, points[0].positions[list(places)], load)
+        return self.supervisor.held()
 
     @property
     def _play(self) -> float:
@@ -394,12 +465,12 @@ class CorrectionStream(Stream):
 
     @staticmethod
     def _faded(
-        running: RunningModel, settings: StreamSettings, correction: Correction
+        running: RunningModel, settings: StreamSettings, correction: Correction, share: float
     ) -> Correction:
-        """Return the correction as the guards let it through."""
+        """Return a share of the correction as the guards let it through."""
         table = running.model.table
         weight = guard_weight(table.workspace, correction.prediction.configuration, settings.safety)
-        return as_applied(correction, weight * correction.delta)
+        return as_applied(correction, share * weight * correction.delta)
 
     def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
         if self.model is None:
@@ -413,11 +484,12 @@ class CorrectionStream(Stream):
         running: RunningModel,
         settings: StreamSettings,
         stamp_ns: int,
-        load: Load,
+        held: Held,
         theta: Array,
         theta_dot: Array | None,
     ) -> Array:
         """Return the corrected angles for planned ones."""
+        load = held.load(running.model.table.workspace.configuration(theta).platform)
         found = self._found(running, settings, stamp_ns, load, theta, theta_dot)
-        delta = self._faded(running, settings, found).delta
+        delta = self._faded(running, settings, found, held.share).delta
         return within_joint_limits(theta, delta, running.model.table.geometry.limits)

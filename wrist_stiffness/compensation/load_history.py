@@ -9,6 +9,7 @@ import numpy as np
 
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.errors import InputError, StaleLoadError
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import Load
 
 NANOSECONDS = 1_000_000_000
@@ -104,8 +105,8 @@ class LoadHistory:
         self._served_ns = (self._stamps[place], max(stamp_ns, self._served_ns[1]))
         return self._stamps[place], self._loads[place]
 
-    def mean_since(self, window_s: float) -> Load:
-        """Return the mean of the newest loads over a window, for the tare.
+    def mean_since(self, window_s: float) -> tuple[Load, Array]:
+        """Return mean and scatter of the newest loads over a window, for the tare.
 
         Parameters
         ----------
@@ -116,6 +117,8 @@ class LoadHistory:
         -------
         Load
             In the frame in which they came.
+        (6,) float
+            Standard deviations [N, N m].
 
         Raises
         ------
@@ -130,7 +133,14 @@ class LoadHistory:
         loads = self._loads[start:]
         if len({load.on_platform for load in loads}) > 1:
             raise InputError("tare: loads in wrist_base and in wrist_platform are mixed")
-        return Load(np.mean([load.wrench for load in loads], axis=0), loads[0].on_platform)
+        wrenches = np.array([load.wrench for load in loads])
+        return Load(wrenches.mean(axis=0), loads[0].on_platform), wrenches.std(axis=0)
+
+    def since(self, start_ns: int, stamp_ns: int) -> list[tuple[int, Load]]:
+        """Return stamps [ns] and loads after one stamp and up to another."""
+        first = bisect.bisect_right(self._stamps, start_ns)
+        last = bisect.bisect_right(self._stamps, stamp_ns)
+        return list(zip(self._stamps[first:last], self._loads[first:last], strict=True))
 
     @property
     def _age_limit_ns(self) -> int:
@@ -151,12 +161,17 @@ class LoadIntake:
     ----------
     history : LoadHistory
         Untared loads by stamp.
+    zero : Load or None
+        What is subtracted, as the last tare found it; may be set to a stored one.
+    scatter : (6,) float
+        Standard deviations of the loads of the last tare [N, N m].
     """
 
     def __init__(self, frames: Frames, age_limit_s: float) -> None:
         self.frames = frames
         self.history = LoadHistory(age_limit_s)
-        self._tare: Load | None = None
+        self.zero: Load | None = None
+        self.scatter = np.zeros(6)
 
     def add(
         self, stamp_ns: int, frame_id: str, force: Sequence[float], moment: Sequence[float]
@@ -172,8 +187,8 @@ class LoadIntake:
         InputError
             If no load has arrived or loads in F and in U are mixed.
         """
-        self._tare = self.history.mean_since(TARE_WINDOW_S)
-        return self._tare
+        self.zero, self.scatter = self.history.mean_since(TARE_WINDOW_S)
+        return self.zero
 
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`).
@@ -184,8 +199,16 @@ class LoadIntake:
             If there is none that is young enough, or the tare was taken in another frame.
         """
         load_stamp_ns, load = self.history.at(stamp_ns)
-        if self._tare is None:
-            return load_stamp_ns, load
-        if self._tare.on_platform != load.on_platform:
+        return load_stamp_ns, self._tared(load)
+
+    def since(self, start_ns: int, stamp_ns: int) -> list[tuple[int, Load]]:
+        """Return stamps [ns] and loads after one stamp and up to another (errors as of `at`)."""
+        found = self.history.since(start_ns, stamp_ns)
+        return [(stamp_ns, self._tared(load)) for stamp_ns, load in found]
+
+    def _tared(self, load: Load) -> Load:
+        if self.zero is None:
+            return load
+        if self.zero.on_platform != load.on_platform:
             raise InputError("load: the tare was taken in another frame than this load")
-        return load_stamp_ns, Load(load.wrench - self._tare.wrench, load.on_platform)
+        return Load(load.wrench - self.zero.wrench, load.on_platform)

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.compensation.contact_policy import POLICIES, ContactSettings
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
 from wrist_stiffness.compensation.intake import MotorNames
 from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.objective import OBJECTIVES
+from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.errors import InputError
 
 ParameterValue = bool | int | float | str
@@ -154,28 +155,26 @@ CORRECTION = (
         upper=0.5,
     ),
     ParameterEntry(
-        "contact_policy",
-        "freeze_in_contact",
-        "what is corrected for in contact: the payload alone, a part of the contact force, or the "
-        "slow part of that",
-        choices=POLICIES,
+        "load_policy",
+        "judge",
+        "what is corrected for: judge: a payload that is recognised or told; follow: every load as "
+        "it is measured, only where it cannot be a contact",
+        choices=("judge", "follow"),
     ),
     ParameterEntry(
         "contact_force_N",
-        0.2,
-        "a force that departs by more from that at enabling is a contact [N]",
-        lower=0.0,
-        upper=1000.0,
-    ),
-    ParameterEntry(
-        "contact_gain", 0.1, "part of the contact force corrected for [-]", lower=0.0, upper=1.0
-    ),
-    ParameterEntry(
-        "contact_lowpass_s",
-        2.0,
-        "time constant of the policy load_lowpass [s]",
+        0.05,
+        "force by which a load departs that is another load; never below five times the scatter "
+        "that the tare found [N]",
         lower=0.001,
         upper=1000.0,
+    ),
+    ParameterEntry(
+        "contact_moment_Nm",
+        0.002,
+        "the same of a moment at O [N m]",
+        lower=0.00001,
+        upper=100.0,
     ),
 )
 
@@ -306,10 +305,8 @@ def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
             domain_fade=radians(values["domain_fade_deg"]),
             singularity_fade=values["singularity_fade"],
         ),
-        contact=ContactSettings(
-            policy=values["contact_policy"],
-            force=values["contact_force_N"],
-            gain=values["contact_gain"],
-            lowpass_s=values["contact_lowpass_s"],
+        supervisor=SupervisorSettings(
+            Thresholds(values["contact_force_N"], values["contact_moment_Nm"]),
+            follow=values["load_policy"] == "follow",
         ),
     )

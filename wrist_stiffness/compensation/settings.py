@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wrist_stiffness.compensation.contact_policy import ContactSettings
 from wrist_stiffness.compensation.intake import Frames, MotorNames
 from wrist_stiffness.compensation.objective import ObjectiveName
 from wrist_stiffness.compensation.safety import SafetySettings
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 
 
@@ -36,8 +36,8 @@ class StreamSettings:
         and there is none [rad].
     safety : SafetySettings
         How the correction may change and where it fades.
-    contact : ContactSettings
-        What is done with a load that depends on the motion.
+    supervisor : SupervisorSettings
+        What of the load is taken for a payload.
     """
 
     motors: MotorNames = field(default_factory=MotorNames)
@@ -48,4 +48,4 @@ class StreamSettings:
     objective: ObjectiveName = "pointing"
     correction_limit: float = float(np.radians(0.5))
     safety: SafetySettings = field(default_factory=SafetySettings)
-    contact: ContactSettings = field(default_factory=ContactSettings)
+    supervisor: SupervisorSettings = field(default_factory=SupervisorSettings)

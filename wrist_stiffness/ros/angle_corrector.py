@@ -57,13 +57,14 @@ class AngleCorrector(WristNode):
         """Return whether commands are corrected."""
         return {
             "enabled": str(self.stream.enabled).lower(),
-            "in contact": str(self.stream.contact.in_contact).lower(),
+            "load": self.stream.supervision.state.value,
         }
 
     def restriction(self) -> str:
         """Return what keeps the node from correcting in full."""
-        if self.stream.enabled and self.stream.contact.in_contact:
-            return f"in contact: {self.stream.settings.contact.policy}"
+        supervision = self.stream.supervision
+        if self.stream.enabled and supervision.text:
+            return f"{supervision.state.value}: {supervision.text}"
         return ""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:

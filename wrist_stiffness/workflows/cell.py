@@ -39,7 +39,7 @@ END_PATIENCE_S = 15.0
 """How long a node may take to end once it is told to."""
 
 CELL_PARAMETERS: dict[str, dict[str, ParameterValue]] = {
-    "angle_corrector": {"contact_policy": "gain", "contact_gain": 1.0}
+    "angle_corrector": {"load_policy": "follow"}
 }
 """The virtual cell's loads are weights: they do not depend on the motion, so there is no loop."""
 

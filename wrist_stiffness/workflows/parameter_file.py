@@ -3,7 +3,7 @@
 /**:
   ros__parameters: {frames: "{ft: {parent: wrist_platform}}"}
 angle_corrector:
-  ros__parameters: {contact_policy: gain, contact_gain: 1.0}
+  ros__parameters: {load_policy: follow}
 """
 
 from __future__ import annotations

@@ -1,0 +1,259 @@
+"""A payload is a weight at a fixed point of the platform; known from measured loads, or told.
+
+Its force is constant in F, along gravity, and its moment follows the pose: that is what tells it
+from a contact.  With axes u, v, down of F, its weight W [N] and the moments Q = W * centre [N m], a
+payload's load at O has no force along u and v and no moment about down, the force W, and
+
+    moment_u = (R' v) . Q        moment_v = -(R' u) . Q
+
+so one pose shows two of the three components of Q, and other poses the third.  Plain floats: the
+arrays have three elements, and this is done for every command.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, isfinite
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.vectors import triad
+from wrist_stiffness.model.error_model import Load
+
+SIGMAS = 3.0
+"""A threshold is this many standard deviations of what one reading may be wrong by."""
+
+ENOUGH = 100
+"""After so many readings a direction counts as known and is learned no further, so that a contact
+that grows slowly is not learned as payload."""
+
+Row = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What the platform carries.
+
+    Parameters
+    ----------
+    mass_kg : float
+        [kg].
+    centre_m : (float, float, float)
+        Its centre of gravity in U, from O [m].
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or the mass is not positive.
+    """
+
+    mass_kg: float
+    centre_m: Row
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not (isfinite(self.mass_kg) and self.mass_kg > 0.0):
+            raise InputError(f"payload: mass {self.mass_kg} kg is not a positive number")
+        if len(self.centre_m) != 3 or not all(map(isfinite, self.centre_m)):
+            raise InputError(f"payload: centre {self.centre_m} m is not three finite numbers")
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """A load that departs by more than these is another load.
+
+    Parameters
+    ----------
+    force, moment : float
+        [N], [N m].
+    """
+
+    force: float
+    moment: float
+
+    def times(self, factor: float) -> Thresholds:
+        """Return a multiple of both."""
+        return Thresholds(factor * self.force, factor * self.moment)
+
+
+@dataclass(slots=True)
+class Reading:
+    """A load along u, v and down, and what its moments say of a payload.
+
+    Parameters
+    ----------
+    side : float
+        Force across gravity [N].
+    weight : float
+        Force along gravity [N].
+    moments : (float, float, float)
+        About u, v and down [N m].
+    rows : (Row, Row)
+        What the first two moments are of Q [-].
+    """
+
+    side: float
+    weight: float
+    moments: Row
+    rows: tuple[Row, Row]
+
+    def size(self, limit: Thresholds) -> float:
+        """Return the load over the thresholds, the larger of force and moment [-]."""
+        force = hypot(self.side, self.weight) / limit.force
+        return max(force, hypot(*self.moments) / limit.moment)
+
+    def is_weight(self, limit: Thresholds) -> bool:
+        """Tell whether some payload could weigh like this."""
+        aside = self.side <= limit.force and abs(self.moments[2]) <= limit.moment
+        return aside and self.weight > limit.force
+
+
+class PayloadEstimate:
+    """Weight and moments of a payload by a Kalman filter of a constant.
+
+    Parameters
+    ----------
+    weight : float
+        [N].
+    moments : (float, float, float)
+        Weight times centre in U [N m].
+    open_moment : float
+        Standard deviation of each moment [N m]; 0 where they are known.
+    """
+
+    def __init__(self, weight: float, moments: Row, open_moment: float) -> None:
+        variance = open_moment * open_moment
+        self.weight, self.moments = weight, moments
+        self._readings = 0 if variance else ENOUGH
+        self._spread = (variance, 0.0, 0.0, variance, 0.0, variance)
+
+    def rest(self, reading: Reading) -> Reading:
+        """Return what of a load the payload does not explain."""
+        first, second = self.shown(reading.rows)
+        about_u, about_v, about_down = reading.moments
+        moments = (about_u - first, about_v - second, about_down)
+        return Reading(reading.side, reading.weight - self.weight, moments, reading.rows)
+
+    def shown(self, rows: tuple[Row, Row]) -> tuple[float, float]:
+        """Return the payload's moments about u and v at a pose [N m]."""
+        (ax, ay, az), (bx, by, bz) = rows
+        x, y, z = self.moments
+        return ax * x + ay * y + az * z, bx * x + by * y + bz * z
+
+    def departure(self, reading: Reading, limit: Thresholds) -> float:
+        """Return how far a load departs, over the thresholds and what poses left open [-]."""
+        left = self.rest(reading)
+        about_u, about_v, about_down = left.moments
+        known = limit.moment * limit.moment
+        open_u, open_v = (
+            known + SIGMAS * SIGMAS * _quadratic(self._spread, row) for row in reading.rows
+        )
+        moment = about_u * about_u / open_u + about_v * about_v / open_v
+        moment += about_down * about_down / known
+        return max(hypot(left.side, left.weight) / limit.force, moment**0.5)
+
+    def update(self, reading: Reading, limit: Thresholds) -> None:
+        """Learn from a load that does not depart."""
+        if self._readings < ENOUGH:
+            self._readings += 1
+            self.weight += (reading.weight - self.weight) / self._readings
+        noise = (limit.moment / SIGMAS) ** 2
+        self._learn(reading.rows[0], reading.moments[0], noise)
+        self._learn(reading.rows[1], reading.moments[1], noise)
+
+    def _learn(self, row: Row, value: float, noise: float) -> None:
+        xx, xy, xz, yy, yz, zz = self._spread
+        a, b, c = row
+        px, py, pz = xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c
+        variance = a * px + b * py + c * pz
+        if ENOUGH * variance <= noise:
+            return
+        x, y, z = self.moments
+        gain = 1.0 / (variance + noise)
+        step = gain * (value - a * x - b * y - c * z)
+        self.moments = x + px * step, y + py * step, z + pz * step
+        self._spread = (
+            xx - gain * px * px,
+            xy - gain * px * py,
+            xz - gain * px * pz,
+            yy - gain * py * py,
+            yz - gain * py * pz,
+            zz - gain * pz * pz,
+        )
+
+
+def _quadratic(spread: tuple[float, ...], row: Row) -> float:
+    xx, xy, xz, yy, yz, zz = spread
+    a, b, c = row
+    return a * a * xx + b * b * yy + c * c * zz + 2.0 * (a * b * xy + a * c * xz + b * c * yz)
+
+
+class Scales:
+    """Weighs on one wrist: reads loads along gravity, and turns payloads into loads.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Gravity, and the largest moment of the table: a payload beyond it is refused anyway.
+    """
+
+    def __init__(self, geometry: Geometry) -> None:
+        self.geometry = geometry
+        self._g = float(np.linalg.norm(geometry.gravity))
+        down = geometry.gravity / self._g
+        frame = triad(down, np.eye(3)[np.argmin(np.abs(down))])
+        self._axes: list[list[float]] = [*frame[:, 1:].T.tolist(), down.tolist()]
+
+    def read(self, wrench: list[float], rotation: list[list[float]]) -> Reading:
+        """Return a load (6,) at O in F [N, N m] on the platform that is turned by (3, 3)."""
+        force_u, force_v, weight = self.along(wrench[:3])
+        side = hypot(force_u, force_v)
+        return Reading(side, weight, self.along(wrench[3:]), self.rows(rotation))
+
+    def rows(self, rotation: list[list[float]]) -> tuple[Row, Row]:
+        """Return what the moments about u and v are of Q, on the platform turned by (3, 3)."""
+        (ux, uy, uz), (vx, vy, vz), _ = self._axes
+        (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = rotation
+        first = (
+            vx * r00 + vy * r10 + vz * r20,
+            vx * r01 + vy * r11 + vz * r21,
+            vx * r02 + vy * r12 + vz * r22,
+        )
+        second = (
+            -ux * r00 - uy * r10 - uz * r20,
+            -ux * r01 - uy * r11 - uz * r21,
+            -ux * r02 - uy * r12 - uz * r22,
+        )
+        return first, second
+
+    def along(self, vector: list[float]) -> Row:
+        """Return a vector (3,) in F along u, v and down."""
+        x, y, z = vector
+        (ux, uy, uz), (vx, vy, vz), (dx, dy, dz) = self._axes
+        return ux * x + uy * y + uz * z, vx * x + vy * y + vz * z, dx * x + dy * y + dz * z
+
+    def load(self, payload: PayloadEstimate, rows: tuple[Row, Row], share: float) -> Load:
+        """Return a share of a payload's load at the pose of a reading's rows, in F."""
+        (ux, uy, uz), (vx, vy, vz), (dx, dy, dz) = self._axes
+        weight = share * payload.weight
+        first, second = (share * each for each in payload.shown(rows))
+        wrench = [weight * dx, weight * dy, weight * dz]
+        wrench += [ux * first + vx * second, uy * first + vy * second, uz * first + vz * second]
+        return Load(np.array(wrench))
+
+    def unknown(self) -> PayloadEstimate:
+        """Return the estimate of a payload of which nothing is known."""
+        return PayloadEstimate(0.0, (0.0, 0.0, 0.0), self.geometry.limits.moment)
+
+    def estimate(self, payload: Payload) -> PayloadEstimate:
+        """Return a payload as an estimate that is known."""
+        weight = payload.mass_kg * self._g
+        x, y, z = payload.centre_m
+        return PayloadEstimate(weight, (weight * x, weight * y, weight * z), 0.0)
+
+    def payload(self, estimate: PayloadEstimate) -> Payload:
+        """Return an estimate as a payload."""
+        x, y, z = (moment / estimate.weight for moment in estimate.moments)
+        return Payload(estimate.weight / self._g, (x, y, z))
