@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
 
 NAME = "wrist_stiffness"
 HERE = Path(__file__).parent
@@ -15,6 +15,21 @@ def shared(pattern: str) -> tuple[str, list[str]]:
     """Return a data_files entry that puts the files of one folder under share/."""
     files = sorted(str(path.relative_to(HERE)) for path in HERE.glob(pattern))
     return f"share/{NAME}/{Path(pattern).parent}", files
+
+
+NATIVE = f"{NAME}/mechanism/native"
+# Without a C compiler the package installs all the same and runs on NumPy alone, slower.  The
+# stable interface makes one build serve every Python; no fused multiply-add, so that all
+# processors round alike.
+native = Extension(
+    f"{NAME}.mechanism._native",
+    sorted(str(path.relative_to(HERE)) for path in (HERE / NATIVE).glob("*.c")),
+    depends=[f"{NATIVE}/wrist.h"],
+    define_macros=[("Py_LIMITED_API", "0x030B0000")],
+    py_limited_api=True,
+    extra_compile_args=["-O3", "-ffp-contract=off"],
+    optional=True,
+)
 
 
 setup(
@@ -29,6 +44,8 @@ setup(
     maintainer_email="maintainers@wrist-stiffness.example",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},
+    ext_modules=[native],
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -67,6 +67,10 @@ def main() -> None:
     clock = count(2, MICROSECOND)
     unlike = np.random.default_rng(0).permutation(SAMPLES)
 
+    compiled = model.compiled
+    if compiled is None:
+        raise SystemExit("this model has no compiled form here: no C compiler at installation?")
+
     def guess(i: int) -> np.ndarray:
         return predictions[i - 1].active
 
@@ -83,7 +87,7 @@ def main() -> None:
 
     lines = {
         "kinematics and domain": lambda i: table.workspace.configuration(theta[i]),
-        "response with contact": lambda i: table.single_pose.respond(
+        "response with contact": lambda i: compiled.respond(
             configurations[i], load.wrench, guess(i)
         ),
         "model.predict": predict,
@@ -98,7 +102,7 @@ def main() -> None:
         ),
         "what cancels the task": lambda i: objective.cancelling(configurations[i], jacobian),
         "residual twist": lambda i: residual_twist(predictions[i], configurations[i].platform),
-        "fixed point from nothing": correction,
+        "fixed point in Python": correction,
         "correct a command": lambda i: correcting.on_command(
             next(clock), "", NAMES, theta[i].tolist()
         ),

@@ -8,12 +8,13 @@ from math import copysign
 
 import numpy as np
 
-from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.objective import DEPENDENT, OBJECTIVES, Objective
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.compiled import CorrectedRows
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.single_motion import log_one
+from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.mechanism.workspace import Workspace
-from wrist_stiffness.model.error_model import Prediction
+from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
 TOLERANCE = 1e-10
 """The search ends where the angles are known to this [rad]; 1e-6 of an encoder step."""
@@ -135,6 +136,28 @@ def _step(missing: float, last_missing: float, last_step: float, play: float) ->
     return -beyond
 
 
+def compiled_task(objective: Objective, play: float) -> Array:
+    """Return an objective as the compiled search takes it, (10,).
+
+    Parameters
+    ----------
+    objective : Objective
+        What to make right.
+    play : float
+        What a motor may leave before its correction moves [rad].
+    """
+    vector = objective.tool_point if objective.name == "tool_point" else objective.normal
+    search = [TOLERANCE, UNCHECKED, ANSWERS, DEPENDENT, MAX_ITERATIONS]
+    return np.array([*search, OBJECTIVES.index(objective.name), *vector, play])
+
+
+def correction_of(found: CorrectedRows, place: int, model: ErrorModel, load: Load) -> Correction:
+    """Return one of n compiled corrections, under its load."""
+    row = found.rows[place]
+    prediction = model.prediction_of(found.predicted, place, load)
+    return Correction(row[:2], row[2:8], prediction, row[14:20].reshape(3, 2))
+
+
 def as_applied(correction: Correction, delta: Array) -> Correction:
     """Return what a correction leaves where only another one near it is applied.
 
@@ -174,4 +197,4 @@ def residual_twist(prediction: Prediction, desired: Array) -> Array:
         Twist at O in F [m, rad].
     """
     rotation, shift = prediction.motion
-    return log_one(rotation.dot(prediction.configuration.platform).dot(desired.T), shift)
+    return log_motion(rotation.dot(prediction.configuration.platform).dot(desired.T), shift)

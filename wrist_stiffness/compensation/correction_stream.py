@@ -8,19 +8,15 @@ from math import isfinite
 
 import numpy as np
 
-from wrist_stiffness.compensation.correction import Correction, as_applied, correct
+from wrist_stiffness.compensation.correction import Correction
+from wrist_stiffness.compensation.corrector import Corrector, faded, search
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.payload import Payload, Thresholds
 from wrist_stiffness.compensation.perishable import require_within_limits
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.running_model import RunningModel
-from wrist_stiffness.compensation.safety import (
-    AppliedCorrection,
-    guard_weight,
-    within_joint_limits,
-)
+from wrist_stiffness.compensation.safety import within_joint_limits
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.compensation.supervisor import Held, Supervision, Supervisor
@@ -43,6 +39,8 @@ PLAN_WINDOW_NS = 2 * NANOSECONDS
 """Of the loads before a plan so many are judged: twice what it takes to know a payload [ns]."""
 
 TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
+
+NOTHING = np.zeros(2)
 
 
 @dataclass(frozen=True)
@@ -121,8 +119,7 @@ class CorrectionStream(Stream):
         super().__init__(model, settings)
         self.supervisor = Supervisor()
         self.active = True
-        self._applied = AppliedCorrection()
-        self._held = np.zeros(2)
+        self._corrector = Corrector()
         self._enabled = enabled
 
     def _used(self, model: ErrorModel) -> ErrorModel:
@@ -165,12 +162,12 @@ class CorrectionStream(Stream):
     @property
     def applied(self) -> Array:
         """What is added to the commands now (2,) [rad]."""
-        return self._applied.value
+        return self._corrector.applied.value
 
     def resume(self, paused_s: float) -> None:
         """Correct again after a pause [s], in which the correction faded as time passed."""
-        self._applied.fade(paused_s, self.settings.safety)
-        self._held = np.zeros(2)
+        self._corrector.applied.fade(paused_s, self.settings.safety)
+        self._corrector.release()
         self.active = True
 
     def tare(self) -> Load:
@@ -216,37 +213,37 @@ class CorrectionStream(Stream):
         theta_dot = self.settings.motors.speeds(names, velocities)
         sent = np.array(positions, dtype=float)
         if frame_id == CORRECTED_FRAME:
-            self._applied.reset()
-            self._held = np.zeros(2)
+            self._corrector.reset()
             self._remember(stamp_ns, theta, None, theta_dot)
             twice = InputError(TWICE) if self.correcting else None
             return CorrectedCommand(frame_id, sent, theta, None, twice)
-        correction: Correction | None = None
-        fault: WristError | None = None
         load: Load | None = None
-        held = np.zeros(2)
+        fault: WristError | None = None
         if self.correcting:
             try:
                 load = self._load(stamp_ns, theta)
-                running = self.running_model()
-                found = self._found(
-                    running, self.settings, stamp_ns, load, theta, theta_dot, self._held, self._play
-                )
-                share = self.supervisor.share(found.jacobian.dot(found.delta))
-                held = found.delta
-                correction = self._faded(running, self.settings, found, share)
             except WristError as error:
                 fault = error
                 if isinstance(error, StaleLoadError):
                     self.supervisor.lost()
-        self._held = held
-        delta = self._advance(stamp_ns, theta, correction)
-        if correction is not None:
-            correction = as_applied(correction, delta)
+        delta, correction = NOTHING, None
+        if self._running is not None:
+            corrected = self._corrector.command(
+                self._running,
+                self.settings,
+                stamp_ns,
+                theta,
+                theta_dot,
+                load,
+                self.supervisor.share,
+            )
+            delta, correction = corrected.delta, corrected.correction
+            fault = fault or corrected.fault
         forgotten = self._remember(stamp_ns, theta + delta, load, theta_dot)
         if self.correcting:
             fault = fault or forgotten
-        sent[list(self.settings.motors.places(names))] = theta + delta
+        first, second = self.settings.motors.places(names)
+        sent[first], sent[second] = (theta + delta).tolist()
         marked = self.correcting or bool(np.any(delta))
         return CorrectedCommand(
             CORRECTED_FRAME if marked else frame_id,
@@ -433,54 +430,8 @@ class CorrectionStream(Stream):
             self._judged(load_ns, points[0].positions[list(places)], load)
         return self.supervisor.held()
 
-    @property
-    def _play(self) -> float:
-        limits = self.running_model().model.table.geometry.limits
-        return self.settings.safety.deadband_steps * limits.encoder_step
-
     @staticmethod
-    def _found(
-        running: RunningModel,
-        settings: StreamSettings,
-        stamp_ns: int,
-        load: Load,
-        theta: Array,
-        theta_dot: Array | None,
-        held: Array | None = None,
-        play: float = 0.0,
-    ) -> Correction:
-        """Return the correction that meets the objective; refused beyond the limit."""
-        table = running.model.table
-        platform = table.geometry.platform
-        objective = Objective(settings.objective, platform.normal, platform.tool_point)
-        predict = running.preview(stamp_ns, load, theta_dot)
-        correction = correct(predict, table.workspace, theta, objective, held, play)
-        largest = max(map(abs, correction.delta.tolist()))
-        if largest > settings.correction_limit:
-            raise InputError(
-                f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
-                f"{np.degrees(settings.correction_limit):g} deg"
-            )
-        return correction
-
-    @staticmethod
-    def _faded(
-        running: RunningModel, settings: StreamSettings, correction: Correction, share: float
-    ) -> Correction:
-        """Return a share of the correction as the guards let it through."""
-        table = running.model.table
-        weight = guard_weight(table.workspace, correction.prediction.configuration, settings.safety)
-        return as_applied(correction, share * weight * correction.delta)
-
-    def _advance(self, stamp_ns: int, theta: Array, correction: Correction | None) -> Array:
-        if self.model is None:
-            return np.zeros(2)
-        wanted = np.zeros(2) if correction is None else correction.delta
-        limits = self.model.table.geometry.limits
-        return self._applied.advance(stamp_ns, theta, wanted, limits, self.settings.safety)
-
     def _planned(
-        self,
         running: RunningModel,
         settings: StreamSettings,
         stamp_ns: int,
@@ -490,6 +441,6 @@ class CorrectionStream(Stream):
     ) -> Array:
         """Return the corrected angles for planned ones."""
         load = held.load(running.model.table.workspace.configuration(theta).platform)
-        found = self._found(running, settings, stamp_ns, load, theta, theta_dot)
-        delta = self._faded(running, settings, found, held.share).delta
+        found = search(running, settings, stamp_ns, load, theta, theta_dot)
+        delta = held.share * faded(running, settings, found)
         return within_joint_limits(theta, delta, running.model.table.geometry.limits)

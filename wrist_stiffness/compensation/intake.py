@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property
 from math import isfinite
 from typing import Literal
 
@@ -17,6 +17,9 @@ from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
 JOINT_STATE, COMMAND = "joint state", "command"
+
+MOST_NAMES = 32
+"""Lists of names whose places are kept."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,14 @@ class MotorNames:
         InputError
             If a motor is missing or named twice.
         """
-        return _places(self, tuple(names), what)
+        names = tuple(names)
+        known = self._known.get(names)
+        if known is None:
+            # A stream says the same names in every message.
+            if len(self._known) >= MOST_NAMES:
+                self._known.clear()
+            known = self._known[names] = self._found(names, what)
+        return known
 
     def angles(
         self, names: Sequence[str], positions: Sequence[float], what: str = JOINT_STATE
@@ -76,7 +86,7 @@ class MotorNames:
         places = self.places(names, what)
         if len(positions) != len(names):
             raise InputError(f"{what}: {len(positions)} positions for {len(names)} names")
-        first, second = (float(positions[place]) for place in places)
+        first, second = float(positions[places[0]]), float(positions[places[1]])
         if not (isfinite(first) and isfinite(second)):
             raise InputError(f"{what}: motor angles ({first}, {second}) are not finite")
         return np.array([first, second])
@@ -101,18 +111,21 @@ class MotorNames:
         speeds = np.array([velocities[place] for place in self.places(names)], dtype=float)
         return speeds if np.all(np.isfinite(speeds)) else None
 
+    @cached_property
+    def _known(self) -> dict[tuple[str, ...], tuple[int, int]]:
+        """Places by the names of a message."""
+        return {}
 
-@lru_cache(maxsize=32)
-def _places(motors: MotorNames, names: tuple[str, ...], what: str) -> tuple[int, int]:
-    # A stream says the same names in every message.
-    found = []
-    for motor in (motors.motor_1, motors.motor_2):
-        count = names.count(motor)
-        if count != 1:
-            count_text = "is missing" if count == 0 else f"is named {count} times"
-            raise InputError(f"{what}: {motor} {count_text} among {', '.join(names) or 'no names'}")
-        found.append(names.index(motor))
-    return found[0], found[1]
+    def _found(self, names: tuple[str, ...], what: str) -> tuple[int, int]:
+        found = []
+        for motor in (self.motor_1, self.motor_2):
+            count = names.count(motor)
+            if count != 1:
+                count_text = "is missing" if count == 0 else f"is named {count} times"
+                listed = ", ".join(names) or "no names"
+                raise InputError(f"{what}: {motor} {count_text} among {listed}")
+            found.append(names.index(motor))
+        return found[0], found[1]
 
 
 def frame_name(frame_id: str) -> str:

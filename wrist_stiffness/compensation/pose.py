@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
-
 import numpy as np
 
+from wrist_stiffness.mechanism.compiled import native
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.single_motion import exp_one
-from wrist_stiffness.mechanism.vectors import skew
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.mechanism.vectors import dot, skew
 
 
 def pose_of_twist(twist: Array) -> tuple[Array, Array]:
@@ -16,20 +15,25 @@ def pose_of_twist(twist: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    twist : (6,) float
+    twist : (..., 6) float
         (translation; rotation) at O in F [m, rad].
 
     Returns
     -------
-    position : (3,) float
+    position : (..., 3) float
         Where the point at O goes [m].
-    quaternion : (4,) float
+    quaternion : (..., 4) float
         Rotation, x y z w with w >= 0 for angles up to pi.
     """
-    u, v, w = twist[3:].tolist()
-    half = 0.5 * sqrt(u * u + v * v + w * w)
-    scale = 0.5 * sin(half) / half if half > 0.0 else 0.5
-    return exp_one(twist)[1], np.array([scale * u, scale * v, scale * w, cos(half)])
+    if native is not None:
+        pose = np.empty((*twist.shape[:-1], 7))
+        native.pose_of_twist(np.ascontiguousarray(twist), pose)
+        return pose[..., :3], pose[..., 3:]
+    half = 0.5 * np.sqrt(dot(twist[..., 3:], twist[..., 3:]))[..., None]
+    # sin(x) / x, with numpy's pi in it.
+    scale = 0.5 * np.sinc(half / np.pi)
+    quaternion = np.concatenate([scale * twist[..., 3:], np.cos(half)], axis=-1)
+    return exp_twist(twist)[1], quaternion
 
 
 def seen_from(point: Array) -> Array:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.mechanism.compiled import CompiledWrist, Flags
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
@@ -31,6 +31,11 @@ class RunningModel:
         Predicts.
     temperatures, covariates : HeldSignals
         What the stream has heard of them.
+
+    Attributes
+    ----------
+    contact : (m,) bool
+        Flange sectors in contact at the last sample, for a model without a memory.
     """
 
     def __init__(
@@ -41,7 +46,7 @@ class RunningModel:
         self._covariates = covariates
         self._session: Session | None = None if model.stateless else model.session()
         self._last_ns = 0
-        self._active: NDArray[np.bool_] | None = None
+        self.contact: Flags = np.zeros(len(model.parts.sectors.gap), dtype=bool)
 
     def advance(
         self, stamp_ns: int, theta: Array, load: Load, theta_dot: Array | None = None
@@ -84,6 +89,11 @@ class RunningModel:
         return taken
 
     @property
+    def compiled(self) -> CompiledWrist | None:
+        """The compiled formulas, where they serve the model and nothing is to be remembered."""
+        return None if self.remembers else self.model.compiled
+
+    @property
     def remembers(self) -> bool:
         """Whether predictions depend on the samples before."""
         return self._session is not None
@@ -102,8 +112,8 @@ class RunningModel:
     def _predict(self, theta: Array, load: Load) -> Prediction:
         # The flanges that touched last are a good guess.  It saves time and leaves no trace: the
         # forces are solved for once more from the flanges that are found, whatever the guess was.
-        prediction = _told(lambda: self.model.predict(theta, load, self._active))
-        self._active = prediction.active
+        prediction = _told(lambda: self.model.predict(theta, load, self.contact))
+        self.contact = prediction.active
         return prediction
 
     def _session_at(self, stamp_ns: int) -> Session | None:

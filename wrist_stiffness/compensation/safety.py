@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.mechanism.compiled import NEVER_NS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
@@ -37,6 +38,12 @@ class SafetySettings:
     deadband_steps: float = 0.15
     domain_fade: float = float(np.radians(2.0))
     singularity_fade: float = 0.05
+
+    def compiled(self, limits: Limits) -> Array:
+        """Return what the compiled formulas must know, with the limits of the joints, (8,)."""
+        joints = np.stack([limits.joint_lower, limits.joint_upper], axis=1).ravel()
+        fades = [self.domain_fade, self.singularity_fade]
+        return np.array([self.slew, LONGEST_STEP_S, *fades, *joints])
 
 
 def guard_weight(
@@ -86,25 +93,27 @@ class AppliedCorrection:
     """What is really added to the commands, and how it moves towards what is wanted.
 
     It begins at zero, so that enabling is a ramp, and ends there at the slew limit.
+
+    Attributes
+    ----------
+    value : (2,) float
+        What was added to the last command [rad].
+    stamp_ns : (1,) int
+        Its stamp [ns].
     """
 
     def __init__(self) -> None:
-        self._applied = np.zeros(2)
-        self._stamp_ns: int | None = None
-
-    @property
-    def value(self) -> Array:
-        """What was added to the last command (2,) [rad]."""
-        return self._applied
+        self.value = np.zeros(2)
+        self.stamp_ns = np.array([NEVER_NS])
 
     def reset(self) -> None:
         """Begin at zero again."""
-        self._applied = np.zeros(2)
+        self.value[:] = 0.0
 
     def fade(self, seconds: float, settings: SafetySettings) -> None:
         """Move towards zero for a time [s] in which no command came."""
         reach = settings.slew * seconds
-        self._applied = self._applied - between(self._applied, -reach, reach)
+        self.value -= between(self.value, -reach, reach)
 
     def advance(
         self, stamp_ns: int, theta: Array, wanted: Array, limits: Limits, settings: SafetySettings
@@ -130,12 +139,13 @@ class AppliedCorrection:
             To be added to the command [rad].
         """
         reach = settings.slew * self._seconds_since_last(stamp_ns)
-        self._applied = self._applied + between(wanted - self._applied, -reach, reach)
-        self._applied = within_joint_limits(theta, self._applied, limits) - theta
-        return self._applied
+        near = self.value + between(wanted - self.value, -reach, reach)
+        self.value[:] = within_joint_limits(theta, near, limits) - theta
+        return self.value.copy()
 
     def _seconds_since_last(self, stamp_ns: int) -> float:
-        last_ns, self._stamp_ns = self._stamp_ns, stamp_ns
-        if last_ns is None:
+        last_ns = int(self.stamp_ns[0])
+        self.stamp_ns[0] = stamp_ns
+        if last_ns == NEVER_NS:
             return 0.0
         return min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)

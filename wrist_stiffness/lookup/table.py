@@ -20,7 +20,6 @@ from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values, mechanism_of
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.mechanism.statics import ContactOperators, component_shares, contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
 
@@ -116,11 +115,6 @@ class Table:
     def map_spline(self) -> BiharmonicSpline:
         """Spline of the rated load's s and phi: the paper's maps."""
         return BiharmonicSpline.fit(self.nodes, self.map_values, self.header.kernel)
-
-    @cached_property
-    def single_pose(self) -> SinglePoseStatics:
-        """The closed form for one pose at a time."""
-        return SinglePoseStatics(self.components, self.geometry.gravity)
 
     def operators_at(
         self, configuration: Configuration, evaluation: Evaluation | None = None

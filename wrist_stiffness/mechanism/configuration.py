@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 
@@ -35,6 +38,39 @@ class Configuration:
     singularity: Array
     dual: Array
     bodies: Array
+    if TYPE_CHECKING:
+        row: ClassVar[Array]
+        """The numbers of one pose, (66,)."""
+
+    @classmethod
+    def of_row(cls, row: Array) -> Configuration:
+        """Return the configuration that the numbers (..., 66) of all fields, in order, stand for.
+
+        Its fields are views, made where they are asked for: a stream needs few of them.
+        """
+        made = object.__new__(cls)
+        vars(made)["row"] = row
+        return made
+
+    def __getattr__(self, name: str) -> Array:
+        """Return a field of `of_row`, or the row of the fields."""
+        if name == "row":
+            value = np.concatenate([np.ravel(each) for each in self._values()])
+        elif name in _PLACES and "row" in vars(self):
+            begin, end, shape = _PLACES[name]
+            value = self.row[..., begin:end].reshape((*self.row.shape[:-1], *shape))
+        else:
+            raise AttributeError(name)
+        vars(self)[name] = value
+        return value
+
+    @property
+    def as_block(self) -> Configuration:
+        """One pose as a stack of one."""
+        return Configuration(*(value[None] for value in self._values()))
+
+    def _values(self) -> list[Array]:
+        return [getattr(self, field.name) for field in fields(self)]
 
     @property
     def rotations(self) -> dict[str, Array]:
@@ -45,3 +81,20 @@ class Configuration:
     def platform(self) -> Array:
         """Rotation U -> F of the rigid platform, (..., 3, 3)."""
         return self.bodies[..., 3, :, :]
+
+
+_SHAPES: dict[str, tuple[int, ...]] = {
+    "theta": (2,),
+    "b": (3,),
+    "c": (3,),
+    "d": (3,),
+    "singularity": (),
+    "dual": (3, 3),
+    "bodies": (len(BODIES), 3, 3),
+}
+_ENDS = np.cumsum([int(np.prod(shape)) for shape in _SHAPES.values()]).tolist()
+_PLACES = {
+    name: (end - int(np.prod(shape)), end, shape)
+    for (name, shape), end in zip(_SHAPES.items(), _ENDS, strict=True)
+}
+"""Where each field begins and ends in a row, and its shape."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.mechanism.compiled import native
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross, dot, skew
 
@@ -37,6 +38,10 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
     shift : (..., 3) float
         Where the point at O goes [m].
     """
+    if twist.ndim == 1 and native is not None:
+        rotation, shift = np.empty((3, 3)), np.empty(3)
+        native.exp_twist(np.ascontiguousarray(twist), rotation, shift)
+        return rotation, shift
     v, w = twist[..., :3], twist[..., 3:]
     angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE
@@ -49,7 +54,7 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
     wv = cross(w, v)
     shift = v + first * wv + second * cross(w, wv)
     turn = skew(w)
-    rotation: Array = np.eye(3) + sine[..., None] * turn + first[..., None] * (turn @ turn)
+    rotation = np.eye(3) + sine[..., None] * turn + first[..., None] * (turn @ turn)
     return rotation, shift
 
 
@@ -91,6 +96,11 @@ def log_motion(rotation: Array, shift: Array) -> Array:
     (..., 6) float
         Twist at O in F [m, rad].
     """
+    if shift.ndim == 1 and native is not None:
+        twist = np.empty(6)
+        one = np.ascontiguousarray(rotation), np.ascontiguousarray(shift)
+        if not native.log_motion(*one, twist):
+            return twist
     w = rotation_vector(rotation)
     angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE

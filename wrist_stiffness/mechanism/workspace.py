@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
+from wrist_stiffness.mechanism.compiled import mechanism_constants, native
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.kinematics import Mechanism, angles_text
-from wrist_stiffness.mechanism.single_pose import SinglePoseKinematics
 from wrist_stiffness.mechanism.vectors import triad
 
 BORDER_POINTS = 721
@@ -61,13 +61,9 @@ class Workspace:
         return centre - self.limits.map_margin * half, centre + self.limits.map_margin * half
 
     @cached_property
-    def _single_pose(self) -> SinglePoseKinematics:
-        return SinglePoseKinematics(self.mechanism)
-
-    @cached_property
-    def _edges(self) -> list[list[float]]:
-        """Lower and upper motor angles of the domain's rectangle by motor [rad]."""
-        return np.transpose(self.rectangle).tolist()
+    def constants(self) -> Array:
+        """What the compiled formulas must know."""
+        return mechanism_constants(self.mechanism, self.rectangle, self.limits)
 
     def operative(self, theta: Array) -> NDArray[np.bool_]:
         """Tell which poses lie in the operative workspace, (...) for `theta` (..., 2) [rad]."""
@@ -132,14 +128,15 @@ class Workspace:
         SingularPoseError
             If |D| is below its limit.
         """
-        theta = np.asarray(theta, dtype=float)
-        configuration = self._single_pose.forward(theta)
-        if configuration is None:
-            # It says why there is none.
-            configuration = self.mechanism.forward(theta)
-        (first_low, first_high), (second_low, second_high) = self._edges
-        theta_1, theta_2 = theta.tolist()
-        if not (first_low <= theta_1 <= first_high and second_low <= theta_2 <= second_high):
+        theta = np.array(theta, dtype=float)
+        if native is not None:
+            row = np.empty(native.CONFIGURATION)
+            if not native.forward(self.constants, theta, row):
+                return Configuration.of_row(row)
+        # It says why there is none.
+        configuration = self.mechanism.forward(theta)
+        low, high = self.rectangle
+        if not ((low <= theta) & (theta <= high)).all():
             low, high = np.degrees(self.rectangle)
             raise UnreachablePoseError(
                 f"motor angles {angles_text(theta)} outside the table's domain "

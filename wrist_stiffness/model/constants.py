@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wrist_stiffness.mechanism.compiled import GROUPS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
-from wrist_stiffness.mechanism.single_pose import GROUPS
 from wrist_stiffness.model.contribution import Contribution, together
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
@@ -26,7 +26,7 @@ class Constants:
     Parameters
     ----------
     screws : (5, 6) float, optional
-        At O in the home frames of `SEATS`, which are the groups of `SinglePoseStatics` [m, rad].
+        At O in the home frames of `SEATS`, which are the groups of `CompiledWrist` [m, rad].
     wrench : (6,) float, optional
         On the platform in F [N, N m].
     gap : (m,) float, optional

@@ -12,21 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.mechanism.compiled import (
+    CompiledWrist,
+    Flags,
+    PredictedRows,
+    compilable,
+    native,
+)
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
+from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.model.batch import Recent, predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.session import Session
 from wrist_stiffness.model.situation import lengths
 from wrist_stiffness.model.stages import AtHome, Evaluable, constants_of, share
+
+IN_F, IN_U = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -110,12 +119,20 @@ class ErrorModel:
         )
 
     @cached_property
-    def single_pose(self) -> SinglePoseStatics:
-        """The closed form for one pose at a time, with the constants' screws and gaps."""
+    def compiled(self) -> CompiledWrist | None:
+        """The closed form with all that is constant, compiled; None where that cannot be had."""
+        if self.evaluation == "spline" or not compilable(self.parts):
+            return None
         own = self.constants
-        if self.parts is self.table.components and own.screws is None and own.gap is None:
-            return self.table.single_pose
-        return SinglePoseStatics(self.parts, self.table.geometry.gravity, own.screws, own.gap)
+        return CompiledWrist(
+            self.table.workspace.constants,
+            self.parts,
+            self.table.geometry.gravity,
+            own.screws,
+            own.gap,
+            1.0 + sum(share or 0.0 for share in self._load_shares),
+            own.wrench,
+        )
 
     @cached_property
     def variations(self) -> tuple[ErrorModel, ...]:
@@ -178,34 +195,45 @@ class ErrorModel:
         """
         if not self.stateless:
             return self.session().advance(Sample(0.0, theta, load))
+        theta, compiled = np.array(theta, dtype=float), self.compiled
+        if compiled is not None:
+            closed = np.zeros(compiled.sectors, dtype=bool) if active is None else active.copy()
+            in_u = IN_U if load.on_platform else IN_F
+            rows = compiled.predict(theta, load.wrench, in_u, closed, None)
+            if not rows.status[0]:
+                return self.prediction_of(rows, 0, load)
+        # The formulas for blocks say what is wrong.
         configuration = self.table.workspace.configuration(theta)
-        wrench = load.in_base(configuration)
-        self.table.check_load(wrench)
-        added = self.constants
-        if self.evaluation == "closed_form":
-            if self._load_shares:
-                wrench = wrench * (1.0 + sum(share or 0.0 for share in self._load_shares))
-            if added.wrench is not None:
-                wrench = wrench + added.wrench
-            twist, _, active = self.single_pose.respond(configuration, wrench, active)
-        else:
-            operators = self.table.operators_at(configuration, self.evaluation)
-            response = respond(operators, wrench, active=active)
-            twist, active = response.twist, response.active
+        self.table.check_load(load.wrench)
+        found = evaluate(self, Sample(0.0, theta, load).block, None)
+        return self._prediction(load, found.twist[0], configuration, found.active[0])
 
+    def prediction_of(self, rows: PredictedRows, place: int, load: Load) -> Prediction:
+        """Return the prediction of one of n samples under its load."""
+        return self._prediction(
+            load,
+            rows.twist[place],
+            Configuration.of_row(rows.configuration[place]),
+            rows.active[place],
+        )
+
+    def _prediction(
+        self, load: Load, twist: Array, configuration: Configuration, active: Flags
+    ) -> Prediction:
         def of_parameters() -> Array:
+            theta = configuration.theta
             moved = [other.predict(theta, load, active).twist for other in self.variations]
             return self.parameter_covariance(twist, moved)
 
-        sensor = added.sensor(configuration)
+        uncertain = self.joint is not None or self.variations
         return Prediction(
             twist,
             configuration,
             active,
             self.table_covariance,
-            sensor,
-            of_parameters,
-            warnings=added.warnings,
+            self.constants.sensor(configuration),
+            of_parameters if uncertain else None,
+            warnings=self.constants.warnings,
         )
 
     @cached_property
@@ -300,24 +328,27 @@ class ErrorModel:
         Parameters
         ----------
         configuration : Configuration
-            Of one pose.
-        twist : (6,) float
+            Of one pose, or of rows.
+        twist : (..., 6) float
             Predicted there [m, rad].
 
         Returns
         -------
-        (6, 6) float
+        (..., 6, 6) float
             Translation first, in F.
         """
+        covariance = np.zeros((*twist.shape, 6))
+        of_size = self.relative_error**2 / 3.0
+        of_step = self.table.geometry.limits.encoder_step**2 / 12.0
+        if native is not None:
+            own = self.table.workspace.constants, configuration.row, twist
+            native.table_covariance(*own, covariance, of_size, of_step)
+            return covariance
         jacobian = self.table.mechanism.jacobian(configuration)
-        step = self.table.geometry.limits.encoder_step
-        covariance = np.zeros((6, 6))
-        covariance[3:, 3:] = jacobian.dot(jacobian.T)
-        covariance *= step**2 / 12.0
-        each = self.relative_error**2 / 3.0
-        x, y, z, u, v, w = twist.tolist()
-        shift, turn = each * (x * x + y * y + z * z), each * (u * u + v * v + w * w)
-        covariance.ravel()[::7] += [shift, shift, shift, turn, turn, turn]
+        covariance[..., 3:, 3:] = of_step * (jacobian @ np.swapaxes(jacobian, -1, -2))
+        for half in (slice(0, 3), slice(3, 6)):
+            square = dot(twist[..., half], twist[..., half])
+            covariance[..., half, half] += of_size * square[..., None, None] * np.eye(3)
         return covariance
 
 

@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
-from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contacts import Held, solve_alike, solve_contacts
@@ -116,8 +116,9 @@ def evaluate(
     start = situation_of(model, with_speeds(block, memory), guess, pose)
     found = staged(model, start, memory, near=near)
     at = found.last
-    if pose is not None and at.given.through is None and "operators" not in at.statics.__dict__:
-        return Evaluated(found, *_settled_one(model.single_pose, pose, at))
+    compiled = None if pose is None or at.given.through is not None else model.compiled
+    if pose is not None and compiled is not None and "operators" not in at.statics.__dict__:
+        return Evaluated(found, *_settled_one(compiled, pose, at))
     return Evaluated(found, *_settled(at))
 
 
@@ -174,10 +175,7 @@ def situation_of(
     pose: Configuration | None = None,
 ) -> Situation:
     """Return a block at its configurations, before any effect that is not constant."""
-    if pose is None:
-        configuration = model.table.mechanism.forward(block.theta)
-    else:
-        configuration = Configuration(*(value[None] for value in vars(pose).values()))
+    configuration = model.table.mechanism.forward(block.theta) if pose is None else pose.as_block
     load = block.load
     if block.load_on_platform:
         halves = load.reshape(-1, 2, 3) @ np.swapaxes(configuration.platform, -1, -2)
@@ -206,7 +204,7 @@ def _settled_alike(
 
 
 def _settled_one(
-    statics: SinglePoseStatics, pose: Configuration, at: Situation
+    wrist: CompiledWrist, pose: Configuration, at: Situation
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return twist (1, 6), force (1, m) and contact state (1, m) of one sample."""
     given = at.given
@@ -214,7 +212,7 @@ def _settled_one(
     limb_1, limb_2, gap = (
         None if value is None else value[0] for value in (given.limb_1, given.limb_2, given.gap)
     )
-    twist, force, active = statics.respond(pose, at.wrench[0], guess, limb_1, limb_2, gap)
+    twist, force, active = wrist.respond(pose, at.wrench[0], guess, limb_1, limb_2, gap)
     if given.both is not None:
         twist = twist + given.both[0]
     return twist[None], force[None], active[None]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.single_motion import exp_one, log_one
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.contribution import LEFT_OUT
 
 
@@ -65,19 +65,19 @@ class Prediction:
         left, right = self.sensor
         if left is None and right is None:
             return self.twist
-        rotation, shift = exp_one(self.twist)
+        rotation, shift = exp_twist(self.twist)
         if right is not None:
-            turned, moved = exp_one(right)
+            turned, moved = exp_twist(right)
             rotation, shift = rotation @ turned, shift + rotation @ moved
         if left is not None:
-            turned, moved = exp_one(left)
+            turned, moved = exp_twist(left)
             rotation, shift = turned @ rotation, moved + turned @ shift
-        return log_one(rotation, shift)
+        return log_motion(rotation, shift)
 
     @property
     def motion(self) -> tuple[Array, Array]:
         """Rotation R_err (3, 3) and shift s (3,) [m]."""
-        return exp_one(self.twist)
+        return exp_twist(self.twist)
 
     @property
     def shift_norm(self) -> float:

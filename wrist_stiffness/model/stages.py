@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
-from wrist_stiffness.mechanism.single_pose import SinglePoseStatics
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.constants import Constants
@@ -67,8 +67,8 @@ class Evaluable(Protocol):
         """What the constant effects add together."""
 
     @property
-    def single_pose(self) -> SinglePoseStatics:
-        """The closed form for one pose at a time, with the constants' screws and gaps."""
+    def compiled(self) -> CompiledWrist | None:
+        """The closed form with all that is constant, compiled; None where that cannot be had."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,293 @@
+"""From a command and its load to what is added to it: search, hysteresis, guards and slew.
+
+Where the model remembers nothing, a block of commands is one compiled loop, and a live command is a
+block of one: so live nodes and replay agree to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from wrist_stiffness.compensation.correction import (
+    Correction,
+    as_applied,
+    compiled_task,
+    correct,
+    correction_of,
+)
+from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.running_model import RunningModel
+from wrist_stiffness.compensation.safety import AppliedCorrection, guard_weight
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.mechanism.compiled import (
+    CompiledCommands,
+    CompiledWrist,
+    CorrectedRows,
+)
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.error_model import IN_F, IN_U, ErrorModel, Load
+
+WANTED = np.ones(1, dtype=bool)
+
+
+class Corrected(NamedTuple):
+    """What is added to one command (2,) [rad], its correction as applied, or why there is none."""
+
+    delta: Array
+    correction: Correction | None
+    fault: WristError | None
+
+
+class Corrector:
+    """What one stream of commands remembers of its corrections."""
+
+    def __init__(self) -> None:
+        self.applied = AppliedCorrection()
+        self._held = np.zeros(2)
+        self._settings_of: tuple[StreamSettings, ErrorModel] | None = None
+        self._task = self._safety = np.zeros(0)
+
+    def release(self) -> None:
+        """Search the next correction from nothing."""
+        self._held[:] = 0.0
+
+    def reset(self) -> None:
+        """Begin at zero again."""
+        self.release()
+        self.applied.reset()
+
+    def command(
+        self,
+        running: RunningModel,
+        settings: StreamSettings,
+        stamp_ns: int,
+        theta: Array,
+        theta_dot: Array | None,
+        load: Load | None,
+        share: Callable[[Array], float],
+    ) -> Corrected:
+        """Correct one command.
+
+        Parameters
+        ----------
+        running : RunningModel
+            Predicts.
+        settings : StreamSettings
+            Objective and limits.
+        stamp_ns : int
+            Of the command [ns].
+        theta : (2,) float
+            Commanded motor angles [rad].
+        theta_dot : (2,) float, optional
+            Their speeds [rad/s].
+        load : Load or None
+            To correct for; None where there shall be no correction, and what is applied fades out.
+        share : callable
+            Which part of a correction is applied, by the platform's turn (3,) [rad].
+        """
+        if load is not None and running.compiled is not None:
+            flags = IN_U if load.on_platform else IN_F
+            own = CompiledCommands(np.array([stamp_ns]), theta, load.wrench, flags, WANTED)
+            block = Correcting(self, running, running.compiled, settings, own)
+            if block.search(0, 1) == 1:
+                block.share[0] = share(block.turn(0))
+                block.apply(0, 1)
+                applied = correction_of(block.found, 0, running.model, load)
+                return Corrected(applied.delta, applied, None)
+        return self.searched(running, settings, stamp_ns, theta, theta_dot, load, share)
+
+    def compiled_settings(self, model: ErrorModel, settings: StreamSettings) -> tuple[Array, Array]:
+        """Return what the compiled search and the compiled guards must know."""
+        if self._settings_of is None or not (
+            self._settings_of[0] is settings and self._settings_of[1] is model
+        ):
+            task = compiled_task(objective_of(model, settings), play_of(model, settings))
+            self._task = np.append(task, settings.correction_limit)
+            self._safety = settings.safety.compiled(model.table.geometry.limits)
+            self._settings_of = settings, model
+        return self._task, self._safety
+
+    def searched(
+        self,
+        running: RunningModel,
+        settings: StreamSettings,
+        stamp_ns: int,
+        theta: Array,
+        theta_dot: Array | None,
+        load: Load | None,
+        share: Callable[[Array], float],
+    ) -> Corrected:
+        """Do the same in Python: for models with a memory, and to say what is wrong."""
+        found: Correction | None = None
+        fault: WristError | None = None
+        held, wanted = self._held.copy(), np.zeros(2)
+        self.release()
+        if load is not None:
+            try:
+                play = play_of(running.model, settings)
+                found = search(running, settings, stamp_ns, load, theta, theta_dot, held, play)
+                self._held[:] = found.delta
+                part = share(found.jacobian.dot(found.delta))
+                wanted = part * faded(running, settings, found)
+            except WristError as error:
+                fault = error
+        limits = running.model.table.geometry.limits
+        delta = self.applied.advance(stamp_ns, theta, wanted, limits, settings.safety)
+        return Corrected(delta, None if found is None else as_applied(found, delta), fault)
+
+
+class Correcting:
+    """A block of commands of a model that remembers nothing, on its way through a corrector.
+
+    Parameters
+    ----------
+    corrector : Corrector
+        Goes on from the command before.
+    running : RunningModel
+        Predicts.
+    compiled : CompiledWrist
+        Its compiled formulas.
+    settings : StreamSettings
+        Objective and limits.
+    commands : CompiledCommands
+        n of them; loads and which are wanted may still be written until they are searched.
+
+    Attributes
+    ----------
+    found : CorrectedRows
+        The corrections.
+    share : (n,) float
+        Part of each that is applied, 1 until it is said [-].
+    faults : dict of int to WristError
+        Why a command that was wanted has no correction, by its place.
+    """
+
+    def __init__(
+        self,
+        corrector: Corrector,
+        running: RunningModel,
+        compiled: CompiledWrist,
+        settings: StreamSettings,
+        commands: CompiledCommands,
+    ) -> None:
+        self._corrector = corrector
+        self._running = running
+        self._compiled = compiled
+        self._settings = settings
+        self._task, self._safety = corrector.compiled_settings(running.model, settings)
+        self.commands = commands
+        n = len(commands.wanted)
+        self.found = CorrectedRows.room(n, compiled.sectors)
+        self.share = np.ones(n)
+        self.faults: dict[int, WristError] = {}
+
+    def search(self, begin: int, end: int) -> int:
+        """Search corrections and return which command is the first that cannot be served."""
+        held, contact = self._corrector._held, self._running.contact
+        return self._compiled.correct(
+            self._task, self.commands, held, contact, self.found, begin, end
+        )[0]
+
+    def turn(self, place: int) -> Array:
+        """Return by how much a correction turns the platform, (3,) [rad]."""
+        row = self.found.rows[place]
+        turn: Array = row[14:20].reshape(3, 2).dot(row[:2])
+        return turn
+
+    def apply(self, begin: int, end: int) -> None:
+        """Let what was searched through the guards."""
+        applied = self._corrector.applied
+        self._compiled.apply(
+            self._safety,
+            self.commands,
+            self.share,
+            applied.value,
+            applied.stamp_ns,
+            self.found,
+            begin,
+            end,
+        )
+
+    def correct(self, begin: int, end: int, share: Callable[[Array], float] | None = None) -> None:
+        """Correct commands whose shares are said, or a single one whose share depends on it."""
+        while begin < end:
+            done = self.search(begin, end)
+            if share is not None and done > begin:
+                self.share[begin] = share(self.turn(begin))
+            self.apply(begin, done)
+            if done < end:
+                self._search_in_python(done, share)
+                done += 1
+            begin = done
+
+    def _search_in_python(self, place: int, share: Callable[[Array], float] | None) -> None:
+        own = self.commands
+        load = Load(own.load[place], bool(own.on_platform[place]))
+        part = float(self.share[place])
+        one = self._corrector.searched(
+            self._running,
+            self._settings,
+            int(own.stamp_ns[place]),
+            own.theta[place],
+            None,
+            load,
+            share or (lambda turn: part),
+        )
+        self.found.applied[place] = one.delta
+        if one.fault is not None:
+            self.faults[place] = one.fault
+        elif one.correction is not None:
+            at = one.correction.prediction
+            self.found.put(place, one.correction.after, at.twist, at.configuration)
+
+
+def search(
+    running: RunningModel,
+    settings: StreamSettings,
+    stamp_ns: int,
+    load: Load,
+    theta: Array,
+    theta_dot: Array | None,
+    held: Array | None = None,
+    play: float = 0.0,
+) -> Correction:
+    """Return the correction that meets the objective; refused beyond the limit.
+
+    Raises
+    ------
+    WristError
+        If there is none, or it is too large.
+    """
+    predict = running.preview(stamp_ns, load, theta_dot)
+    objective = objective_of(running.model, settings)
+    workspace = running.model.table.workspace
+    correction = correct(predict, workspace, theta, objective, held, play)
+    largest = max(map(abs, correction.delta.tolist()))
+    if largest > settings.correction_limit:
+        raise InputError(
+            f"correction of {np.degrees(largest):.4f} deg is larger than the limit "
+            f"{np.degrees(settings.correction_limit):g} deg"
+        )
+    return correction
+
+
+def faded(running: RunningModel, settings: StreamSettings, correction: Correction) -> Array:
+    """Return a correction as the guards let it through, (2,) [rad]."""
+    at = correction.prediction.configuration
+    weight = guard_weight(running.model.table.workspace, at, settings.safety)
+    return weight * correction.delta
+
+
+def objective_of(model: ErrorModel, settings: StreamSettings) -> Objective:
+    """Return what the motors shall make right."""
+    platform = model.table.geometry.platform
+    return Objective(settings.objective, platform.normal, platform.tool_point)
+
+
+def play_of(model: ErrorModel, settings: StreamSettings) -> float:
+    """Return what a motor may leave before its correction moves [rad]."""
+    return settings.safety.deadband_steps * model.table.geometry.limits.encoder_step

@@ -1,0 +1,427 @@
+"""The same kinematics, statics and contact, compiled: for streams, a sample after the other.
+
+For one pose a NumPy call costs more than its arithmetic.  `native/` holds the formulas of
+`kinematics`, `statics`, `contact` and `rigid_motion` for one pose in C; these stay their judges,
+serve where no compiler was at hand, and say why a pose cannot be served.  A block of samples is the
+same code in a loop, so live nodes and replay agree to the bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.cones import GRAM_ROUNDING
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
+from wrist_stiffness.mechanism.contact import NOT_DEFINITE
+from wrist_stiffness.mechanism.geometry import Limits
+from wrist_stiffness.mechanism.influence import LIMB_1, LIMB_2
+from wrist_stiffness.mechanism.kinematics import Mechanism
+from wrist_stiffness.mechanism.vectors import skew
+
+
+def _native() -> Any:
+    try:
+        return import_module("wrist_stiffness.mechanism._native")
+    except ImportError:
+        return None
+
+
+native: Any = _native()
+"""The compiled functions; None where the package was installed without a C compiler."""
+
+Flags = NDArray[np.bool_]
+
+GROUPS = tuple(
+    tuple(name for name in limb if CARRIER[name] == body)
+    for limb, body in (
+        (LIMB_1, "frame"),
+        (LIMB_1, "link_1"),
+        (LIMB_2, "frame"),
+        (LIMB_2, "link_2"),
+        (LIMB_2, "link_3"),
+    )
+)
+"""Elastic components that lie in one limb and turn with one body."""
+
+
+def mechanism_constants(
+    mechanism: Mechanism, rectangle: tuple[Array, Array], limits: Limits
+) -> Array:
+    """Return what `native` must know of a kinematic scheme and its domain."""
+    turn = np.zeros((24, 5))
+    driven = np.stack([mechanism.b0, mechanism.d0])
+    axes = np.stack([mechanism.a1, mechanism.a2])
+    for i in range(2):
+        along = np.outer(axes[i], axes[i])
+        parts = np.stack([along, np.eye(3) - along, skew(axes[i])], axis=-1)
+        columns = [0, 1 + 2 * i, 2 + 2 * i]
+        turn[9 * i : 9 * i + 9, columns] = np.swapaxes(parts, 0, 1).reshape(9, 3)
+        turn[18 + 3 * i : 21 + 3 * i, columns] = np.swapaxes(parts, 1, 2) @ driven[i]
+    homes = [np.stack([each, mechanism.c0, np.cross(each, mechanism.c0)]) for each in driven]
+    return np.concatenate(
+        [
+            turn.ravel(),
+            np.linalg.inv(homes).ravel(),
+            axes.ravel(),
+            [mechanism.b0 @ mechanism.c0, mechanism.c0 @ mechanism.d0],
+            [mechanism.assembly_mode, GRAM_ROUNDING],
+            np.transpose(rectangle).ravel(),
+            [limits.singularity, limits.force, limits.moment],
+        ]
+    )
+
+
+def parts_constants(
+    components: ElasticComponents,
+    gravity: Array,
+    screws: Array | None,
+    opening: Array | None,
+    load_scale: float,
+    load_added: Array | None,
+) -> Array:
+    """Return what `native` must know of the elastic parts and of what is constant."""
+    sectors = components.sectors
+    m, bodies = len(sectors.gap), len(BODIES)
+    flexibility, weight_screw = np.zeros((len(GROUPS), 6, 6)), np.zeros((len(GROUPS), 6, 3))
+    group_of, weight_gap = np.zeros((m, 1)), np.zeros((m, 3))
+    weight = np.zeros((bodies, 6, 3))
+    for group, names in enumerate(GROUPS):
+        carried = np.zeros((6, 3))
+        for name in reversed(names):
+            k = ELASTIC.index(name)
+            own = sectors.component == k
+            here = carried + components.weight_platform_side[k]
+            flexibility[group] += components.flexibility[k]
+            weight_screw[group] += components.flexibility[k] @ here
+            group_of[own] = group
+            weight_gap[own] = sectors.weight_approach[own] + sectors.screw[own] @ here
+            carried = here + components.weight_motor_side[k]
+        weight[BODIES.index(CARRIER[names[0]])] = carried
+    weight[BODIES.index("platform")] = components.platform_weight
+    gap = sectors.gap if opening is None else sectors.gap + opening
+    rows = [group_of, sectors.slide, sectors.screw, weight_gap, gap[:, None]]
+    return np.concatenate(
+        [
+            gravity,
+            [load_scale],
+            np.zeros(6) if load_added is None else load_added,
+            flexibility.ravel(),
+            weight_screw.ravel(),
+            np.zeros(6 * len(GROUPS)) if screws is None else screws.ravel(),
+            weight.ravel(),
+            np.hstack(rows).ravel(),
+            sectors.approach.ravel(),
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class PredictedRows:
+    """What a wrist does at n samples.
+
+    Parameters
+    ----------
+    twist : (n, 6) float
+        Of the platform at O in F [m, rad].
+    configuration : (n, 66) float
+        As `Configuration.of_row` takes them.
+    active : (n, m) bool
+        Sectors in contact.
+    status : (n,) int
+        0 where the sample could be served; of the others the rest is undefined.
+    """
+
+    twist: Array
+    configuration: Array
+    active: Flags
+    status: NDArray[np.uint8]
+
+
+def compilable(components: ElasticComponents) -> bool:
+    """Tell whether the compiled formulas are there and can serve a wrist."""
+    return native is not None and len(components.sectors.gap) <= native.MOST_SECTORS
+
+
+class CompiledCommands(NamedTuple):
+    """Commands with the loads to correct for.
+
+    Stamps (n,) [ns], angles (n, 2) [rad], loads at O (n, 6) [N, N m], which of these are in U (n,),
+    and which commands shall be corrected (n,).
+    """
+
+    stamp_ns: NDArray[np.int64]
+    theta: Array
+    load: Array
+    on_platform: Flags
+    wanted: Flags
+
+
+NEVER_NS = np.iinfo(np.int64).min
+"""Stamp of no command."""
+
+
+@dataclass(frozen=True)
+class CorrectedRows:
+    """Corrections of n commands.
+
+    Parameters
+    ----------
+    rows : (n, 86) float
+        What the properties give.
+    applied : (n, 2) float
+        To be added to the commands, also where no correction was wanted [rad].
+    active : (n, m) bool
+        Sectors in contact at the corrected angles.
+    """
+
+    rows: Array
+    applied: Array
+    active: Flags
+
+    @classmethod
+    def room(cls, n: int, sectors: int) -> CorrectedRows:
+        """Return what is to be filled for n commands and a wrist's flange sectors."""
+        rows, applied = np.empty((n, native.CORRECTED)), np.empty((n, 2))
+        return cls(rows, applied, np.empty((n, sectors), dtype=bool))
+
+    def put(self, place: int, after: Array, twist: Array, configuration: Configuration) -> None:
+        """Write what another search found for one command, as it is applied."""
+        row = self.rows[place]
+        row[:2], row[2:8], row[8:14] = self.applied[place], after, twist
+        row[20:] = configuration.row
+
+    @property
+    def after(self) -> Array:
+        """Residual twist at O in F, (n, 6) [m, rad]."""
+        return self.rows[:, 2:8]
+
+    @property
+    def predicted(self) -> PredictedRows:
+        """What the wrist does at the corrected angles."""
+        status = np.zeros(len(self.rows), dtype=np.uint8)
+        return PredictedRows(self.rows[:, 8:14], self.rows[:, 20:], self.active, status)
+
+
+class CompiledWrist:
+    """One wrist with all that is constant.
+
+    Parameters
+    ----------
+    mechanism : (MECHANISM,) float
+        From `mechanism_constants`.
+    components : ElasticComponents
+        Condensed parts.
+    gravity : (3,) float
+        Acceleration of gravity in F [m/s^2].
+    screws : (5, 6) float, optional
+        Constant screws of `GROUPS`, at O in the home frames of their bodies [m, rad].
+    opening : (m,) float, optional
+        Of the sectors beyond the components' gaps [m].
+    load_scale : float
+        Factor on what the load sensor says.
+    load_added : (6,) float, optional
+        Added to it then, in F [N, N m].
+    """
+
+    def __init__(
+        self,
+        mechanism: Array,
+        components: ElasticComponents,
+        gravity: Array,
+        screws: Array | None = None,
+        opening: Array | None = None,
+        load_scale: float = 1.0,
+        load_added: Array | None = None,
+    ) -> None:
+        self._mechanism = mechanism
+        self.sectors = len(components.sectors.gap)
+        self._parts = parts_constants(components, gravity, screws, opening, load_scale, load_added)
+
+    def respond(
+        self,
+        configuration: Configuration,
+        wrench: Array,
+        active: Flags | None = None,
+        limb_1: Array | None = None,
+        limb_2: Array | None = None,
+        opening: Array | None = None,
+    ) -> tuple[Array, Array, Flags]:
+        """Solve for the platform's twist under a load, with contact and own weight.
+
+        Parameters
+        ----------
+        configuration : Configuration
+            Of one pose.
+        wrench : (6,) float
+            Load on the platform at O in F, as it acts [N, N m].
+        active : (m,) bool, optional
+            First guess of the sectors in contact; leaves no trace in the result.
+        limb_1, limb_2 : (6,) float, optional
+            Further screws in the limbs at O in F [m, rad].
+        opening : (m,) float, optional
+            Further opening of the sectors [m].
+
+        Returns
+        -------
+        twist : (6,) float
+            Of the platform at O in F, first order [m, rad].
+        force : (m,) float
+            Of each sector [N].
+        active : (m,) bool
+            Sectors in contact.
+
+        Raises
+        ------
+        InputError
+            If the flanges' flexibility is not positive definite.
+        """
+        twist, force = np.empty(6), np.empty(self.sectors)
+        closed = np.zeros(self.sectors, dtype=bool) if active is None else active.copy()
+        extras = (None if e is None else np.ascontiguousarray(e) for e in (limb_1, limb_2, opening))
+        row = configuration.row
+        wrench = np.ascontiguousarray(wrench)
+        if native.respond(self._parts, row, wrench, *extras, closed, twist, force, self.sectors):
+            raise InputError(NOT_DEFINITE)
+        return twist, force, closed
+
+    def predict(
+        self, theta: Array, load: Array, on_platform: Flags, closed: Flags, wanted: Flags | None
+    ) -> PredictedRows:
+        """Predict n samples in their order.
+
+        Parameters
+        ----------
+        theta : (n, 2) float
+            Motor angles [rad].
+        load : (n, 6) float
+            As the load sensor says it at O [N, N m].
+        on_platform : (n,) bool
+            Which of them are in U, not in F.
+        closed : (m,) bool
+            First guess of the contact state; afterwards that of the last sample.
+        wanted : (n,) bool, optional
+            Samples to serve; all if None.
+        """
+        n = len(on_platform)
+        rows = PredictedRows(
+            np.empty((n, 6)),
+            np.empty((n, native.CONFIGURATION)),
+            np.empty((n, self.sectors), dtype=bool),
+            np.empty(n, dtype=np.uint8),
+        )
+        native.predict(
+            self._mechanism,
+            self._parts,
+            theta,
+            load,
+            on_platform,
+            closed,
+            wanted,
+            rows.twist,
+            rows.configuration,
+            rows.active,
+            rows.status,
+            self.sectors,
+        )
+        return rows
+
+    def correct(
+        self,
+        task: Array,
+        commands: CompiledCommands,
+        held: Array,
+        closed: Flags,
+        found: CorrectedRows,
+        begin: int = 0,
+        end: int | None = None,
+    ) -> tuple[int, int]:
+        """Correct commands in their order (see `compensation.correction.correct`).
+
+        Parameters
+        ----------
+        task : (11,) float
+            What to make right and how far (see `compensation.corrector`).
+        commands : CompiledCommands
+            n of them.
+        held : (2,) float
+            The correction found before; afterwards that of the last command done [rad].
+        closed : (m,) bool
+            First guess of the contact state; afterwards that of the last command.
+        found : CorrectedRows
+            To be filled.
+        begin, end : int
+            Which of the commands.
+
+        Returns
+        -------
+        int, int
+            Which command comes next, and why it cannot be done; 0 where all are.
+        """
+        return native.correct(
+            self._mechanism,
+            self._parts,
+            task,
+            commands.theta,
+            commands.load,
+            commands.on_platform,
+            commands.wanted,
+            held,
+            closed,
+            found.rows,
+            found.active,
+            self.sectors,
+            begin,
+            len(commands.wanted) if end is None else end,
+        )
+
+    def apply(
+        self,
+        safety: Array,
+        commands: CompiledCommands,
+        share: Array,
+        applied: Array,
+        stamp_ns: NDArray[np.int64],
+        found: CorrectedRows,
+        begin: int = 0,
+        end: int | None = None,
+    ) -> None:
+        """Let corrections through the guards (see `compensation.safety`).
+
+        Parameters
+        ----------
+        safety : (8,) float
+            From `SafetySettings.compiled`.
+        commands : CompiledCommands
+            n of them.
+        share : (n,) float
+            Of the correction [-].
+        applied : (2,) float
+            To the command before; afterwards to the last one [rad].
+        stamp_ns : (1,) int
+            Its stamp [ns].
+        found : CorrectedRows
+            From `correct`; afterwards as it is applied.
+        begin, end : int
+            Which of the commands.
+        """
+        native.apply(
+            self._mechanism,
+            safety,
+            commands.theta,
+            commands.stamp_ns,
+            share,
+            commands.wanted,
+            applied,
+            stamp_ns,
+            found.rows,
+            found.applied,
+            begin,
+            len(commands.wanted) if end is None else end,
+        )

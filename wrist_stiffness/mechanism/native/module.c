@@ -1,0 +1,274 @@
+/* What Python sees: arrays of 64-bit floats in, arrays filled, a status or a place back. */
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include "wrist.h"
+
+enum { MOST_BUFFERS = 12 };
+
+/* Views of the first `count` arguments; None is a null pointer. */
+typedef struct {
+    Py_buffer view[MOST_BUFFERS];
+    int count;
+} Buffers;
+
+static void release(Buffers *all) {
+    while (all->count) {
+        Py_buffer *view = all->view + --all->count;
+        if (view->obj) PyBuffer_Release(view);
+    }
+}
+
+/* Take arrays; `sizes` says how many bytes each must have at least, those filled are marked in
+ * `filled` by their place. */
+static int take(Buffers *all, PyObject *const *args, const Py_ssize_t *sizes, int count,
+                unsigned filled) {
+    for (all->count = 0; all->count < count; all->count++) {
+        Py_buffer *view = all->view + all->count;
+        view->obj = 0;
+        view->buf = 0;
+        if (args[all->count] == Py_None) continue;
+        const int flags = PyBUF_C_CONTIGUOUS | (filled >> all->count & 1 ? PyBUF_WRITABLE : 0);
+        if (PyObject_GetBuffer(args[all->count], view, flags)) {
+            view->obj = 0;
+            release(all);
+            return -1;
+        }
+        if (view->len < sizes[all->count]) {
+            PyErr_Format(PyExc_ValueError, "array %d has %zd bytes, %zd are needed", all->count,
+                         view->len, sizes[all->count]);
+            all->count++;
+            release(all);
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int counted(Py_ssize_t given, Py_ssize_t wanted) {
+    if (given == wanted) return 0;
+    PyErr_Format(PyExc_TypeError, "%zd arguments, not %zd", given, wanted);
+    return -1;
+}
+
+static Py_ssize_t parts_size(long m) {
+    return sizeof(Parts) + m * (sizeof(Sector) + m * sizeof(double));
+}
+
+static int sectors(PyObject *number, long *m) {
+    *m = PyLong_AsLong(number);
+    if (*m >= 0 && *m <= MOST_SECTORS) return 0;
+    if (!PyErr_Occurred()) PyErr_Format(PyExc_ValueError, "%ld sectors", *m);
+    return -1;
+}
+
+static PyObject *forward_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), 2 * sizeof(double), sizeof(Configuration)};
+    Buffers b;
+    if (counted(count, 3) || take(&b, args, sizes, 3, 1u << 2)) return 0;
+    Configuration *at = b.view[2].buf;
+    int status = forward(b.view[0].buf, b.view[1].buf, at);
+    if (!status) status = in_domain(b.view[0].buf, at);
+    release(&b);
+    return PyLong_FromLong(status);
+}
+
+static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    const Py_ssize_t six = 6 * sizeof(double);
+    long m;
+    if (counted(count, 10) || sectors(args[9], &m)) return 0;
+    const Py_ssize_t row = m * sizeof(double);
+    const Py_ssize_t sizes[] = {parts_size(m), sizeof(Configuration), six, six, six, row,
+                                m, six, row};
+    Buffers b;
+    if (take(&b, args, sizes, 9, 7u << 6)) return 0;
+    const int status = respond(b.view[0].buf, (int)m, b.view[1].buf, b.view[2].buf, b.view[3].buf,
+                               b.view[4].buf, b.view[5].buf, b.view[6].buf, b.view[7].buf,
+                               b.view[8].buf);
+    release(&b);
+    return PyLong_FromLong(status);
+}
+
+/* Mechanism, parts, angles (n, 2), loads (n, 6), which of them are in U (n), contact state (m),
+ * which are wanted (n); twists (n, 6), configurations (n, 66), contact states (n, m), statuses (n);
+ * m.  The contact state goes from sample to sample. */
+static PyObject *predict_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    long m;
+    if (counted(count, 12) || sectors(args[11], &m)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[4]), real = sizeof(double);
+    if (n < 0) return 0;
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), 2 * n * real, 6 * n * real, n, m,
+                                n, 6 * n * real, n * sizeof(Configuration), n * m, n};
+    Buffers b;
+    if (take(&b, args, sizes, 11, 1u << 5 | 15u << 7)) return 0;
+    const double *theta = b.view[2].buf, *load = b.view[3].buf;
+    const unsigned char *in_u = b.view[4].buf, *wanted = b.view[6].buf;
+    unsigned char *closed = b.view[5].buf, *states = b.view[9].buf, *statuses = b.view[10].buf;
+    double *twist = b.view[7].buf;
+    Configuration *at = b.view[8].buf;
+    Py_BEGIN_ALLOW_THREADS
+    for (Py_ssize_t i = 0; i < n; i++) {
+        if (wanted && !wanted[i]) continue;
+        statuses[i] = (unsigned char)predict(b.view[0].buf, b.view[1].buf, (int)m, theta + 2 * i,
+                                             load + 6 * i, in_u[i], closed, twist + 6 * i, at + i);
+        for (long j = 0; j < m; j++) states[i * m + j] = closed[j];
+    }
+    Py_END_ALLOW_THREADS
+    release(&b);
+    Py_RETURN_NONE;
+}
+
+/* Mechanism, parts, task, commands (n, 2), loads (n, 6), which are in U (n), which are wanted (n),
+ * the correction held so far (2), contact state (m); answers (n, 86), contact states (n, m); m, where
+ * to begin and to end.  Ends at the first command that it cannot serve and returns its place and
+ * why; a command that is not wanted leaves nothing held. */
+static PyObject *correct_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    long m;
+    if (counted(count, 14) || sectors(args[11], &m)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[5]), real = sizeof(double);
+    const Py_ssize_t begin = PyLong_AsSsize_t(args[12]), end = PyLong_AsSsize_t(args[13]);
+    if (PyErr_Occurred()) return 0;
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), sizeof(Task), 2 * n * real,
+                                6 * n * real, n, n, 2 * real, m, n * sizeof(Corrected), n * m};
+    Buffers b;
+    if (take(&b, args, sizes, 11, 15u << 7)) return 0;
+    const double *command = b.view[3].buf, *load = b.view[4].buf;
+    const unsigned char *in_u = b.view[5].buf, *wanted = b.view[6].buf;
+    double *held = b.view[7].buf;
+    unsigned char *closed = b.view[8].buf, *states = b.view[10].buf;
+    Corrected *out = b.view[9].buf;
+    int status = OK;
+    Py_ssize_t i = begin < 0 ? 0 : begin;
+    Py_BEGIN_ALLOW_THREADS
+    for (; i < end && i < n; i++) {
+        if (wanted[i])
+            status = correct(b.view[0].buf, b.view[1].buf, (int)m, b.view[2].buf, command + 2 * i,
+                             load + 6 * i, in_u[i], held, closed, out + i);
+        if (status) break;
+        for (int motor = 0; motor < 2; motor++) held[motor] = wanted[i] ? out[i].delta[motor] : 0.0;
+        for (long j = 0; j < m; j++) states[i * m + j] = closed[j];
+    }
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return Py_BuildValue("ni", i, status);
+}
+
+/* Mechanism, safety, commands (n, 2), their stamps (n), shares (n), which have a correction (n), the
+ * correction applied so far (2) and when (1); answers (n, 86), what is applied (n, 2); where to begin
+ * and to end. */
+static PyObject *apply_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    if (counted(count, 12)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[5]), real = sizeof(double);
+    const Py_ssize_t begin = PyLong_AsSsize_t(args[10]), end = PyLong_AsSsize_t(args[11]);
+    if (PyErr_Occurred()) return 0;
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), sizeof(Safety), 2 * n * real, 8 * n, n * real, n,
+                                2 * real, 8, n * sizeof(Corrected), 2 * n * real};
+    Buffers b;
+    if (take(&b, args, sizes, 10, 15u << 6)) return 0;
+    const double *command = b.view[2].buf, *share = b.view[4].buf;
+    const int64_t *stamp = b.view[3].buf;
+    const unsigned char *has = b.view[5].buf;
+    double *applied = b.view[6].buf, *sent = b.view[9].buf;
+    Corrected *out = b.view[8].buf;
+    for (Py_ssize_t i = begin < 0 ? 0 : begin; i < end && i < n; i++) {
+        apply_safely(b.view[0].buf, b.view[1].buf, command + 2 * i, stamp[i], share[i],
+                     has[i] ? out + i : 0, applied, b.view[7].buf);
+        for (int motor = 0; motor < 2; motor++) sent[2 * i + motor] = applied[motor];
+    }
+    release(&b);
+    Py_RETURN_NONE;
+}
+
+/* Twists (n, 6) to positions and quaternions (n, 7). */
+static PyObject *pose_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    const Py_ssize_t sizes[] = {0, 0};
+    Buffers b;
+    if (counted(count, 2) || take(&b, args, sizes, 2, 2u)) return 0;
+    const Py_ssize_t n = b.view[0].len / (Py_ssize_t)(6 * sizeof(double));
+    const double *twist = b.view[0].buf;
+    double *pose = b.view[1].buf;
+    if (b.view[1].len < n * 7 * (Py_ssize_t)sizeof(double)) {
+        release(&b);
+        PyErr_SetString(PyExc_ValueError, "too few rows for the poses");
+        return 0;
+    }
+    for (Py_ssize_t i = 0; i < n; i++) pose_of_twist(twist + 6 * i, pose + 7 * i);
+    release(&b);
+    Py_RETURN_NONE;
+}
+
+/* Mechanism, configurations (n, 66), twists (n, 6), variance by size and of a step; (n, 6, 6). */
+static PyObject *covariance_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    Buffers b;
+    if (counted(count, 6)) return 0;
+    const double of_size = PyFloat_AsDouble(args[4]), of_step = PyFloat_AsDouble(args[5]);
+    if (PyErr_Occurred()) return 0;
+    Py_ssize_t sizes[] = {sizeof(Mechanism), 0, 0, 0};
+    if (take(&b, args, sizes, 4, 1u << 3)) return 0;
+    const Py_ssize_t n = b.view[1].len / (Py_ssize_t)sizeof(Configuration);
+    const Py_ssize_t six = 6 * sizeof(double);
+    if (b.view[2].len < n * six || b.view[3].len < 6 * n * six) {
+        release(&b);
+        PyErr_SetString(PyExc_ValueError, "too few rows for the covariances");
+        return 0;
+    }
+    const Configuration *at = b.view[1].buf;
+    const double *twist = b.view[2].buf;
+    double *out = b.view[3].buf;
+    for (Py_ssize_t i = 0; i < n; i++)
+        table_covariance(b.view[0].buf, at + i, twist + 6 * i, of_size, of_step, out + 36 * i);
+    release(&b);
+    Py_RETURN_NONE;
+}
+
+static PyObject *exp_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    const Py_ssize_t sizes[] = {6 * sizeof(double), 9 * sizeof(double), 3 * sizeof(double)};
+    Buffers b;
+    if (counted(count, 3) || take(&b, args, sizes, 3, 6u)) return 0;
+    exp_twist(b.view[0].buf, b.view[1].buf, b.view[2].buf);
+    release(&b);
+    Py_RETURN_NONE;
+}
+
+static PyObject *log_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    const Py_ssize_t sizes[] = {9 * sizeof(double), 3 * sizeof(double), 6 * sizeof(double)};
+    Buffers b;
+    if (counted(count, 3) || take(&b, args, sizes, 3, 4u)) return 0;
+    const int status = log_motion(b.view[0].buf, b.view[1].buf, b.view[2].buf);
+    release(&b);
+    return PyLong_FromLong(status);
+}
+
+#define FAST(name, function, text) \
+    {name, (PyCFunction)(void (*)(void))function, METH_FASTCALL, text}
+
+static PyMethodDef METHODS[] = {
+    FAST("forward", forward_of, "Fill the configuration of one pose in the domain."),
+    FAST("respond", respond_of, "Fill twist, force and contact state at one configuration."),
+    FAST("predict", predict_of, "Fill twists and configurations of n samples in their order."),
+    FAST("correct", correct_of, "Fill the corrections of n commands in their order."),
+    FAST("apply", apply_of, "Let the corrections of n commands through the guards."),
+    FAST("pose_of_twist", pose_of, "Fill positions and quaternions of n twists."),
+    FAST("table_covariance", covariance_of, "Fill the covariances of n predictions."),
+    FAST("exp_twist", exp_of, "Fill rotation and shift of one twist."),
+    FAST("log_motion", log_of, "Fill the twist of one motion; not 0 where it turns too far."),
+    {0, 0, 0, 0},
+};
+
+static struct PyModuleDef MODULE = {
+    PyModuleDef_HEAD_INIT, "_native", "The wrist's formulas, compiled.", -1, METHODS, 0, 0, 0, 0,
+};
+
+PyMODINIT_FUNC PyInit__native(void) {
+    PyObject *module = PyModule_Create(&MODULE);
+    if (module) {
+        PyModule_AddIntConstant(module, "MECHANISM", sizeof(Mechanism) / sizeof(double));
+        PyModule_AddIntConstant(module, "PARTS", sizeof(Parts) / sizeof(double));
+        PyModule_AddIntConstant(module, "TASK", sizeof(Task) / sizeof(double));
+        PyModule_AddIntConstant(module, "SAFETY", sizeof(Safety) / sizeof(double));
+        PyModule_AddIntConstant(module, "CONFIGURATION", sizeof(Configuration) / sizeof(double));
+        PyModule_AddIntConstant(module, "CORRECTED", sizeof(Corrected) / sizeof(double));
+        PyModule_AddIntConstant(module, "MOST_SECTORS", MOST_SECTORS);
+    }
+    return module;
+}
