@@ -49,7 +49,7 @@ def flipped(whole):
 @pytest.mark.parametrize(
     ("damaged", "reason"),
     [
-        (lambda whole: whole[:2000], r"damaged or cut within .*; 0 messages stand before that"),
+        (lambda whole: whole[:2000], r"damaged or cut within .*; 0 messages can be read"),
         (flipped, "does not match its checksum"),
     ],
     ids=["cut", "flipped"],

@@ -52,7 +52,7 @@ def test_a_cut_file_gives_a_prefix_and_says_so(tmp_path, small):
         recording = open_recording(path)
         found = list(recording.messages())
         assert found == entries[: len(found)]
-        assert f"{len(found)} messages stand before that" in recording.damage
+        assert f"{len(found)} messages can be read" in recording.damage
         assert str(length) in recording.damage or "closing magic" in recording.damage
         assert sum(info.count for info in recording.topics) == len(found)
         found_lengths.add(len(found))
@@ -98,7 +98,7 @@ def test_a_cut_between_the_indexes_of_a_chunk_loses_no_topic(
         "/load_estimate": 25,
         "/recording_notes": 1,
     }
-    assert "76 messages stand before that" in recording.damage
+    assert "76 messages can be read" in recording.damage
     assert len(list(recording.messages())) == 76
 
 
@@ -184,8 +184,8 @@ METADATA = "rosbag2_bagfile_information: {{storage_identifier: {}, relative_file
     [
         (None, "does not exist"),
         ({}, "no recording: neither metadata.yaml nor"),
-        ({"metadata.yaml": "a: [unclosed"}, "no rosbag2 metadata"),
-        ({"metadata.yaml": "just text"}, "no rosbag2 metadata"),
+        ({"metadata.yaml": "a: [unclosed"}, "not a YAML file"),
+        ({"metadata.yaml": "just text"}, "'just text' is not a mapping"),
         ({"metadata.yaml": METADATA.format("sqlite3", "a.db3", "")}, "'sqlite3' is not read"),
         ({"metadata.yaml": METADATA.format("mcap", "a.mcap", "")}, "a.mcap .* not found"),
         ({"metadata.yaml": METADATA.format("mcap", "", "")}, "lists no files"),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.recording.mcap_chunk import payloads_in
+from wrist_stiffness.recording.mcap_chunk import contents_of
 from wrist_stiffness.recording.mcap_index import index_mcap
 
 
@@ -19,7 +19,7 @@ def held(chunk, wanted):
     """Return times and payloads by channel as plain lists."""
     return {
         number: (times.tolist(), [bytes(payload) for payload in payloads])
-        for number, (times, payloads) in payloads_in(chunk, wanted).items()
+        for number, (times, payloads) in contents_of(chunk).payloads(wanted).items()
     }
 
 
@@ -34,7 +34,9 @@ def test_the_index_gives_what_a_walk_gives(indexed):
         assert chunk.indexed
         assert held(chunk, wanted) == walked(chunk, wanted)
         # Rows of numbers, not payloads one by one: else the walk was compared with itself.
-        assert any(isinstance(p, np.ndarray) for _, p in payloads_in(chunk, wanted).values())
+        assert any(
+            isinstance(p, np.ndarray) for _, p in contents_of(chunk).payloads(wanted).values()
+        )
 
 
 @pytest.mark.parametrize(

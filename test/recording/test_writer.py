@@ -304,7 +304,7 @@ def test_of_a_live_recording_that_fills_the_disk_all_whole_chunks_are_kept(
     assert found == entries[: len(found)]
     assert len(found) > 250
     assert str(caught.value).endswith(f"; the first {len(found)} messages are kept in {kept}")
-    assert f"{len(found)} messages stand before that" in recording.damage
+    assert f"{len(found)} messages can be read" in recording.damage
     # The next one that fills the disk must not cost this one.
     with (
         pytest.raises(RecordingError, match=f"{kept.name} exists already, a part of an earlier"),

@@ -98,6 +98,13 @@ def text(*allowed: str) -> Schema[str]:
     return read
 
 
+def whole(node: Node) -> int:
+    """Read a whole number."""
+    if isinstance(node.value, bool) or not isinstance(node.value, int):
+        raise node.refuse(f"{short(node)} is not a whole number")
+    return node.value
+
+
 def truth(node: Node) -> bool:
     """Read true or false."""
     if not isinstance(node.value, bool):

@@ -6,7 +6,7 @@ import struct
 import zlib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
-from operator import itemgetter
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,23 +17,26 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.inputs.opening import open_input
 
 RECORD_HEAD = struct.Struct("<BQ")
-MESSAGE_HEAD = struct.Struct("<HIQQ")
-MESSAGE_RECORD = struct.Struct("<BQHIQQ")
-_MESSAGE = np.dtype(
+MESSAGE = np.dtype(
     [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
     + [("log_time", "<u8"), ("publish_time", "<u8")]
 )
-"""The same as `MESSAGE_RECORD`."""
+"""How a message record begins."""
+MESSAGE_HEAD_SIZE = MESSAGE.itemsize - RECORD_HEAD.size
+LAST_TIME_NS = 2**63 - 1
+"""ROS counts nanoseconds in 64 bits with a sign."""
+
+LARGEST_CHUNK = 64 << 20
+"""Recorders write a chunk of about 1 MiB, or of one larger message: a raw picture of 4K has 25 MB.
+More is damage, or meant to take all memory: not a reason to give it."""
 
 Places = NDArray[np.int64]
 Times = NDArray[np.int64]
 Payloads = Sequence[bytes] | NDArray[np.uint8]
 """Payloads one by one, or (m, size) where all have one size."""
-
-# Recorders write about 1 MiB; a size beyond this one is damage, not a reason to take memory.
-_LARGEST_CHUNK = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,32 @@ class Chunk:
     end_ns: int
     indexed: dict[int, Places] = field(default_factory=dict)
 
+    @property
+    def place(self) -> str:
+        """File and byte, for messages."""
+        return f"{self.path.name}: chunk at byte {self.offset}"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Number of messages, first and last log time."""
+
+    count: int
+    first_ns: int
+    last_ns: int
+
+    def joined(self, other: Span) -> Span:
+        """Return the span over both."""
+        return Span(
+            self.count + other.count,
+            min(self.first_ns, other.first_ns),
+            max(self.last_ns, other.last_ns),
+        )
+
+
+Spans = dict[int, Span]
+"""By channel id, of the channels that have messages."""
+
 
 class StoredMessage(NamedTuple):
     """A message as stored."""
@@ -75,8 +104,81 @@ class StoredMessage(NamedTuple):
     payload: bytes
 
 
-def chunk_bytes(chunk: Chunk) -> bytes:
-    """Return the records of a chunk, decompressed and checked.
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """A chunk, unpacked and checked.
+
+    Attributes
+    ----------
+    buffer : bytes
+        Its records.
+    begins : (m,) int array
+        Where its messages begin.
+    heads : (m,) array of `MESSAGE`
+        How they begin.
+    others : list of (int, bytes)
+        Opcode and content of its other records.
+    """
+
+    buffer: bytes
+    begins: Places
+    heads: NDArray[np.void]
+    others: list[tuple[int, bytes]]
+
+    @cached_property
+    def spans(self) -> Spans:
+        """Messages of each channel."""
+        found = {}
+        for number in np.unique(self.heads["channel"]).tolist():
+            times = self.heads["log_time"][self.heads["channel"] == number]
+            found[number] = Span(times.size, int(times.min()), int(times.max()))
+        return found
+
+    def messages(self, left_out: Collection[int]) -> list[StoredMessage]:
+        """Return the messages by log time, ties in the order of the file.
+
+        Parameters
+        ----------
+        left_out : collection of int
+            Channels that are not wanted.
+        """
+        kept = ~np.isin(self.heads["channel"], list(left_out)) if left_out else slice(None)
+        heads, begins = self.heads[kept], self.begins[kept]
+        order = np.argsort(heads["log_time"], kind="stable")
+        heads, begins = heads[order], begins[order]
+        starts = begins + MESSAGE.itemsize
+        ends = begins + RECORD_HEAD.size + heads["length"].astype(np.int64)
+        columns = (heads["log_time"], heads["channel"], starts, ends)
+        buffer = self.buffer
+        return [
+            StoredMessage(time_ns, channel, buffer[start:end])
+            for time_ns, channel, start, end in zip(*(c.tolist() for c in columns), strict=True)
+        ]
+
+    def payloads(self, wanted: Collection[int]) -> dict[int, tuple[Times, Payloads]]:
+        """Return log times [ns] and payloads of some channels, in the order of the file.
+
+        Many times as fast as `messages`, for readers that need no order between channels.
+        """
+        found: dict[int, tuple[Times, Payloads]] = {}
+        for number in wanted:
+            own = self.heads["channel"] == number
+            sizes = self.heads["length"][own].astype(np.int64) - MESSAGE_HEAD_SIZE
+            times = self.heads["log_time"][own].astype(np.int64)
+            starts = self.begins[own] + MESSAGE.itemsize
+            if sizes.size and sizes[0] and (sizes == sizes[0]).all():
+                size = int(sizes[0])
+                rows = _from_each_byte(self.buffer, np.dtype(f"V{size}"))[starts]
+                found[number] = times, rows.view(np.uint8).reshape(-1, size)
+            else:
+                ends = (starts + sizes).tolist()
+                parts = zip(starts.tolist(), ends, strict=True)
+                found[number] = times, [self.buffer[start:end] for start, end in parts]
+        return found
+
+
+def contents_of(chunk: Chunk) -> Contents:
+    """Read a chunk.
 
     Parameters
     ----------
@@ -85,219 +187,126 @@ def chunk_bytes(chunk: Chunk) -> bytes:
 
     Returns
     -------
-    bytes
-        MCAP records one after another.
+    Contents
+        Found by the chunk's own index where that agrees with its bytes, else from record to record.
 
     Raises
     ------
     RecordingError
-        If the bytes cannot be read, decompressed, or do not match size or checksum.
+        If the bytes cannot be read or decompressed, do not match size or checksum, a record is
+        damaged, or a log time is before the stated start or after the last that ROS knows.
     """
-    place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
-    if chunk.uncompressed_size > _LARGEST_CHUNK:
+    buffer = _bytes_of(chunk)
+    found = _by_index(buffer, chunk) or _by_walk(buffer, chunk)
+    times = found.heads["log_time"]
+    if times.size and not chunk.start_ns <= times.min() <= times.max() <= LAST_TIME_NS:
         raise RecordingError(
-            f"{place} states {chunk.uncompressed_size} bytes, more than {_LARGEST_CHUNK}"
+            f"{chunk.place} holds log times {times.min()} to {times.max()} ns, outside of "
+            f"{chunk.start_ns} ns, where it is stated to begin, to {LAST_TIME_NS} ns"
+        )
+    return found
+
+
+def _bytes_of(chunk: Chunk) -> bytes:
+    """Return the records of a chunk, decompressed and checked."""
+    if max(chunk.uncompressed_size, chunk.size) > LARGEST_CHUNK:
+        raise RecordingError(
+            f"{chunk.place} states {max(chunk.uncompressed_size, chunk.size)} bytes, "
+            f"more than {LARGEST_CHUNK}"
         )
     try:
-        with chunk.path.open("rb") as stream:
+        with open_input(chunk.path, RecordingError) as stream:
             stream.seek(chunk.offset)
-            stored = stream.read(chunk.size)
-        records = _decompress(stored, chunk)
-    except (OSError, RuntimeError, zstandard.ZstdError, MemoryError) as error:
-        raise RecordingError(f"{place} cannot be read: {error}") from error
+            records = _unpacked(stream.read(chunk.size), chunk)
+    except (OSError, RuntimeError, ValueError, zstandard.ZstdError) as error:
+        raise RecordingError(f"{chunk.place} cannot be read: {error}") from error
     if len(records) != chunk.uncompressed_size:
         raise RecordingError(
-            f"{place} has {len(records)} bytes, its header states {chunk.uncompressed_size}"
+            f"{chunk.place} has {len(records)} bytes or more, its header states "
+            f"{chunk.uncompressed_size}"
         )
     if chunk.crc and zlib.crc32(records) != chunk.crc:
-        raise RecordingError(f"{place} does not match its checksum {chunk.crc:#010x}")
+        raise RecordingError(f"{chunk.place} does not match its checksum {chunk.crc:#010x}")
     return records
 
 
-def _decompress(stored: bytes, chunk: Chunk) -> bytes:
+def _unpacked(stored: bytes, chunk: Chunk) -> bytes:
+    """Decompress, never to more than one byte beyond the stated size."""
+    size = chunk.uncompressed_size
     match chunk.compression:
         case "":
             return stored
         case "zstd":
-            return zstandard.decompress(stored, max_output_size=chunk.uncompressed_size)
+            # What the frame itself states is what zstandard takes memory for.
+            if (stated := zstandard.frame_content_size(stored)) not in (-1, size):
+                raise ValueError(f"its zstd frame states {stated} bytes, its header {size}")
+            return zstandard.decompress(stored, max_output_size=size)
         case "lz4":
-            return bytes(lz4.frame.decompress(stored))
+            decompressor = lz4.frame.LZ4FrameDecompressor()
+            return bytes(decompressor.decompress(stored, max_length=size + 1))
         case other:
-            raise RuntimeError(f"compression {other!r} is none of '', 'zstd', 'lz4'")
+            raise ValueError(f"compression {other!r} is none of '', 'zstd', 'lz4'")
 
 
-def records_in(buffer: bytes, place: str) -> Iterator[tuple[int, int, int]]:
-    """Iterate over the records in a decompressed chunk.
-
-    Parameters
-    ----------
-    buffer : bytes
-        MCAP records.
-    place : str
-        Where the buffer comes from, for the error's text.
-
-    Yields
-    ------
-    tuple[int, int, int]
-        Opcode, and the slice of the record's content.
-
-    Raises
-    ------
-    RecordingError
-        If a record reaches beyond the buffer.
-    """
+def _records_in(buffer: bytes, chunk: Chunk) -> Iterator[tuple[int, int, int]]:
+    """Iterate over records: opcode, and where head and record end and begin."""
     position, total = 0, len(buffer)
     while position < total:
         if position + RECORD_HEAD.size > total:
-            raise RecordingError(f"{place}: record head cut after {total - position} bytes")
+            raise RecordingError(f"{chunk.place}: record head cut after {total - position} bytes")
         opcode, length = RECORD_HEAD.unpack_from(buffer, position)
-        start = position + RECORD_HEAD.size
-        position = start + length
+        begin, position = position, position + RECORD_HEAD.size + length
         if position > total:
-            raise RecordingError(f"{place}: record of {length} bytes exceeds its chunk")
-        yield opcode, start, position
+            raise RecordingError(f"{chunk.place}: record of {length} bytes exceeds its chunk")
+        if opcode == 0:
+            raise RecordingError(f"{chunk.place}: no record at byte {begin} of it")
+        yield opcode, begin, position
 
 
-def messages_in(chunk: Chunk, left_out: Collection[int] = ()) -> list[StoredMessage]:
-    """Return the messages of a chunk in log-time order, ties in the order of the file.
-
-    Parameters
-    ----------
-    chunk : Chunk
-        Where to read.
-    left_out : Collection[int]
-        Channels whose messages are not wanted.
-
-    Returns
-    -------
-    list[StoredMessage]
-        Of all other channels.
-
-    Raises
-    ------
-    RecordingError
-        If the chunk is damaged, or holds messages older than its header states: reading in order
-        without holding the whole file relies on that time.
-    """
-    buffer = chunk_bytes(chunk)
-    place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
-    messages = []
-    for opcode, start, end in records_in(buffer, place):
-        if opcode == Opcode.MESSAGE:
-            if end - start < MESSAGE_HEAD.size:
-                raise RecordingError(f"{place}: message record of {end - start} bytes is too short")
-            channel_id, _, log_time_ns, _ = MESSAGE_HEAD.unpack_from(buffer, start)
-            if channel_id in left_out:
-                continue
-            payload = buffer[start + MESSAGE_HEAD.size : end]
-            messages.append(StoredMessage(log_time_ns, channel_id, payload))
-    messages.sort(key=itemgetter(0))
-    if messages and messages[0].log_time_ns < chunk.start_ns:
-        raise RecordingError(
-            f"{place} holds log time {messages[0].log_time_ns} ns, "
-            f"before its stated start {chunk.start_ns} ns"
-        )
-    return messages
+def _by_walk(buffer: bytes, chunk: Chunk) -> Contents:
+    begins, others = [], []
+    for opcode, begin, end in _records_in(buffer, chunk):
+        if opcode != Opcode.MESSAGE:
+            others.append((opcode, buffer[begin + RECORD_HEAD.size : end]))
+        elif end - begin < MESSAGE.itemsize:
+            raise RecordingError(
+                f"{chunk.place}: message record of {end - begin} bytes is too short"
+            )
+        else:
+            begins.append(begin)
+    places = np.array(begins, dtype=np.int64)
+    return Contents(buffer, places, _from_each_byte(buffer, MESSAGE)[places], others)
 
 
-def payloads_in(chunk: Chunk, wanted: Collection[int]) -> dict[int, tuple[Times, Payloads]]:
-    """Return log times and payloads of some channels of a chunk, in the order of the file.
-
-    Far faster than `messages_in`, for readers that need no order between channels.
-
-    Parameters
-    ----------
-    chunk : Chunk
-        Where to read.
-    wanted : Collection[int]
-        Channels.
-
-    Returns
-    -------
-    dict[int, tuple[array, Payloads]]
-        Log times [ns] and payloads by channel.
-
-    Raises
-    ------
-    RecordingError
-        If the chunk is damaged.
-    """
-    buffer = chunk_bytes(chunk)
-    place = f"{chunk.path.name}: chunk at byte {chunk.offset}"
-    indexed = _all_messages(buffer, chunk.indexed)
-    if indexed is not None:
-        return _taken(buffer, *indexed, wanted)
-    found: dict[int, tuple[list[int], list[bytes]]] = {number: ([], []) for number in wanted}
-    position, last = 0, len(buffer) - MESSAGE_RECORD.size
-    unpack, skip = MESSAGE_RECORD.unpack_from, RECORD_HEAD.size
-    while position <= last:
-        opcode, length, channel_id, _, log_time_ns, _ = unpack(buffer, position)
-        end = position + skip + length
-        if opcode == Opcode.MESSAGE and channel_id in found:
-            if end > len(buffer):
-                break
-            times, payloads = found[channel_id]
-            times.append(log_time_ns)
-            payloads.append(buffer[position + MESSAGE_RECORD.size : end])
-        position = end
-    # What remains is shorter than a message, or damage that names itself.
-    for _ in records_in(buffer[position:], place):
-        pass
-    return {
-        number: (np.array(times, dtype=np.int64), payloads)
-        for number, (times, payloads) in found.items()
-    }
-
-
-def _all_messages(
-    buffer: bytes, indexed: dict[int, Places]
-) -> tuple[Places, NDArray[np.void]] | None:
-    """Return where the messages of a chunk begin, as its index says, and their heads.
-
-    None where a walk from record to record would not find just these.
-    """
-    begins = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *indexed.values()]))
-    if not begins.size or begins[0] < 0 or begins[-1] + MESSAGE_RECORD.size > len(buffer):
+def _by_index(buffer: bytes, chunk: Chunk) -> Contents | None:
+    """Find the messages by the chunk's index; None where a walk would not find just these."""
+    begins = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *chunk.indexed.values()]))
+    if not begins.size or begins[0] < 0 or begins[-1] + MESSAGE.itemsize > len(buffer):
         return None
-    heads = _from_each_byte(buffer, _MESSAGE)[begins]
-    too_short = heads["length"] < MESSAGE_HEAD.size
-    if (heads["opcode"] != Opcode.MESSAGE).any() or too_short.any():
+    heads = _from_each_byte(buffer, MESSAGE)[begins]
+    lengths = heads["length"]
+    if (heads["opcode"] != Opcode.MESSAGE).any() or (lengths < MESSAGE_HEAD_SIZE).any():
         return None
-    if (heads["length"] > len(buffer)).any():
+    if (lengths > len(buffer)).any():
         return None
-    ends = begins + RECORD_HEAD.size + heads["length"].astype(np.int64)
+    ends = begins + RECORD_HEAD.size + lengths.astype(np.int64)
     before, after = np.append(0, ends), np.append(begins, len(buffer))
-    for start, end in zip(before[before != after], after[before != after], strict=True):
+    if (before > after).any():
+        return None
+    others = []
+    for start, end in zip(before[before < after], after[before < after], strict=True):
+        between = buffer[start:end]
         try:
-            if start > end or any(
-                opcode == Opcode.MESSAGE for opcode, _, _ in records_in(buffer[start:end], "")
-            ):
-                return None
+            for opcode, begin, stop in _records_in(between, chunk):
+                if opcode == Opcode.MESSAGE:
+                    return None
+                others.append((opcode, between[begin + RECORD_HEAD.size : stop]))
         except RecordingError:
             return None
-    return begins, heads
-
-
-def _taken(
-    buffer: bytes, begins: Places, heads: NDArray[np.void], wanted: Collection[int]
-) -> dict[int, tuple[Times, Payloads]]:
-    """Return log times and payloads of channels from where messages begin, and their heads."""
-    found: dict[int, tuple[Times, Payloads]] = {}
-    for number in wanted:
-        own = heads["channel"] == number
-        sizes = heads["length"][own].astype(np.int64) - MESSAGE_HEAD.size
-        times, starts = heads["log_time"][own].astype(np.int64), begins[own] + MESSAGE_RECORD.size
-        if sizes.size and sizes[0] and (sizes == sizes[0]).all():
-            size = int(sizes[0])
-            rows = _from_each_byte(buffer, np.dtype(f"V{size}"))[starts]
-            found[number] = times, rows.view(np.uint8).reshape(-1, size)
-        else:
-            ends = (starts + sizes).tolist()
-            found[number] = times, [buffer[a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
-    return found
+    return Contents(buffer, begins, heads, others)
 
 
 def _from_each_byte(buffer: bytes, kind: np.dtype[np.void]) -> NDArray[np.void]:
     """Return what a buffer holds from each of its bytes on, as far as there are enough of them."""
-    count = len(buffer) - kind.itemsize + 1
-    return np.ndarray((count,), kind, buffer, strides=(1,))
+    count = max(len(buffer) - kind.itemsize + 1, 0)
+    return np.ndarray((count,), kind, buffer if count else None, strides=(1,))

@@ -1,15 +1,20 @@
 """What an MCAP file holds, found by walking over its record heads.
 
 The walk does not need the summary at the end of the file, so a file that was cut (power lost, disk
-full, copy interrupted) is read by the same code as a whole one.  Contents of chunks are skipped;
-they are decompressed here only where nothing else states which channels and how many messages they
-hold.
+full, copy interrupted) is read by the same code as a whole one.  Behind a damaged record it goes on
+at the next that can be one.  Contents of chunks are skipped; they are unpacked here only where
+nothing else states which channels and how many messages they hold.
+
+What stands twice in a file is compared: the summary's channels, schemas and counts with those of
+the data, the checksums of both sections with their bytes.  What differs is told, and the data is
+taken.
 """
 
 from __future__ import annotations
 
 import os
 import struct
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -19,42 +24,40 @@ from typing import BinaryIO
 import mcap.records
 import numpy as np
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.recording.channel import Channel
 from wrist_stiffness.recording.mcap_chunk import (
-    MESSAGE_HEAD,
     RECORD_HEAD,
     Chunk,
-    chunk_bytes,
-    records_in,
+    Contents,
+    Span,
+    Spans,
+    contents_of,
 )
+from wrist_stiffness.recording.mcap_definitions import (
+    UNREADABLE,
+    Definition,
+    Definitions,
+    Key,
+    channels_of,
+    definition,
+    definitions_in,
+    named,
+)
+from wrist_stiffness.recording.mcap_resume import next_record
 
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _INDEX_HEAD = struct.Struct("<HI")
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
 _LONGEST_COMPRESSION_NAME = 16
 # Loose messages are read in runs of about the size of a chunk.
 _LOOSE_RUN_BYTES = 1 << 20
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Number of messages, first and last log time."""
-
-    count: int
-    first_ns: int
-    last_ns: int
-
-    def joined(self, other: Span) -> Span:
-        """Return the span over both."""
-        return Span(
-            self.count + other.count,
-            min(self.first_ns, other.first_ns),
-            max(self.last_ns, other.last_ns),
-        )
+_MOST_FLAWS = 100
+"""A file with more damaged places than this is given up behind the last."""
 
 
 @dataclass(frozen=True)
@@ -63,20 +66,47 @@ class McapIndex:
 
     Attributes
     ----------
-    chunks : list[Chunk]
+    chunks, chunk_spans : list of Chunk, list of Spans
         In the order of the file.
+    definitions : Definitions
+        Channels and schemas as the file has them.
     channels : dict[int, Channel]
         By channel id.
-    spans : dict[int, Span]
-        By channel id, of the channels that have messages.
-    damage : str
-        Empty, or where and why the file ends early.
+    flaws : list of str
+        What is wrong with it, as far as the walk sees.
     """
 
+    path: Path
     chunks: list[Chunk]
+    chunk_spans: list[Spans]
+    definitions: Definitions
     channels: dict[int, Channel]
-    spans: dict[int, Span]
-    damage: str
+    flaws: list[str]
+
+    @property
+    def spans(self) -> Spans:
+        """Messages of the whole file."""
+        return _sum(self.chunk_spans)
+
+    def told(self, spans: Spans) -> str:
+        """Return messages as a text: how many, of which topic, when."""
+        parts = []
+        for number, span in spans.items():
+            topic = self.channels[number].topic if number in self.channels else f"channel {number}"
+            parts.append(f"{span.count} of {topic} ({span.first_ns} to {span.last_ns} ns)")
+        return ", ".join(parts) or "unknown messages"
+
+    def disagreement(self, contents: Contents, position: int) -> str:
+        """Return how the content of a chunk differs from what the file says of it, or nothing."""
+        place, stated = self.chunks[position].place, self.chunk_spans[position]
+        if stated != contents.spans:
+            return f"{place} lists {self.told(stated)}; it holds {self.told(contents.spans)}"
+        if orphans := contents.spans.keys() - self.channels.keys():
+            return f"{place} holds messages of no channel ({sorted(orphans)})"
+        for key, own in definitions_in(contents).items():
+            if (known := self.definitions.get(key, own)) != own:
+                return f"{place} says {named(own)}, not {named(known)}"
+        return ""
 
 
 def index_mcap(path: Path) -> McapIndex:
@@ -90,18 +120,26 @@ def index_mcap(path: Path) -> McapIndex:
     Returns
     -------
     McapIndex
-        What it holds; a cut file gives what stands before the cut.
+        What it holds; a damaged file gives what stands before and behind the damage.
 
     Raises
     ------
     RecordingError
         If the file is empty, no MCAP file, or cannot be opened.
     """
-    try:
-        with path.open("rb") as stream:
+    with open_input(path, RecordingError) as stream:
+        try:
             return _Walk(path, stream).index()
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _sum(parts: list[Spans]) -> Spans:
+    total: Spans = {}
+    for part in parts:
+        for number, span in part.items():
+            total[number] = total[number].joined(span) if number in total else span
+    return total
 
 
 @dataclass
@@ -109,10 +147,17 @@ class _Walk:
     path: Path
     stream: BinaryIO
     chunks: list[Chunk] = field(default_factory=list)
-    chunk_spans: list[dict[int, Span]] = field(default_factory=list)
-    schemas: dict[int, mcap.records.Schema] = field(default_factory=dict)
-    channels: dict[int, mcap.records.Channel] = field(default_factory=dict)
+    chunk_spans: list[Spans] = field(default_factory=list)
+    data: Definitions = field(default_factory=dict)
+    summary: Definitions = field(default_factory=dict)
+    stated: mcap.records.Statistics | None = None
+    flaws: list[str] = field(default_factory=list)
     loose_run_is_open: bool = False
+    data_end: int = 0
+    summary_start: int = 0
+    # Of chunks that were not understood, as far as their index tells.
+    lost: list[Spans] = field(default_factory=list)
+    last_is_lost: bool = False
 
     def index(self) -> McapIndex:
         size = os.fstat(self.stream.fileno()).st_size
@@ -124,61 +169,98 @@ class _Walk:
                 f"{self.path} is no recording: it does not begin as an MCAP file"
                 + (hint if self.path.suffix.lower() == ".csv" else "")
             )
-        damage = self._walk(size)
-        if damage and self.chunk_spans:
-            # The cut may have taken a part of the last chunk's index.
-            self.chunk_spans[-1].clear()
+        self._walk(size)
         self._look_into_chunks()
-        spans: dict[int, Span] = {}
-        for chunk_spans in self.chunk_spans:
-            for channel_id, span in chunk_spans.items():
-                spans[channel_id] = spans[channel_id].joined(span) if channel_id in spans else span
-        if damage:
-            readable = sum(span.count for span in spans.values())
-            damage = f"{self.path.name}: {damage}; {readable} messages stand before that"
-        return McapIndex(self.chunks, self._named_channels(), spans, damage)
+        for key, found in self.summary.items():
+            self._define(key, found, "the summary")
+        index = McapIndex(
+            self.path, self.chunks, self.chunk_spans, self.data, channels_of(self.data), []
+        )
+        self._compare_counts(index)
+        if self.flaws:
+            readable = sum(span.count for span in index.spans.values())
+            self.flaws.append(f"{readable} messages can be read")
+            index.flaws.append(f"{self.path.name}: {'; '.join(self.flaws)}")
+        return index
 
-    def _walk(self, size: int) -> str:
-        """Visit every record; return why the walk ended early, or an empty text."""
+    def _walk(self, size: int) -> None:
+        position = len(MCAP0_MAGIC)
+        while True:
+            try:
+                self.stream.seek(position)
+                opcode, end = self._record(position, size)
+            except UNREADABLE as error:
+                self._forget_last_index()
+                following = next_record(self.stream, position + 1, size)
+                if position + RECORD_HEAD.size > size:
+                    self.flaws.append(f"ends at byte {size} without a footer")
+                    return
+                if following is None or len(self.flaws) >= _MOST_FLAWS:
+                    self.flaws.append(
+                        f"damaged or cut within the record at byte {position} (file of {size} "
+                        f"bytes; {error})"
+                    )
+                    return
+                self.flaws.append(f"damaged from byte {position} to {following} ({error})")
+                position = following
+                continue
+            if opcode == Opcode.FOOTER:
+                if end + len(MCAP0_MAGIC) != size or self.stream.read(8) != MCAP0_MAGIC:
+                    self.flaws.append(f"closing magic missing at byte {end}")
+                return
+            position = end
+
+    def _record(self, position: int, size: int) -> tuple[int, int]:
+        """Take one record; return its opcode and where it ends."""
+        opcode, length = RECORD_HEAD.unpack(self.stream.read(RECORD_HEAD.size))
+        content = position + RECORD_HEAD.size
+        if opcode == 0 or content + length > size:
+            raise ValueError(f"{length} bytes of kind {opcode}")
+        if opcode != Opcode.MESSAGE:
+            self.loose_run_is_open = False
         handlers: dict[int, Callable[[int, int], None]] = {
             Opcode.SCHEMA: self._schema,
             Opcode.CHANNEL: self._channel,
             Opcode.CHUNK: self._chunk,
             Opcode.MESSAGE_INDEX: self._message_index,
             Opcode.MESSAGE: self._loose_message,
+            Opcode.DATA_END: self._data_end,
+            Opcode.STATISTICS: self._statistics,
+            Opcode.FOOTER: self._footer,
         }
-        position = len(MCAP0_MAGIC)
-        while True:
-            head = self.stream.read(RECORD_HEAD.size)
-            if len(head) < RECORD_HEAD.size:
-                return f"ends at byte {size} without a footer"
-            opcode, length = RECORD_HEAD.unpack(head)
-            content = position + RECORD_HEAD.size
-            if opcode == 0 or content + length > size:
-                return f"damaged or cut within the record at byte {position} (file of {size} bytes)"
-            if opcode != Opcode.MESSAGE:
-                self.loose_run_is_open = False
-            if opcode in handlers:
-                try:
-                    handlers[opcode](content, length)
-                except (McapError, struct.error, ValueError) as error:
-                    return f"unreadable record at byte {position} ({error})"
-            position = content + length
-            self.stream.seek(position)
-            if opcode == Opcode.FOOTER:
-                closed = self.stream.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
-                return "" if closed else f"closing magic missing at byte {position}"
+        if opcode in handlers:
+            handlers[opcode](content, length)
+        elif opcode > Opcode.DATA_END:
+            self.last_is_lost = True
+            self.lost.append({})
+        self.stream.seek(content + length)
+        return opcode, content + length
 
-    def _record_stream(self, length: int) -> ReadDataStream:
-        return ReadDataStream(BytesIO(self.stream.read(length)))
+    def _forget_last_index(self) -> None:
+        """Leave the last chunk to be looked into: the damage may have taken a part of its index."""
+        if self.chunk_spans and not self.last_is_lost:
+            self.chunk_spans[-1].clear()
+            self.chunks[-1].indexed.clear()
+        self.last_is_lost = True
+        self.lost.append({})
 
     def _schema(self, _: int, length: int) -> None:
-        schema = mcap.records.Schema.read(self._record_stream(length))
-        self.schemas[schema.id] = schema
+        self._definition(Opcode.SCHEMA, length)
 
     def _channel(self, _: int, length: int) -> None:
-        channel = mcap.records.Channel.read(self._record_stream(length))
-        self.channels[channel.id] = channel
+        self._definition(Opcode.CHANNEL, length)
+
+    def _definition(self, opcode: int, length: int) -> None:
+        key, found = definition(opcode, self.stream.read(length))
+        if self.data_end:
+            self.summary[key] = found
+        else:
+            self._define(key, found, "a later record")
+
+    def _define(self, key: Key, found: Definition, where: str) -> None:
+        known = self.data.setdefault(key, found)
+        if known != found:
+            self.flaws.append(f"{named(known)}; {where} differs: {named(found)}")
 
     def _chunk(self, content: int, length: int) -> None:
         start_ns, end_ns, uncompressed_size, crc, name_length = _CHUNK_HEAD.unpack(
@@ -189,35 +271,31 @@ class _Walk:
         compression = self.stream.read(name_length).decode()
         (size,) = struct.unpack("<Q", self.stream.read(8))
         head_size = _CHUNK_HEAD.size + name_length + 8
-        if head_size + size > length:
+        if head_size + size != length:
             raise ValueError(f"{size} bytes stated in a chunk record of {length} bytes")
+        offset = content + head_size
         self.chunks.append(
-            Chunk(
-                path=self.path,
-                offset=content + head_size,
-                size=size,
-                compression=compression,
-                uncompressed_size=uncompressed_size,
-                crc=crc,
-                start_ns=start_ns,
-                end_ns=end_ns,
-            )
+            Chunk(self.path, offset, size, compression, uncompressed_size, crc, start_ns, end_ns)
         )
         self.chunk_spans.append({})
+        self.last_is_lost = False
 
     def _message_index(self, _: int, length: int) -> None:
         data = self.stream.read(length)
         channel_id, size = _INDEX_HEAD.unpack_from(data)
         entries = np.frombuffer(data, "<u8", size // 8, _INDEX_HEAD.size)
+        if _INDEX_HEAD.size + size != length or size % 16:
+            raise ValueError(f"index of {size} bytes in a record of {length} bytes")
         times = entries[::2]
-        if self.chunks:
+        if not times.size or not (self.chunks or self.lost):
+            return
+        if not self.last_is_lost:
             self.chunks[-1].indexed[channel_id] = entries[1::2].astype(np.int64)
-        if times.size and self.chunk_spans:
-            span = Span(times.size, int(times.min()), int(times.max()))
-            self.chunk_spans[-1][channel_id] = span
+        spans = self.lost[-1] if self.last_is_lost else self.chunk_spans[-1]
+        spans[channel_id] = Span(times.size, int(times.min()), int(times.max()))
 
     def _loose_message(self, content: int, length: int) -> None:
-        channel_id, _, time_ns, _ = MESSAGE_HEAD.unpack(self.stream.read(MESSAGE_HEAD.size))
+        channel_id, _, time_ns, _ = _MESSAGE_HEAD.unpack(self.stream.read(_MESSAGE_HEAD.size))
         begin, end = content - RECORD_HEAD.size, content + length
         if self.loose_run_is_open and self.chunks[-1].size < _LOOSE_RUN_BYTES:
             last = self.chunks.pop()
@@ -233,55 +311,64 @@ class _Walk:
         spans[channel_id] = spans[channel_id].joined(span) if channel_id in spans else span
         self.loose_run_is_open = True
 
+    def _data_end(self, content: int, _: int) -> None:
+        (crc,) = struct.unpack("<I", self.stream.read(4))
+        self.data_end = content - RECORD_HEAD.size
+        self.summary_start = content + 4
+        if crc and self._crc(0, self.data_end) != crc:
+            self.flaws.append(f"the data section does not match its checksum {crc:#010x}")
+
+    def _statistics(self, _: int, length: int) -> None:
+        record = ReadDataStream(BytesIO(self.stream.read(length)))
+        self.stated = mcap.records.Statistics.read(record)
+
+    def _footer(self, content: int, _: int) -> None:
+        start, _, crc = struct.unpack("<QQI", self.stream.read(20))
+        here = content - RECORD_HEAD.size
+        if not self.data_end:
+            self.flaws.append("the end of the data is not marked")
+        elif start != (0 if here == self.summary_start else self.summary_start):
+            self.flaws.append(f"the footer states the summary at {start}, not {self.summary_start}")
+        if crc and self._crc(self.summary_start, content + 16) != crc:
+            self.flaws.append(f"the summary does not match its checksum {crc:#010x}")
+            self.summary.clear()
+            self.stated = None
+
+    def _crc(self, begin: int, end: int) -> int:
+        self.stream.seek(begin)
+        crc = 0
+        for position in range(begin, end, _LOOSE_RUN_BYTES):
+            crc = zlib.crc32(self.stream.read(min(_LOOSE_RUN_BYTES, end - position)), crc)
+        return crc
+
+    def _compare_counts(self, index: McapIndex) -> None:
+        for spans in self.lost:
+            if spans:
+                self.flaws.append(f"lost with its chunk: {index.told(spans)}")
+        if self.stated is None:
+            return
+        found, stated = index.spans, self.stated.channel_message_counts
+        for number in sorted({*found, *stated}):
+            there, count = found[number].count if number in found else 0, stated.get(number, 0)
+            if there != count:
+                topic = index.channels[number].topic if number in index.channels else number
+                self.flaws.append(f"{topic}: {count} messages stated, {there} found")
+
     def _look_into_chunks(self) -> None:
-        """Decompress the chunks that alone can say what they hold.
+        """Unpack the chunks that alone can say what they hold.
 
         A chunk that turns out to be unreadable is left for the reader, which reports it.
         """
+        known = {number for kind, number in (*self.data, *self.summary) if kind == Opcode.CHANNEL}
         indexed = {channel_id for spans in self.chunk_spans for channel_id in spans}
-        channels_are_missing = not indexed <= self.channels.keys()
         for chunk, spans in zip(self.chunks, self.chunk_spans, strict=True):
-            if spans and not channels_are_missing:
+            if spans and indexed <= known:
                 continue
             try:
-                self._look_into(chunk, spans)
-            except (RecordingError, McapError, struct.error, ValueError):
+                contents = contents_of(chunk)
+                definitions = definitions_in(contents)
+            except RecordingError:
                 continue
-
-    def _look_into(self, chunk: Chunk, spans: dict[int, Span]) -> None:
-        buffer = chunk_bytes(chunk)
-        times: dict[int, list[int]] = {}
-        for opcode, start, end in records_in(buffer, self.path.name):
-            if opcode == Opcode.MESSAGE:
-                channel_id, _, time_ns, _ = MESSAGE_HEAD.unpack_from(buffer, start)
-                times.setdefault(channel_id, []).append(time_ns)
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                record = ReadDataStream(BytesIO(buffer[start:end]))
-                if opcode == Opcode.SCHEMA:
-                    schema = mcap.records.Schema.read(record)
-                    self.schemas[schema.id] = schema
-                else:
-                    channel = mcap.records.Channel.read(record)
-                    self.channels[channel.id] = channel
-        for channel_id, found in times.items():
-            spans[channel_id] = Span(len(found), min(found), max(found))
-
-    def _named_channels(self) -> dict[int, Channel]:
-        named = {}
-        for channel in self.channels.values():
-            schema = self.schemas.get(channel.schema_id)
-            named[channel.id] = Channel(
-                topic=channel.topic,
-                ros_type=_ros_type(schema.name) if schema else "",
-                message_encoding=channel.message_encoding,
-                schema_encoding=schema.encoding if schema else "",
-                schema_text=schema.data if schema else b"",
-                type_hash=channel.metadata.get("topic_type_hash", ""),
-            )
-        return named
-
-
-def _ros_type(schema_name: str) -> str:
-    """Return ``package/msg/Type`` where a writer left out the middle."""
-    package, *_, name = schema_name.split("/") if "/" in schema_name else ("", schema_name)
-    return f"{package}/msg/{name}" if package else schema_name
+            for key, found in definitions.items():
+                self._define(key, found, chunk.place)
+            spans.update(contents.spans)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import os
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -11,23 +12,24 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import yaml
 
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording.bag_folder import METADATA_FILE, Bag, bag_of
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.channel import Channel
 from wrist_stiffness.recording.mcap_chunk import (
-    Chunk,
+    Contents,
     Payloads,
+    Span,
     StoredMessage,
     Times,
-    messages_in,
-    payloads_in,
+    contents_of,
 )
-from wrist_stiffness.recording.mcap_index import McapIndex, Span, index_mcap
+from wrist_stiffness.recording.mcap_index import McapIndex, index_mcap
 from wrist_stiffness.recording.messages import Message
 
-METADATA_FILE = "metadata.yaml"
+MOST_OPENED_BYTES = 256 << 20
+"""Of chunks that overlap in time.  A recorder's overlap by as much as a message is late."""
 
 PAYLOADS_AT_A_TIME = 10_000
 """So many of one topic are given together: a chunk has some hundred, and each step of decoding them
@@ -79,16 +81,17 @@ class Recording:
         By name; also those that cannot be decoded.
     """
 
-    def __init__(self, path: Path, indices: list[McapIndex], flaws: list[str], strict: bool):
+    def __init__(self, path: Path, indices: list[McapIndex], bag: Bag, strict: bool):
         self.path = path
         self._indices = indices
         self._strict = strict
         # Texts in order of discovery; a second reading meets the same flaws again.
         self._flaws: dict[str, None] = {}
         self._undecodable: Counter[str] = Counter()
-        for flaw in [*flaws, *(index.damage for index in indices if index.damage)]:
-            self._report(flaw)
         self.topics = _topics_of(indices)
+        flaws = [flaw for index in indices for flaw in index.flaws]
+        for flaw in [*bag.flaws, *flaws, *_check_counts(self.topics, bag.counts)]:
+            self._report(flaw)
 
     @property
     def damage(self) -> str:
@@ -122,17 +125,28 @@ class Recording:
         RecordingError
             If the recording was opened as strict and a chunk is damaged.
         """
-        chunks = [(chunk, index) for index in self._indices for chunk in index.chunks]
+        chunks = [
+            (chunk, index, position)
+            for index in self._indices
+            for position, chunk in enumerate(index.chunks)
+        ]
         waiting = sorted(
-            ((chunk.start_ns, order) for order, (chunk, _) in enumerate(chunks)), reverse=True
+            ((chunk.start_ns, order) for order, (chunk, *_) in enumerate(chunks)), reverse=True
         )
         # Each entry: time and position in the recording of the next message of an opened chunk.
         opened: list[tuple[int, int, int, list[StoredMessage]]] = []
         while waiting or opened:
             while waiting and (not opened or waiting[-1][0] <= opened[0][0]):
                 _, order = waiting.pop()
-                stored = self._load(*chunks[order], topics)
+                stored = self._load(*chunks[order][1:], topics)
                 if stored:
+                    overlapping = sum(chunks[other][0].uncompressed_size for _, other, *_ in opened)
+                    if overlapping > MOST_OPENED_BYTES:
+                        raise RecordingError(
+                            f"{self.path}: {len(opened)} chunks of {overlapping} bytes overlap at "
+                            f"{stored[0].log_time_ns} ns, more than {MOST_OPENED_BYTES}: sort it "
+                            "by time ('mcap sort')"
+                        )
                     heapq.heappush(opened, (stored[0].log_time_ns, order, 0, stored))
             if not opened:
                 return
@@ -177,13 +191,9 @@ class Recording:
                 if channel.topic in topics
             }
             runs: dict[int, list[tuple[Times, Payloads]]] = {number: [] for number in wanted}
-            for chunk in index.chunks:
-                try:
-                    found = payloads_in(chunk, wanted)
-                except RecordingError as error:
-                    self._report(f"{error}, its messages are left out")
-                    continue
-                for number, part in found.items():
+            for position in range(len(index.chunks)):
+                contents = self._contents(index, position)
+                for number, part in contents.payloads(wanted).items() if contents else ():
                     run = runs[number]
                     if run and not _one_more(run, part):
                         yield wanted[number], *_joined(run)
@@ -228,25 +238,30 @@ class Recording:
             yield channel.topic, log_time_ns, message
 
     def _load(
-        self, chunk: Chunk, index: McapIndex, topics: Collection[str] | None
+        self, index: McapIndex, position: int, topics: Collection[str] | None
     ) -> list[StoredMessage]:
-        known = index.channels
-        left_out = (
-            set()
-            if topics is None
-            else {number for number, channel in known.items() if channel.topic not in topics}
-        )
-        try:
-            stored = messages_in(chunk, left_out)
-        except RecordingError as error:
-            self._report(f"{error}, its messages are left out")
+        contents = self._contents(index, position)
+        if contents is None:
             return []
-        orphans = sum(message.channel_id not in known for message in stored)
-        if orphans:
-            self._report(
-                f"{chunk.path.name}: {orphans} messages at byte {chunk.offset} have no channel"
-            )
-        return [message for message in stored if message.channel_id in known] if orphans else stored
+        known = index.channels
+        orphans = [number for number in contents.spans if number not in known]
+        unwanted = [
+            number
+            for number, channel in known.items()
+            if topics is not None and channel.topic not in topics
+        ]
+        return contents.messages([*orphans, *unwanted])
+
+    def _contents(self, index: McapIndex, position: int) -> Contents | None:
+        """Unpack a chunk; report what is wrong with it, None where it cannot be read."""
+        try:
+            contents = contents_of(index.chunks[position])
+            if flaw := index.disagreement(contents, position):
+                self._report(flaw)
+        except RecordingError as error:
+            self._report(f"{error}, left out: {index.told(index.chunk_spans[position])}")
+            return None
+        return contents
 
     def _report(self, flaw: str) -> None:
         if self._strict:
@@ -276,14 +291,11 @@ def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Record
         also if it is cut.
     """
     path = Path(path)
-    flaws: list[str] = []
-    if path.is_dir():
-        files = _files_of_folder(path, flaws)
-    elif path.exists():
-        files = [path]
-    else:
+    # Unlike Path.exists, this one takes a name that is too long or has a zero byte.
+    if not os.path.exists(path):
         raise RecordingError(f"{path} does not exist")
-    return Recording(path, [index_mcap(file) for file in files], flaws, strict)
+    bag = bag_of(path) if path.is_dir() else Bag([path])
+    return Recording(path, [index_mcap(file) for file in bag.files], bag, strict)
 
 
 def _one_more(run: list[tuple[Times, Payloads]], part: tuple[Times, Payloads]) -> bool:
@@ -307,45 +319,12 @@ def _joined(run: list[tuple[Times, Payloads]]) -> tuple[Times, Payloads]:
     return times, [payload for _, payloads in run for payload in payloads]
 
 
-def _files_of_folder(folder: Path, flaws: list[str]) -> list[Path]:
-    metadata_path = folder / METADATA_FILE
-    present = sorted(folder.glob("*.mcap"))
-    if not metadata_path.exists():
-        # The recorder writes it last, so a crash leaves the storage files alone.
-        if not present:
-            raise RecordingError(f"{folder} is no recording: neither {METADATA_FILE} nor *.mcap")
-        flaws.append(f"{METADATA_FILE} is missing, files taken by name")
-        return present
-    listed = _listed_files(metadata_path)
-    missing = [file.name for file in listed if not file.exists()]
-    if missing and len(missing) == len(listed):
-        raise RecordingError(f"{folder}: {', '.join(missing)} of {METADATA_FILE} not found")
-    if missing:
-        flaws.append(f"{', '.join(missing)} of {METADATA_FILE} not found")
-    return [file for file in listed if file.exists()]
-
-
-def _listed_files(metadata_path: Path) -> list[Path]:
-    try:
-        information = yaml.safe_load(metadata_path.read_text(encoding="utf-8"))[
-            "rosbag2_bagfile_information"
-        ]
-        storage = information["storage_identifier"]
-        compression = information.get("compression_mode") or ""
-        names = [str(name) for name in information["relative_file_paths"]]
-    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
-        reason = " ".join(str(error).split())
-        raise RecordingError(f"{metadata_path} is no rosbag2 metadata: {reason}") from error
-    if storage != "mcap":
-        raise RecordingError(f"{metadata_path}: storage {storage!r} is not read, only 'mcap'")
-    if compression.lower() not in ("", "none"):
-        raise RecordingError(
-            f"{metadata_path}: rosbag2 compression mode {compression!r} is not read, only MCAP's "
-            "own chunk compression"
-        )
-    if not names:
-        raise RecordingError(f"{metadata_path} lists no files")
-    return [metadata_path.parent / name for name in names]
+def _check_counts(topics: tuple[TopicInfo, ...], stated: dict[str, int]) -> Iterator[str]:
+    """Yield how the messages found differ from those stated by the metadata."""
+    found = {info.name: info.count for info in topics}
+    for name, count in stated.items():
+        if (there := found.get(name, 0)) != count:
+            yield f"{METADATA_FILE} states {count} messages of {name}, {there} found"
 
 
 def _topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:

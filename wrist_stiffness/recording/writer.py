@@ -16,10 +16,11 @@ import yaml
 from mcap.writer import CompressionType, Writer
 
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.recording.bag_folder import METADATA_FILE
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import Channel, channel_of
 from wrist_stiffness.recording.messages import Message
-from wrist_stiffness.recording.reader import METADATA_FILE, open_recording
+from wrist_stiffness.recording.reader import open_recording
 
 METADATA_VERSION = 9
 CHUNK_BYTES = 128 * 1024

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording.reader import METADATA_FILE
+from wrist_stiffness.recording.bag_folder import METADATA_FILE
 
 STORAGE = ".mcap"
 
@@ -47,7 +48,7 @@ def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
     """
     found: dict[Path, None] = {}
     for path in map(Path, paths):
-        if not path.exists():
+        if not os.path.exists(path):
             raise RecordingError(f"{path} does not exist")
         if is_recording(path) or not path.is_dir():
             found[path] = None
