@@ -173,7 +173,7 @@ class CorrectionStream(Stream):
     def tare(self) -> Load:
         """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
         zero = super().tare()
-        self.supervisor.forget()
+        self.supervisor.restore(None)
         scatter = (SCATTERS * self.loads.scatter).reshape(2, 3).max(axis=1)
         self.supervisor.scatter = Thresholds(*scatter.tolist())
         return zero
@@ -222,6 +222,9 @@ class CorrectionStream(Stream):
         if self.correcting:
             try:
                 load = self._load(stamp_ns, theta)
+                if self.supervisor.since_ns == stamp_ns:
+                    # With another payload the hysteresis begins anew.
+                    self._corrector.release()
             except WristError as error:
                 fault = error
                 if isinstance(error, StaleLoadError):

@@ -77,6 +77,11 @@ class Thresholds:
         """Return a multiple of both."""
         return Thresholds(factor * self.force, factor * self.moment)
 
+    def wider(self, reading: Reading, turn: float) -> Thresholds:
+        """Return thresholds for a load that may seem turned [rad]."""
+        force, moment = hypot(reading.side, reading.weight), hypot(*reading.moments)
+        return Thresholds(self.force + turn * force, self.moment + turn * moment)
+
 
 @dataclass(slots=True)
 class Reading:
@@ -141,6 +146,10 @@ class PayloadEstimate:
         (ax, ay, az), (bx, by, bz) = rows
         x, y, z = self.moments
         return ax * x + ay * y + az * z, bx * x + by * y + bz * z
+
+    def open_moment(self, rows: tuple[Row, Row]) -> float:
+        """Return how far its moments at a pose may be from what is known of them [N m]."""
+        return SIGMAS * max(_quadratic(self._spread, row) for row in rows) ** 0.5
 
     def departure(self, reading: Reading, limit: Thresholds) -> float:
         """Return how far a load departs, over the thresholds and what poses left open [-]."""

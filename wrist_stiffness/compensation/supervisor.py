@@ -55,6 +55,10 @@ SETTLE_S = 0.5
 RAMP_S = 1.0
 """A correction that is allowed again comes in over this time [s]."""
 
+LATE_S = 0.2
+"""So late a load may be, and the motors behind their command: as much as the platform turns in this
+time, a load may seem turned [s]."""
+
 YIELD_S = 0.2
 """A correction that a contact works against is gone after this time [s]."""
 
@@ -62,8 +66,8 @@ RELEASE = 0.5
 """In contact the thresholds are multiplied by this, against chatter."""
 
 LEAST = 10.0
-"""The lightest payload that is recognised, over the threshold of the force: a contact that is taken
-for one shows when it has grown by a tenth."""
+"""The lightest payload that is recognised, over the threshold: a contact that is taken for one
+shows when it has grown by a tenth.  What is left open of a payload's moment may be as much."""
 
 LONGEST_STEP_S = 0.1
 """A pause between commands counts as this much."""
@@ -184,20 +188,21 @@ class Supervisor:
     def __init__(self) -> None:
         self.scatter = Thresholds(0.0, 0.0)
         self._scales: Scales | None = None
+        self._expected: Payload | None = None
+        self._told = False
         self.forget()
 
     def forget(self) -> None:
-        """Know nothing of payload and contact."""
+        """Judge anew; what the gripper told still stands."""
         self._stamp_ns = self._since_ns = 0
         self._state = self._seen = State.UNSURE
         self._text = NO_LOAD
         self._seen_s = self._step_s = self._candidate_s = 0.0
         self._payload: PayloadEstimate | None = None
         self._candidate: PayloadEstimate | None = None
-        self._expected: Payload | None = None
-        self._told = False
         self._weight = self._share = 1.0
         self._touched: list[float] | None = None
+        self._behind: list[float] | None = None
         self._against: Row | None = None
         self._followed: Load | None = None
 
@@ -216,7 +221,7 @@ class Supervisor:
     def restore(self, payload: Payload | None) -> None:
         """Begin anew and expect a payload that was stored: it counts as soon as the load agrees."""
         self.forget()
-        self._expected = payload
+        self._expected, self._told = payload, False
 
     def lost(self) -> None:
         """Hear that no load is known: the payload must be seen again."""
@@ -246,6 +251,11 @@ class Supervisor:
             self._stamp_ns,
             self._since_ns,
         )
+
+    @property
+    def since_ns(self) -> int:
+        """Stamp of the command at which the state began [ns]."""
+        return self._since_ns
 
     @property
     def valid(self) -> bool:
@@ -307,11 +317,12 @@ class Supervisor:
         )
         if self._touched is not None and _apart(theta, self._touched) > reach:
             self._touched = None
-        self._look(reading, limit)
+        known = limit.wider(reading, self._turned(theta))
+        self._look(reading, known)
         if self._seen is State.IN_CONTACT:
-            self._feel(theta, reading, limit)
+            self._feel(theta, reading, known)
         elif self._seen is State.UNSURE and self._state is State.UNSURE:
-            self._weigh(reading, limit, scales)
+            self._weigh(reading, known, LEAST * limit.force, scales)
         elif self._seen is State.HOLDING and self._state is State.HOLDING:
             self._weight = min(1.0, self._weight + self._step_s / RAMP_S)
         if self._payload is None:
@@ -337,6 +348,13 @@ class Supervisor:
             self._share = min(1.0, self._share + self._step_s / RAMP_S)
         return self._share
 
+    def _turned(self, theta: list[float]) -> float:
+        """Return by how much the command has turned within about `LATE_S` [rad]."""
+        first, second = self._behind or theta
+        share = self._step_s / (LATE_S + self._step_s)
+        self._behind = [first + share * (theta[0] - first), second + share * (theta[1] - second)]
+        return _apart(theta, self._behind)
+
     def _look(self, reading: Reading, limit: Thresholds) -> None:
         """See what the load looks like, and believe it when it has looked like that for a while."""
         in_contact = self._state is State.IN_CONTACT
@@ -344,6 +362,9 @@ class Supervisor:
         self._seen_s = self._seen_s + self._step_s if seen is self._seen else 0.0
         self._seen = seen
         patience = SETTLE_S if seen in TRUSTED else JUDGE_S
+        if self._weight < 1.0 and seen is not State.HOLDING:
+            # While its correction comes in, a payload that is none shows at once.
+            patience = 0.0
         if seen is not self._state and self._seen_s >= patience:
             self._enter(seen)
 
@@ -376,10 +397,19 @@ class Supervisor:
         if self._state is State.IN_CONTACT and self._payload is not None:
             if self._weight < 1.0:
                 self._payload, self._weight, self._text = None, 1.0, CHANGES
-            elif self._payload.rest(reading).size(limit) >= reading.size(limit):
+            elif not self._stands(self._payload, reading, limit):
                 self._payload = None
 
-    def _weigh(self, reading: Reading, limit: Thresholds, scales: Scales) -> None:
+    @staticmethod
+    def _stands(payload: PayloadEstimate, reading: Reading, limit: Thresholds) -> bool:
+        """Tell whether a payload may stand in for the load of a contact.
+
+        Only where the load is nearer to it than to nothing, and its moment at this pose is known.
+        """
+        known = payload.open_moment(reading.rows) <= LEAST * limit.moment
+        return known and payload.rest(reading).size(limit) < reading.size(limit)
+
+    def _weigh(self, reading: Reading, limit: Thresholds, least: float, scales: Scales) -> None:
         """Make a weight that stays the payload, unless it was found to be a contact here."""
         if self._candidate is None or self._candidate.departure(reading, limit) > 1.0:
             self._candidate, self._candidate_s = scales.unknown(), 0.0
@@ -388,16 +418,16 @@ class Supervisor:
         if self._candidate_s < SETTLE_S:
             return
         expected = None if self._expected is None else scales.estimate(self._expected)
-        if expected is not None and expected.departure(reading, limit) <= 1.0:
-            self._payload = expected
-            self._enter(State.HOLDING)
-        elif self._candidate.weight < LEAST * limit.force:
-            self._text = LIGHT
-        elif self._touched is not None:
+        if expected is not None and expected.departure(reading, limit) > 1.0:
+            expected = None
+        if self._touched is not None:
             self._text = CHANGES
+        elif expected is None and self._candidate.weight < least:
+            self._text = LIGHT
         else:
-            self._payload, self._weight = self._candidate, 0.0
-            self._expected, self._told = None, False
+            if expected is None:
+                self._expected, self._told = None, False
+            self._payload, self._weight = expected or self._candidate, 0.0
             self._enter(State.HOLDING)
 
 

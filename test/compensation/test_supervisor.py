@@ -1,0 +1,313 @@
+"""The supervisor of the load: what it believes, and that it lets no measured load through."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wrist_stiffness.compensation import supervisor as module
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.payload import Payload, Thresholds
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.supervisor import State, Supervisor, SupervisorSettings
+from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.error_model import ErrorModel, Load
+
+SECOND = 1_000_000_000
+NAMES = ("motor_1_joint", "motor_2_joint")
+REACH = np.radians(0.5)
+HERE, THERE = np.array([0.1, -0.2]), np.array([-0.3, 0.25])
+PART = Payload(0.2, (0.01, -0.02, 0.03))
+NOTHING = np.zeros(6)
+AGREED = 1e-5  # N m, of thresholds of 2e-3: what the first guess of the centre leaves
+
+
+class Cell:
+    """Loads at 100 Hz for a supervisor, with a correction that turns the platform by `turn`."""
+
+    def __init__(self, table, settings=None, turn=(0.0, 0.0, 0.0)):
+        self.table, self.settings = table, settings or SupervisorSettings()
+        self.supervisor, self.turn = Supervisor(), np.array(turn)
+        self.theta, self.stamp, self.states = HERE, SECOND, []
+        self.corrected = NOTHING
+
+    def rotation(self):
+        return self.table.mechanism.forward(self.theta).platform
+
+    def weight(self, payload):
+        """Return the load of a payload by the definition of weight and moment (6,)."""
+        force = payload.mass_kg * self.table.geometry.gravity
+        return np.concatenate([force, np.cross(self.rotation() @ payload.centre_m, force)])
+
+    def feel(self, seconds, load, theta=None, on_platform=False):
+        """Let a load (6,), a payload, or a function of the share of the correction act."""
+        self.theta = self.theta if theta is None else theta
+        rotation = self.rotation()
+        for _ in range(round(100 * seconds)):
+            self.stamp += SECOND // 100
+            acting = load
+            if callable(load):
+                acting = load(self.supervisor.supervision.share, self.corrected)
+            if isinstance(load, Payload):
+                acting = self.weight(load)
+            wrench = np.asarray(acting, dtype=float)
+            if on_platform:
+                wrench = np.concatenate([rotation.T @ each for each in wrench.reshape(2, 3)])
+            self.corrected = self.supervisor.judge(
+                self.stamp,
+                self.theta.tolist(),
+                Load(wrench, on_platform),
+                rotation,
+                self.table.geometry,
+                self.settings,
+                REACH,
+            ).wrench
+            self.supervisor.share(self.turn)
+            state = self.supervisor.supervision.state
+            if [state] != self.states[-1:]:
+                self.states.append(state)
+        return self.supervisor.supervision
+
+
+@pytest.fixture
+def cell(table):
+    return Cell(table)
+
+
+def side(newtons, newton_metres=0.0):
+    return np.array([newtons, 0.0, 0.0, 0.0, 0.0, newton_metres])
+
+
+payloads = st.builds(
+    Payload,
+    st.floats(0.08, 0.45),
+    st.tuples(st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-0.02, 0.02)),
+)
+angles = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)).map(np.array)
+
+
+@settings(max_examples=20, deadline=None)
+@given(part=payloads, pose=angles, on_platform=st.booleans())
+def test_pick_carry_and_release_are_recognised_from_the_load(table, part, pose, on_platform):
+    cell = Cell(table)
+    cell.feel(1.0, NOTHING, pose, on_platform)
+    held = cell.feel(3.0, part, None, on_platform)
+    assert (held.state, held.valid, held.told) == (State.HOLDING, True, False)
+    assert held.payload.mass_kg == pytest.approx(part.mass_kg, rel=1e-9)
+    assert np.allclose(cell.corrected, cell.weight(part), rtol=0.0, atol=AGREED)
+    cell.feel(1.0, part, pose + [0.3, -0.3], on_platform)
+    carried = cell.feel(1.0, part, pose + [-0.3, -0.2], on_platform)
+    assert carried.valid
+    # Three poses show all of the centre, as well as a reading of the moment is known.
+    assert np.allclose(carried.payload.centre_m, part.centre_m, rtol=0.0, atol=2e-3)
+    empty = cell.feel(2.0, NOTHING, None, on_platform)
+    assert (empty.state, empty.payload, empty.valid) == (State.FREE, None, True)
+    assert not cell.corrected.any()
+    after = [State.FREE, State.UNSURE, State.HOLDING, State.RELEASED, State.FREE]
+    assert cell.states == [State.UNSURE, *after]
+
+
+wrenches = st.lists(
+    st.tuples(
+        st.floats(0.0, 2.0), st.tuples(*[st.floats(-3.0, 3.0)] * 3, *[st.floats(-0.1, 0.1)] * 3)
+    ),
+    max_size=6,
+)
+
+
+@settings(max_examples=20, deadline=None)
+@given(loads=wrenches, part=st.none() | payloads)
+def test_whatever_acts_only_a_weight_is_corrected_for(table, loads, part):
+    """The loop of a contact stays open: no side force and no spin comes through."""
+    cell = Cell(table)
+    if part is not None:
+        cell.feel(2.0, part)
+    for seconds, load in loads:
+        cell.feel(seconds, load)
+        assert np.allclose(cell.corrected[[0, 1, 5]], 0.0, rtol=0.0, atol=AGREED)
+        assert cell.corrected[2] <= 0.0
+
+
+@settings(max_examples=20, deadline=None)
+@given(noise=st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 6), min_size=1, max_size=50))
+def test_noise_below_the_thresholds_changes_nothing(table, noise):
+    cell, limit = Cell(table), SupervisorSettings().limit
+    cell.feel(3.0, PART)
+    before, scale = list(cell.states), np.repeat([limit.force, limit.moment], 3) / 3.0
+    for each in noise:
+        cell.feel(0.03, cell.weight(PART) + scale * each)
+    assert cell.states == before
+    assert np.allclose(cell.corrected, cell.weight(PART), rtol=0.0, atol=np.max(scale))
+
+
+@pytest.mark.parametrize("push", [side(0.3), side(0.0, 0.01)], ids=["force", "couple"])
+def test_in_contact_the_payload_alone_is_corrected_for(cell, push):
+    cell.feel(3.0, PART)
+    told = cell.feel(1.0, cell.weight(PART) + push)
+    assert (told.state, told.valid, bool(told.text)) == (State.IN_CONTACT, False, True)
+    assert np.allclose(cell.corrected, cell.weight(PART), rtol=0.0, atol=AGREED)
+    assert cell.feel(0.3, PART).state is State.IN_CONTACT
+    assert cell.feel(0.3, PART).state is State.HOLDING
+
+
+def test_a_part_that_is_lost_in_contact_is_not_corrected_for(cell):
+    cell.feel(3.0, PART)
+    cell.feel(1.0, cell.weight(PART) + side(0.3))
+    told = cell.feel(0.5, side(0.3))
+    assert (told.state, told.payload) == (State.IN_CONTACT, None)
+
+
+def test_in_contact_a_payload_stands_in_only_where_its_moment_is_known(cell):
+    """Its centre along gravity shows at another pose; there the contact hides it."""
+    cell.feel(3.0, PART)
+    assert cell.feel(1.0, cell.weight(PART) + side(1.5)).payload is not None
+    cell.theta = THERE
+    assert cell.feel(1.0, cell.weight(PART) + side(1.5)).payload is None
+
+
+def test_another_weight_is_corrected_for_only_when_it_has_settled(cell):
+    light = replace(PART, mass_kg=0.1)
+    cell.feel(3.0, PART)
+    assert cell.feel(0.3, light).state is State.UNSURE
+    assert not cell.corrected.any()
+    assert cell.feel(2.0, light).payload.mass_kg == pytest.approx(0.1)
+
+
+def test_a_weight_that_grows_with_its_correction_is_a_contact_there(cell):
+    """A ceiling above the tool, loop gain 1: it pushes down, as a part would weigh."""
+    cell.turn = np.array([0.0, 1e-3, 0.0])
+
+    def ceiling(share, corrected):
+        return [
+            0.0,
+            0.0,
+            -1.0 + share * corrected[2],
+            0.0,
+            -0.02 + 0.02 * share * corrected[2],
+            0.0,
+        ]
+
+    cell.feel(20.0, ceiling)
+    assert cell.states.count(State.HOLDING) == 1
+    told = cell.supervisor.supervision
+    assert (told.payload, told.valid, told.text) == (None, False, module.CHANGES)
+    assert cell.feel(5.0, ceiling, THERE).text == module.CHANGES
+    assert cell.states.count(State.HOLDING) == 2
+
+
+def test_a_correction_yields_to_what_works_against_it_until_the_command_leaves(cell):
+    cell.feel(2.0, NOTHING)
+    push = np.array([0.2, 0.0, 0.0, 0.0, 0.01, 0.0])
+    cell.turn = np.array([0.0, 1e-3, 0.0])
+    assert cell.feel(1.0, push).share == 1.0
+    cell.turn = -cell.turn
+    shares = [cell.feel(0.01, push).share for _ in range(30)]
+    assert np.all(np.diff(shares) <= 0.0)
+    assert shares[-1] == 0.0
+    told = cell.feel(5.0, NOTHING)
+    assert (told.state, told.share, told.valid) == (State.FREE, 0.0, False)
+    assert told.text == module.YIELDED
+    assert cell.feel(2.0, NOTHING, HERE + 0.9 * REACH).share == 0.0
+    assert cell.feel(2.0, NOTHING, HERE + 1.1 * REACH).valid
+
+
+def test_what_the_gripper_tells_counts_once_the_load_agrees(cell):
+    feather = replace(PART, mass_kg=0.02)
+    assert cell.feel(3.0, feather).text == module.LIGHT
+    cell.supervisor.declare_payload(feather)
+    cell.supervisor.forget()
+    assert cell.feel(1.0, NOTHING).state is State.FREE
+    told = cell.feel(3.0, feather)
+    assert (told.state, told.told) == (State.HOLDING, True)
+    assert told.payload.mass_kg == pytest.approx(feather.mass_kg)
+    assert told.payload.centre_m == pytest.approx(feather.centre_m)
+    cell.supervisor.declare_payload(None)
+    assert cell.supervisor.supervision.state is State.RELEASED
+    assert cell.feel(3.0, feather).state is State.UNSURE
+
+
+def test_a_told_payload_that_differs_gives_way_to_the_load(cell):
+    cell.supervisor.declare_payload(replace(PART, mass_kg=0.4))
+    told = cell.feel(3.0, PART)
+    assert (told.told, told.payload.mass_kg) == (False, pytest.approx(PART.mass_kg))
+
+
+def test_after_loads_were_lost_the_payload_must_be_seen_again(cell):
+    cell.feel(3.0, PART)
+    cell.supervisor.lost()
+    assert cell.supervisor.supervision.text == module.NO_LOAD
+    assert cell.supervisor.supervision.payload is None
+    assert cell.feel(1.0, NOTHING).state is State.FREE
+    cell.supervisor.restore(PART)
+    assert cell.feel(3.0, PART).payload.centre_m == pytest.approx(PART.centre_m)
+
+
+def test_a_load_that_comes_late_while_the_wrist_moves_is_no_contact(cell):
+    cell.feel(3.0, PART)
+    path = [HERE + (THERE - HERE) * i / 100.0 for i in range(101)]
+    for i in range(20, 101):
+        cell.theta = path[i - 10]
+        late = cell.weight(PART)
+        cell.feel(0.01, late, path[i])
+    assert cell.feel(2.0, PART, THERE).valid
+    assert State.IN_CONTACT not in cell.states
+
+
+def test_thresholds_are_not_below_the_scatter_of_the_load(cell):
+    cell.supervisor.scatter = Thresholds(0.5, 0.05)
+    assert cell.feel(2.0, side(0.3)).state is State.FREE
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, np.nan, np.inf])
+def test_a_payload_without_a_weight_is_refused(mass):
+    with pytest.raises(InputError, match="mass"):
+        Payload(mass, (0.0, 0.0, 0.0))
+
+
+def stream_of(table, **options):
+    model = ErrorModel("soft", table, "closed_form")
+    stream = CorrectionStream(model, StreamSettings(**options), enabled=True)
+    return stream
+
+
+def drive(stream, seconds, wrench, start=0.0):
+    for i in range(round(50 * seconds)):
+        stamp = round((10.0 + start + i / 50) * SECOND)
+        stream.loads.add(stamp, "wrist_base", wrench[:3], wrench[3:])
+        command = stream.on_command(stamp, "", NAMES, HERE)
+    return command
+
+
+@pytest.fixture(scope="module")
+def soft(make_table):
+    return make_table(softness=20.0)
+
+
+def test_after_a_release_commands_are_as_if_nothing_had_been_held(soft):
+    stream = stream_of(soft)
+    weight = Cell(soft).weight(PART)
+    held = drive(stream, 4.0, weight)
+    assert held.valid
+    assert np.max(np.abs(held.theta - HERE)) > soft.geometry.limits.encoder_step
+    after = drive(stream, 3.0, NOTHING, start=4.0)
+    never = drive(stream_of(soft), 3.0, NOTHING)
+    assert np.array_equal(after.theta, never.theta)
+    assert np.array_equal(after.correction.after, never.correction.after)
+    assert after.valid
+
+
+def test_a_plan_without_commands_is_corrected_for_what_was_held_before_it(soft):
+    stream, weight = stream_of(soft), Cell(soft).weight(PART)
+    for i in range(100):
+        stream.loads.add(9 * SECOND + i * SECOND // 100, "wrist_base", weight[:3], weight[3:])
+    plan = [planned_point(2, HERE, (), ())]
+    found = stream.on_trajectory(10 * SECOND, "", NAMES, plan)
+    assert stream.supervision.payload is not None
+    follow = stream_of(soft, supervisor=SupervisorSettings(follow=True))
+    follow.loads.add(10 * SECOND, "wrist_base", weight[:3], weight[3:])
+    wanted = follow.on_trajectory(10 * SECOND, "", NAMES, plan)
+    assert np.allclose(found.points[0].positions, wanted.points[0].positions, rtol=0.0, atol=1e-7)
+    assert np.max(np.abs(found.points[0].positions - HERE)) > 1e-4
