@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from math import prod
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,12 @@ MAGIC = "wrist_stiffness table"
 
 LARGEST_BYTES = 256 << 20
 """Unpacked; the shipped table of 961 poses has 4 million."""
+
+_DAMAGED = (
+    *(ValueError, EOFError, KeyError, TypeError, SyntaxError, TokenError),
+    *(NotImplementedError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile),
+)
+"""What zipfile raises of a damaged archive, and numpy of a damaged array's head."""
 
 UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; moment) at O in F"
 
@@ -151,16 +158,7 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
                 return {part.filename.removesuffix(".npy"): _array(archive, part) for part in parts}
         except OSError as error:
             raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
-        except (
-            ValueError,
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            KeyError,
-            struct.error,
-            NotImplementedError,
-            RuntimeError,
-        ) as error:
+        except _DAMAGED as error:
             raise TableError(
                 f"{path}: damaged or not a table: {' '.join(str(error).split())}"
             ) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 from functools import cache
 from importlib import import_module, metadata, util
 from pathlib import Path
@@ -129,7 +130,7 @@ def law_from_file(reference: str, folder: Path) -> Law:
     """
     file, _, name = reference.rpartition(":")
     path = folder / file
-    if not file or not path.is_file():
+    if not file or not os.path.isfile(path):
         raise InputError(f"{reference}: no file {path}; write FILE.py:CLASS")
     spec = util.spec_from_file_location(f"wrist_stiffness_user_{path.stem}", path)
     if spec is None or spec.loader is None:

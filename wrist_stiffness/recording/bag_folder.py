@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def bag_of(folder: Path) -> Bag:
     names = stated["relative_file_paths"]
     if not names:
         raise RecordingError(f"{metadata} lists no files")
-    missing = [name for name in names if not (folder / name).is_file()]
+    missing = [name for name in names if not os.path.isfile(folder / name)]
     if len(missing) == len(names):
         raise RecordingError(f"{folder}: {', '.join(missing)} of {METADATA_FILE} not found")
     held = {Path(file["path"]).name: _held(file) for file in stated.get("files", ())}

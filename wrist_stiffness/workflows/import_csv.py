@@ -6,7 +6,9 @@ import csv
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import TextIOWrapper
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +28,7 @@ from wrist_stiffness.campaign.reading.csv_columns import (
 from wrist_stiffness.campaign.reading.marker_poses import LEAST_MARKERS
 from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import (
@@ -62,6 +65,8 @@ LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 """ROS 2 counts the seconds of a stamp in 32 bits."""
 
 ROWS_A_REPORT = 1000
+LONGEST_LINE = csv.field_size_limit()
+"""Of column names: what Python's reader takes for one cell."""
 
 
 @dataclass(frozen=True)
@@ -174,14 +179,19 @@ class _Row:
 def _survey(table: Path) -> tuple[int, list[str]]:
     """Return the number of lines below the first, and the column names."""
     try:
-        with table.open(newline="", encoding="utf-8-sig") as stream:
-            first = stream.readline()
+        with _opened(table) as stream:
+            first = stream.readline(LONGEST_LINE + 1)
+            if len(first) > LONGEST_LINE:
+                raise InputError(f"{table}: row 1 has more than {LONGEST_LINE} characters")
             total = sum(1 for _ in stream)
     except OSError as error:
         raise InputError(f"{table}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{table}: is no text in UTF-8") from error
-    header = [name.strip() for name in next(csv.reader([first]), [])]
+    try:
+        header = [name.strip() for name in next(csv.reader([first]), [])]
+    except csv.Error as error:
+        raise InputError(f"{table}: row 1: {error}") from error
     for mark, name in ((";", "';'"), ("\t", "tabs")):
         if len(header) < 2 and mark in first:
             raise InputError(
@@ -189,6 +199,10 @@ def _survey(table: Path) -> tuple[int, list[str]]:
                 "numbers"
             )
     return total, header
+
+
+def _opened(table: Path) -> TextIOWrapper:
+    return TextIOWrapper(open_input(table, InputError), "utf-8-sig", newline="")
 
 
 def _columns(header: list[str], unloaded: bool) -> Columns:
@@ -209,10 +223,10 @@ def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
     required = {*MOTORS, *(LOAD if columns.loads else ())}
     before: tuple[int, str] | None = None
     zero_ns = 0
-    with table.open(newline="", encoding="utf-8-sig") as stream:
+    with _opened(table) as stream:
         lines = csv.reader(stream)
         next(lines)
-        for cells in lines:
+        while (cells := _next(lines, table)) is not None:
             place = f"{table}: row {lines.line_num}"
             if not any(cell.strip() for cell in cells):
                 continue
@@ -247,6 +261,13 @@ def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
                 except ValueError as error:
                     raise InputError(f"{place}, column {name}: {error}") from error
             yield _checked(place, _Row(time_ns, values))
+
+
+def _next(lines: Any, table: Path) -> list[str] | None:
+    try:
+        return next(lines, None)
+    except csv.Error as error:
+        raise InputError(f"{table}: row {lines.line_num}: {error}") from error
 
 
 def _checked(place: str, row: _Row) -> _Row:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from decimal import Context, Decimal, InvalidOperation
+from decimal import Context, Decimal, InvalidOperation, Overflow
 from math import inf
 
 from wrist_stiffness.errors import InputError, with_a_point
@@ -27,6 +28,9 @@ PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 FACTORS = {"deg": PI / 180, "mm": Decimal("0.001")}
 SIGNIFICANT = (15, 16, 17)
 """Digits tried; seventeen tell any double, and what somebody typed mostly has fewer."""
+
+LARGEST_EXPONENT = 300
+"""Of ten, in a number that still is one in SI."""
 
 NANOSECONDS = Decimal(1_000_000_000)
 
@@ -101,8 +105,8 @@ def columns_of(header: Sequence[str]) -> Columns:
         If a column is missing, named twice or has no unit or a wrong one, or nothing measured is
         there.
     """
-    for name in header:
-        if list(header).count(name) > 1:
+    for name, times in Counter(header).items():
+        if times > 1:
             raise InputError(f"column {name or '(without a name)'} is there twice")
     if not any(header):
         raise InputError("no column names in the first line")
@@ -156,9 +160,11 @@ def column_of(covariate: str) -> str:
 
 
 def _markers(header: Sequence[str]) -> int:
-    numbers = [int(found[1]) for name in header if (found := MARKER.fullmatch(name))]
-    count = max(numbers, default=0)
-    if missing := [name for name in marker_columns(count) if name not in header]:
+    found = [name for name in header if MARKER.fullmatch(name)]
+    # Three columns each, numbered from 1: a number too large has columns missing before it.
+    count = -(-len(found) // 3)
+    expected = marker_columns(count)
+    if missing := sorted({*expected} - {*found}) or sorted({*found} - {*expected}):
         raise InputError(f"column {', '.join(missing[:6])} of the markers is missing")
     return count
 
@@ -177,7 +183,7 @@ def reader_of(column: str) -> Callable[[str], float]:
             exact = Decimal(text.strip())
         except InvalidOperation as error:
             raise ValueError(f"{text!r} is no number{with_a_point(text)}") from error
-        if not exact.is_finite():
+        if not exact.is_finite() or exact.adjusted() > LARGEST_EXPONENT:
             raise ValueError(f"{text!r} is not finite")
         if not lower <= exact <= upper:
             raise ValueError(f"{text} is outside {lower:g} to {upper:g} {unit}")
@@ -219,9 +225,13 @@ def nanoseconds(text: str) -> int:
     """Return the stamp of a time in seconds [ns]; ValueError where it has none exactly."""
     try:
         exact = EXACT.multiply(Decimal(text.strip()), NANOSECONDS)
-    except InvalidOperation as error:
+    except (InvalidOperation, Overflow) as error:
         raise ValueError(f"{text!r} is no number{with_a_point(text)}") from error
-    if not exact.is_finite() or exact != exact.to_integral_value():
+    if (
+        not exact.is_finite()
+        or exact.adjusted() > LARGEST_EXPONENT
+        or exact != exact.to_integral_value()
+    ):
         raise ValueError(f"{text!r} is no whole number of nanoseconds")
     return int(exact)
 
