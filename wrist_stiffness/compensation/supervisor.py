@@ -62,12 +62,12 @@ time, a load may seem turned [s]."""
 YIELD_S = 0.2
 """A correction that a contact works against is gone after this time [s]."""
 
-RELEASE = 0.5
-"""In contact the thresholds are multiplied by this, against chatter."""
+CALM = 0.5
+"""A contact ends and a weight becomes the payload within this part of the thresholds, so that noise
+does not undo it."""
 
-LEAST = 10.0
-"""The lightest payload that is recognised, over the threshold: a contact that is taken for one
-shows when it has grown by a tenth.  What is left open of a payload's moment may be as much."""
+OPEN = 10.0
+"""In contact a payload stands in only where its moment is known to this many thresholds."""
 
 LONGEST_STEP_S = 0.1
 """A pause between commands counts as this much."""
@@ -76,7 +76,6 @@ NO_LOAD = "no load is known"
 NO_WEIGHT = "the load is no weight: a contact, or the sensor is not tared"
 CHANGES = "the load changes with the correction: a contact"
 NEW_WEIGHT = "a weight that was not there before is being judged"
-LIGHT = "a weight is too light to be recognised: tell it"
 COMING_IN = "the correction for the payload is coming in"
 YIELDED = "the correction yielded to a contact, and comes back when the command leaves this place"
 
@@ -322,7 +321,7 @@ class Supervisor:
         if self._seen is State.IN_CONTACT:
             self._feel(theta, reading, known)
         elif self._seen is State.UNSURE and self._state is State.UNSURE:
-            self._weigh(reading, known, LEAST * limit.force, scales)
+            self._weigh(reading, known, scales)
         elif self._seen is State.HOLDING and self._state is State.HOLDING:
             self._weight = min(1.0, self._weight + self._step_s / RAMP_S)
         if self._payload is None:
@@ -358,7 +357,7 @@ class Supervisor:
     def _look(self, reading: Reading, limit: Thresholds) -> None:
         """See what the load looks like, and believe it when it has looked like that for a while."""
         in_contact = self._state is State.IN_CONTACT
-        seen = self._seeming(reading, limit.times(RELEASE) if in_contact else limit)
+        seen = self._seeming(reading, limit.times(CALM) if in_contact else limit)
         self._seen_s = self._seen_s + self._step_s if seen is self._seen else 0.0
         self._seen = seen
         patience = SETTLE_S if seen in TRUSTED else JUDGE_S
@@ -406,10 +405,10 @@ class Supervisor:
 
         Only where the load is nearer to it than to nothing, and its moment at this pose is known.
         """
-        known = payload.open_moment(reading.rows) <= LEAST * limit.moment
+        known = payload.open_moment(reading.rows) <= OPEN * limit.moment
         return known and payload.rest(reading).size(limit) < reading.size(limit)
 
-    def _weigh(self, reading: Reading, limit: Thresholds, least: float, scales: Scales) -> None:
+    def _weigh(self, reading: Reading, limit: Thresholds, scales: Scales) -> None:
         """Make a weight that stays the payload, unless it was found to be a contact here."""
         if self._candidate is None or self._candidate.departure(reading, limit) > 1.0:
             self._candidate, self._candidate_s = scales.unknown(), 0.0
@@ -422,8 +421,8 @@ class Supervisor:
             expected = None
         if self._touched is not None:
             self._text = CHANGES
-        elif expected is None and self._candidate.weight < least:
-            self._text = LIGHT
+        elif not reading.is_weight(limit.times(CALM)):
+            self._text = NO_WEIGHT
         else:
             if expected is None:
                 self._expected, self._told = None, False
