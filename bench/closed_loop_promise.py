@@ -219,6 +219,14 @@ def report(lines: list[dict[str, object]]) -> None:
             f"{kind:8}  {len(some):8d}  {sum(map(broken, some)):6d}  {total:19.2f}  "
             f"{worse.max():6.2f}  {harder:19.2f}  {hunts:5d}"
         )
+    peaks = np.array([each["peak"] for each in lines]).reshape(-1, 2, 2).max(axis=2)
+    met = peaks[:, 1] > 0.0
+    if met.any():
+        ratio = np.percentile(peaks[met, 0] / peaks[met, 1], [50.0, 95.0, 100.0])
+        print(
+            "first touch, largest push of one sample over that without correction, where there is"
+        )
+        print(f"one: median {ratio[0]:.2f}, 95 % {ratio[1]:.2f}, largest {ratio[2]:.2f}")
     for name in ("worse", "harder", "hunts"):
         print(f"worst by {name}:")
         for each in sorted(lines, key=lambda line: -line[name])[:5]:  # type: ignore[operator]

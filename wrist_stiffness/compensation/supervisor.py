@@ -59,8 +59,9 @@ LATE_S = 0.2
 """So late a load may be, and the motors behind their command: as much as the platform turns in this
 time, a load may seem turned [s]."""
 
-YIELD_S = 0.2
-"""A correction that a contact works against is gone after this time [s]."""
+YIELD_S = 0.1
+"""A correction that a contact works against is gone after this time, in which the default
+slew limit takes back 50 mdeg [s]."""
 
 CALM = 0.5
 """A contact ends and a weight becomes the payload within this part of the thresholds, so that noise
