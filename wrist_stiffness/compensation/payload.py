@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot, isfinite
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,8 +61,7 @@ class Payload:
             raise InputError(f"payload: centre {self.centre_m} m is not three finite numbers")
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
+class Thresholds(NamedTuple):
     """A load that departs by more than these is another load.
 
     Parameters
@@ -83,8 +83,7 @@ class Thresholds:
         return Thresholds(self.force + turn * force, self.moment + turn * moment)
 
 
-@dataclass(slots=True)
-class Reading:
+class Reading(NamedTuple):
     """A load along u, v and down, and what its moments say of a payload.
 
     Parameters
@@ -151,34 +150,37 @@ class PayloadEstimate:
         """Return how far its moments at a pose may be from what is known of them [N m]."""
         return SIGMAS * max(_quadratic(self._spread, row) for row in rows) ** 0.5
 
-    def departure(self, reading: Reading, limit: Thresholds) -> float:
-        """Return how far a load departs, over the thresholds and what poses left open [-]."""
-        left = self.rest(reading)
-        about_u, about_v, about_down = left.moments
-        known = limit.moment * limit.moment
-        open_u, open_v = (
-            known + SIGMAS * SIGMAS * _quadratic(self._spread, row) for row in reading.rows
-        )
-        moment = about_u * about_u / open_u + about_v * about_v / open_v
-        moment += about_down * about_down / known
-        return max(hypot(left.side, left.weight) / limit.force, moment**0.5)
+    def explains(self, reading: Reading, limit: Thresholds) -> bool:
+        """Tell whether a load is the payload's, within thresholds and what poses left open.
 
-    def update(self, reading: Reading, limit: Thresholds) -> None:
-        """Learn from a load that does not depart."""
+        If so, it is learned from.
+        """
+        side, weight, (about_u, about_v, about_down), (row_u, row_v) = reading
+        force = weight - self.weight
+        if side * side + force * force > limit.force * limit.force:
+            return False
+        (ax, ay, az), (bx, by, bz), (x, y, z) = row_u, row_v, self.moments
+        left_u = about_u - (ax * x + ay * y + az * z)
+        left_v = about_v - (bx * x + by * y + bz * z)
+        noise = limit.moment * limit.moment / (SIGMAS * SIGMAS)
+        of_u, of_v = _quadratic(self._spread, row_u), _quadratic(self._spread, row_v)
+        moment = left_u * left_u / (noise + of_u) + left_v * left_v / (noise + of_v)
+        if moment + about_down * about_down / noise > SIGMAS * SIGMAS:
+            return False
         if self._readings < ENOUGH:
             self._readings += 1
-            self.weight += (reading.weight - self.weight) / self._readings
-        noise = (limit.moment / SIGMAS) ** 2
-        self._learn(reading.rows[0], reading.moments[0], noise)
-        self._learn(reading.rows[1], reading.moments[1], noise)
+            self.weight += force / self._readings
+        if ENOUGH * of_u > noise:
+            self._learn(row_u, about_u, noise)
+        if ENOUGH * of_v > noise:
+            self._learn(row_v, about_v, noise)
+        return True
 
     def _learn(self, row: Row, value: float, noise: float) -> None:
         xx, xy, xz, yy, yz, zz = self._spread
         a, b, c = row
         px, py, pz = xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c
         variance = a * px + b * py + c * pz
-        if ENOUGH * variance <= noise:
-            return
         x, y, z = self.moments
         gain = 1.0 / (variance + noise)
         step = gain * (value - a * x - b * y - c * z)
@@ -252,9 +254,9 @@ class Scales:
         wrench += [ux * first + vx * second, uy * first + vy * second, uz * first + vz * second]
         return Load(np.array(wrench))
 
-    def unknown(self) -> PayloadEstimate:
-        """Return the estimate of a payload of which nothing is known."""
-        return PayloadEstimate(0.0, (0.0, 0.0, 0.0), self.geometry.limits.moment)
+    def unknown(self, reading: Reading) -> PayloadEstimate:
+        """Return the estimate of a payload of which a reading's weight is all that is known."""
+        return PayloadEstimate(reading.weight, (0.0, 0.0, 0.0), self.geometry.limits.moment)
 
     def estimate(self, payload: Payload) -> PayloadEstimate:
         """Return a payload as an estimate that is known."""

@@ -371,8 +371,7 @@ class Supervisor:
     def _seeming(self, reading: Reading, limit: Thresholds) -> State:
         self._against = None
         payload = self._payload
-        if payload is not None and payload.departure(reading, limit) <= 1.0:
-            payload.update(reading, limit)
+        if payload is not None and payload.explains(reading, limit):
             return State.HOLDING
         if reading.size(limit) <= 1.0:
             return State.FREE if payload is None else State.RELEASED
@@ -411,14 +410,13 @@ class Supervisor:
 
     def _weigh(self, reading: Reading, limit: Thresholds, scales: Scales) -> None:
         """Make a weight that stays the payload, unless it was found to be a contact here."""
-        if self._candidate is None or self._candidate.departure(reading, limit) > 1.0:
-            self._candidate, self._candidate_s = scales.unknown(), 0.0
-        self._candidate.update(reading, limit)
+        if self._candidate is None or not self._candidate.explains(reading, limit):
+            self._candidate, self._candidate_s = scales.unknown(reading), 0.0
         self._candidate_s += self._step_s
         if self._candidate_s < SETTLE_S:
             return
         expected = None if self._expected is None else scales.estimate(self._expected)
-        if expected is not None and expected.departure(reading, limit) > 1.0:
+        if expected is not None and not expected.explains(reading, limit):
             expected = None
         if self._touched is not None:
             self._text = CHANGES
