@@ -73,9 +73,11 @@ setup(
         ],
         "fem": ["netgen-mesher>=6.2.2404", "scikit-fem>=10", "pymetis>=2025.1"],
         "plot": ["matplotlib>=3.8"],
+        # Bars of commands that take long; without it they say nothing on the way.
+        "progress": ["tqdm>=4.66"],
         "fleet": ["distributed>=2024.5", "cloudpickle>=3"],
         "bench": ["scikit-learn>=1.3"],
-        "verify": ["acrod>=1.2", "rosbags>=0.10"],
+        "verify": ["acrod>=1.2", "rosbags>=0.10", "mcap-ros2-support>=0.5"],
         # colcon finds pytest through this extra and would run no test without it.
         "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100"],
         "dev": [

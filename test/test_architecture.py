@@ -36,6 +36,7 @@ ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both
     "fem": ROBOT | {"netgen", "skfem", "pymetis"},
+    "cli": ROBOT | {"tqdm"},  # the extra `progress`
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
     "workflows": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
 }

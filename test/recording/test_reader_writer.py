@@ -9,20 +9,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
+from mcap_ros2.writer import Writer as FoxgloveWriter
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
-from wrist_stiffness.recording import RecordingWriter, open_recording
+from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
     JointState,
+    Vector3,
+    Wrench,
     WrenchStamped,
 )
+from wrist_stiffness.recording.schema import definition_text
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 FORMS = pytest.mark.parametrize("name", ["bag", "file.mcap"], ids=["folder", "bare"])
@@ -112,6 +116,36 @@ def test_reads_what_rosbags_wrote(tmp_path):
         assert sum(connection.topic == "/cmd_vel" for connection, _, _ in reader.messages()) == 3
 
 
+def test_reads_what_foxglove_wrote(tmp_path):
+    path = tmp_path / "foxglove.mcap"
+    with path.open("wb") as stream:
+        writer = FoxgloveWriter(stream)
+        name = "geometry_msgs/msg/WrenchStamped"
+        schema = writer.register_msgdef(name, definition_text(name))
+        for time_ns in (5, 4, 6):
+            header = {"stamp": {"sec": 1, "nanosec": time_ns}, "frame_id": "ft"}
+            force, torque = (
+                {"x": 1.0, "y": 2.0, "z": float(time_ns)},
+                {"x": 0.0, "y": 0.0, "z": 0.5},
+            )
+            wrench = {"header": header, "wrench": {"force": force, "torque": torque}}
+            writer.write_message("/load_estimate", schema, wrench, time_ns, time_ns)
+        writer.finish()
+    recording = open_recording(path, strict=True)
+    assert list(recording.messages()) == [
+        (
+            "/load_estimate",
+            time_ns,
+            WrenchStamped(
+                Header(1_000_000_000 + time_ns, "ft"),
+                Wrench(Vector3(1.0, 2.0, float(time_ns)), Vector3(z=0.5)),
+            ),
+        )
+        for time_ns in (4, 5, 6)
+    ]
+    assert read_samples(recording).loads.wrench[:, 2].tolist() == [4.0, 5.0, 6.0]
+
+
 @pytest.mark.parametrize("compression", list(CompressionType), ids=lambda kind: kind.name)
 @pytest.mark.parametrize("use_chunking", [True, False], ids=["chunks", "loose"])
 @pytest.mark.parametrize("with_index", [True, False], ids=["indexed", "bare"])
@@ -173,6 +207,11 @@ def test_several_files_of_one_folder_are_merged_by_time(tmp_path, timeline, writ
     merged = list(open_recording(first, strict=True).messages())
     assert [entry[1] for entry in merged] == sorted(entry[1] for entry in entries)
     assert len(merged) == len(entries)
+    kept = (first / "bag_0.mcap").rename(tmp_path / "kept.mcap")
+    times = f"{entries[0][1]} to {max(entry[1] for entry in entries[::2])} ns"
+    missing = rf"bag_0.mcap \({len(entries[::2])} messages, {times}\) of metadata.yaml not found"
+    assert re.search(missing, open_recording(first).damage)
+    kept.rename(first / "bag_0.mcap")
     (first / "bag_1.mcap").unlink()
     recording = open_recording(first)
     assert "bag_1.mcap of metadata.yaml not found" in recording.damage

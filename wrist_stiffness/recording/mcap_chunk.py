@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -55,8 +55,6 @@ class Chunk:
         Size and CRC-32 after decompression; CRC 0 = not stated.
     start_ns, end_ns : int
         First and last log time.
-    indexed : dict[int, (m,) int array]
-        Where the file says that the messages of each channel begin in the chunk; empty = not said.
     """
 
     path: Path
@@ -67,7 +65,6 @@ class Chunk:
     crc: int
     start_ns: int
     end_ns: int
-    indexed: dict[int, Places] = field(default_factory=dict)
 
     @property
     def place(self) -> str:
@@ -188,7 +185,7 @@ def contents_of(chunk: Chunk) -> Contents:
     Returns
     -------
     Contents
-        Found by the chunk's own index where that agrees with its bytes, else from record to record.
+        Its records.
 
     Raises
     ------
@@ -196,8 +193,7 @@ def contents_of(chunk: Chunk) -> Contents:
         If the bytes cannot be read or decompressed, do not match size or checksum, a record is
         damaged, or a log time is before the stated start or after the last that ROS knows.
     """
-    buffer = _bytes_of(chunk)
-    found = _by_index(buffer, chunk) or _by_walk(buffer, chunk)
+    found = _walked(_bytes_of(chunk), chunk)
     times = found.heads["log_time"]
     if times.size and not chunk.start_ns <= times.min() <= times.max() <= LAST_TIME_NS:
         raise RecordingError(
@@ -248,62 +244,27 @@ def _unpacked(stored: bytes, chunk: Chunk) -> bytes:
             raise ValueError(f"compression {other!r} is none of '', 'zstd', 'lz4'")
 
 
-def _records_in(buffer: bytes, chunk: Chunk) -> Iterator[tuple[int, int, int]]:
-    """Iterate over records: opcode, and where head and record end and begin."""
-    position, total = 0, len(buffer)
-    while position < total:
-        if position + RECORD_HEAD.size > total:
-            raise RecordingError(f"{chunk.place}: record head cut after {total - position} bytes")
-        opcode, length = RECORD_HEAD.unpack_from(buffer, position)
-        begin, position = position, position + RECORD_HEAD.size + length
-        if position > total:
-            raise RecordingError(f"{chunk.place}: record of {length} bytes exceeds its chunk")
-        if opcode == 0:
-            raise RecordingError(f"{chunk.place}: no record at byte {begin} of it")
-        yield opcode, begin, position
-
-
-def _by_walk(buffer: bytes, chunk: Chunk) -> Contents:
+def _walked(buffer: bytes, chunk: Chunk) -> Contents:
+    """Go from record to record: as quick as following the chunk's index, which may be wrong."""
     begins, others = [], []
-    for opcode, begin, end in _records_in(buffer, chunk):
-        if opcode != Opcode.MESSAGE:
-            others.append((opcode, buffer[begin + RECORD_HEAD.size : end]))
-        elif end - begin < MESSAGE.itemsize:
-            raise RecordingError(
-                f"{chunk.place}: message record of {end - begin} bytes is too short"
-            )
+    position, total, unpack = 0, len(buffer), RECORD_HEAD.unpack_from
+    while position + RECORD_HEAD.size <= total:
+        opcode, length = unpack(buffer, position)
+        end = position + RECORD_HEAD.size + length
+        if opcode == Opcode.MESSAGE:
+            begins.append(position)
+        elif opcode:
+            others.append((opcode, buffer[position + RECORD_HEAD.size : end]))
         else:
-            begins.append(begin)
+            break
+        position = end
     places = np.array(begins, dtype=np.int64)
-    return Contents(buffer, places, _from_each_byte(buffer, MESSAGE)[places], others)
-
-
-def _by_index(buffer: bytes, chunk: Chunk) -> Contents | None:
-    """Find the messages by the chunk's index; None where a walk would not find just these."""
-    begins = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *chunk.indexed.values()]))
-    if not begins.size or begins[0] < 0 or begins[-1] + MESSAGE.itemsize > len(buffer):
-        return None
-    heads = _from_each_byte(buffer, MESSAGE)[begins]
-    lengths = heads["length"]
-    if (heads["opcode"] != Opcode.MESSAGE).any() or (lengths < MESSAGE_HEAD_SIZE).any():
-        return None
-    if (lengths > len(buffer)).any():
-        return None
-    ends = begins + RECORD_HEAD.size + lengths.astype(np.int64)
-    before, after = np.append(0, ends), np.append(begins, len(buffer))
-    if (before > after).any():
-        return None
-    others = []
-    for start, end in zip(before[before < after], after[before < after], strict=True):
-        between = buffer[start:end]
-        try:
-            for opcode, begin, stop in _records_in(between, chunk):
-                if opcode == Opcode.MESSAGE:
-                    return None
-                others.append((opcode, between[begin + RECORD_HEAD.size : stop]))
-        except RecordingError:
-            return None
-    return Contents(buffer, begins, heads, others)
+    if position != total or (begins and begins[-1] + MESSAGE.itemsize > total):
+        raise RecordingError(f"{chunk.place}: no record at byte {position} of its {total}")
+    heads = _from_each_byte(buffer, MESSAGE)[places]
+    if (heads["length"] < MESSAGE_HEAD_SIZE).any():
+        raise RecordingError(f"{chunk.place}: a message record is too short")
+    return Contents(buffer, places, heads, others)
 
 
 def _from_each_byte(buffer: bytes, kind: np.dtype[np.void]) -> NDArray[np.void]:

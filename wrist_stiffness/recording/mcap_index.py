@@ -240,7 +240,6 @@ class _Walk:
         """Leave the last chunk to be looked into: the damage may have taken a part of its index."""
         if self.chunk_spans and not self.last_is_lost:
             self.chunk_spans[-1].clear()
-            self.chunks[-1].indexed.clear()
         self.last_is_lost = True
         self.lost.append({})
 
@@ -289,8 +288,6 @@ class _Walk:
         times = entries[::2]
         if not times.size or not (self.chunks or self.lost):
             return
-        if not self.last_is_lost:
-            self.chunks[-1].indexed[channel_id] = entries[1::2].astype(np.int64)
         spans = self.lost[-1] if self.last_is_lost else self.chunk_spans[-1]
         spans[channel_id] = Span(times.size, int(times.min()), int(times.max()))
 
