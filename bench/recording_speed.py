@@ -8,17 +8,30 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+import timeit
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
 from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples
-from wrist_stiffness.recording.messages import Header, JointState
+from wrist_stiffness.recording.cdr import decode, encode
+from wrist_stiffness.recording.messages import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    Header,
+    JointState,
+    KeyValue,
+    PoseWithCovarianceStamped,
+    WrenchStamped,
+)
+from wrist_stiffness.recording.schema import definition_text
 
 NAMES = ("motor_1_joint", "motor_2_joint")
 TOPIC = "/joint_states"
@@ -60,6 +73,44 @@ def decode_rosbags(path: Path) -> int:
             reader.deserialize(payload, connection.msgtype) is not None
             for connection, _, payload in reader.messages()
         )
+
+
+def codecs() -> None:
+    """Print how long single messages take here, and how many times as long elsewhere."""
+    header = Header(5, "ft")
+    store = get_typestore(Stores.ROS2_JAZZY)
+    values = tuple(KeyValue(f"key {number}", "value") for number in range(20))
+    states = (DiagnosticStatus(0, "node", "fine", "", values),)
+    for message in (
+        JointState(header, NAMES, (0.1, 0.2), (0.0, 0.0), (0.0, 0.0)),
+        WrenchStamped(header),
+        PoseWithCovarianceStamped(header),
+        DiagnosticArray(header, states),
+    ):
+        name, text, payload = message.ros_type, definition_text(message.ros_type), encode(message)
+        reader, writer = generate_dynamic(name, text)[name], serialize_dynamic(name, text)[name]
+        theirs, dynamic = store.deserialize_cdr(payload, name), reader(payload)
+        for verb, actions in {
+            "decode": (
+                partial(decode, type(message), payload),
+                partial(store.deserialize_cdr, payload, name),
+                partial(reader, payload),
+            ),
+            "encode": (
+                partial(encode, message),
+                partial(store.serialize_cdr, theirs, name),
+                partial(writer, dynamic),
+            ),
+        }.items():
+            own, rosbags, support = (_microseconds(action) for action in actions)
+            print(
+                f"{verb} {name.rpartition('/')[2]:27s} {own:5.1f} us, "
+                f"rosbags {rosbags / own:4.2f} x, mcap-ros2-support {support / own:5.2f} x"
+            )
+
+
+def _microseconds(action: Callable[[], object]) -> float:
+    return 1e3 * min(timeit.repeat(action, number=1000, timer=time.process_time))
 
 
 def seconds(action: Callable[[], object]) -> float:
@@ -105,3 +156,4 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+    codecs()
