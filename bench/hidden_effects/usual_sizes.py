@@ -28,7 +28,7 @@ def usual_sizes(riddle: Riddle, words: Dictionary) -> Answer:
     usual = {
         name: base.columns[:, :, places] for name in whole.names if (places := whole.places(name))
     }
-    for each in wrist_candidates(point_of(base), usual, {}):
+    for each in wrist_candidates(point_of(base), usual):
         usual[each.name] = each.at(each.shapes[len(each.shapes) // 2]) * each.usual
     lengths = {name: np.linalg.norm(base.whiten(whole.beyond(c))) for name, c in usual.items()}
     silent = nothing(riddle)

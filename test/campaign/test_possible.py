@@ -23,7 +23,7 @@ def fitted(model, in_the_cell):
 
 @pytest.fixture(scope="module")
 def catalogue(fitted):
-    return wrist_candidates(point_of(fitted), (), {})
+    return wrist_candidates(point_of(fitted), ())
 
 
 def only(catalogue, *names):

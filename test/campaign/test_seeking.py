@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.fitting.recipes import effect_at
 from wrist_stiffness.campaign.searching import stepwise
 from wrist_stiffness.campaign.searching.base_fit import fit_base
 from wrist_stiffness.campaign.searching.candidates import turns_normal, wrist_candidates
@@ -14,6 +13,7 @@ from wrist_stiffness.campaign.searching.fitter import Fitter
 from wrist_stiffness.campaign.searching.place import WORTH, Reached, point_of
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.effect import effect_at
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
@@ -45,7 +45,7 @@ def alone(model, units):
 
 @pytest.fixture(scope="module")
 def candidates(alone):
-    return wrist_candidates(point_of(alone), (), {})
+    return wrist_candidates(point_of(alone), ())
 
 
 def effect(name, **values):
@@ -154,7 +154,7 @@ def test_an_extra_on_its_bound_stays_an_effect(both):
 
 def test_of_the_catalogue_those_laws_are_tried_that_are_asked_for(alone, candidates):
     asked = ("backlash", "time_delay")
-    found = [each.name for each in wrist_candidates(point_of(alone), (), {}, asked)]
+    found = [each.name for each in wrist_candidates(point_of(alone), (), laws=asked)]
     assert found == [each.name for each in candidates if each.law.id in asked] != []
 
 
@@ -166,7 +166,7 @@ def test_a_law_of_another_package_must_say_how_large_it_usually_is(alone, monkey
     monkeypatch.setattr(law, "parameters", lambda place: (replace(width, scale=scale),))
     said = f"backlash@motor_1: width_mdeg has the scale {scale:g}; a diagnosis needs its usual"
     with pytest.raises(InputError, match=said):
-        wrist_candidates(point_of(alone), (), {}, ("backlash",))
+        wrist_candidates(point_of(alone), (), laws=("backlash",))
 
 
 def test_motors_can_turn_back_what_points_the_platform_elsewhere():

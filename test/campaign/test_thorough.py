@@ -109,7 +109,7 @@ def test_gaps_follow_the_axis_as_built_and_not_what_came_on_top(model, alone):
 @pytest.mark.slow
 def test_a_candidate_stands_for_a_whole_fit(alone):
     """One column, the price of all its parameters, and what the fit strained."""
-    candidates = {c.name: c for c in wrist_candidates(point_of(alone), (), {})}
+    candidates = {c.name: c for c in wrist_candidates(point_of(alone), ())}
     own = candidates[AXIS].candidate()
     change = np.random.default_rng(2).normal(size=alone.residual.shape)
     whole = candidates[AXIS].changed_by(change, 3.0).candidate()

@@ -111,3 +111,10 @@ class Effect:
         for key, value in values.items():
             changed[key] = Estimate(value, changed[key].sigma if key in changed else 0.0)
         return replace(self, estimates=changed)
+
+
+def effect_at(law: Law, place: str, values: Mapping[str, float]) -> Effect:
+    """Return a law with these values, each brought within its bounds."""
+    known = {parameter.key: parameter for parameter in law.parameters(place)}
+    found = {key: Estimate(known[key].within(value)) for key, value in values.items()}
+    return Effect(law, place, found)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.model.columns import Recipe, tangents
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
@@ -56,6 +57,12 @@ class Law(ABC):
         alone: it gets the state of the sample before, or what another model has at the same
         samples.  Such a state has `last`, what the next block gets of it, and `after(before)`, the
         same beginning with the past of another state: see `pin_rest.Rest`.
+    smooth : bool
+        Whether its columns show it as it is.  Not where it sticks, or where walls and flanges touch
+        or do not: there a search tries the law itself.
+    inexactness : float
+        Share of its own effect by which it is wrong on a real machine (assumed), the same for units
+        under like conditions: a second effect no larger than that is no evidence.
     file : path or None
         The Python file of a user's own law.
     """
@@ -70,6 +77,8 @@ class Law(ABC):
     constant: bool = False
     many_waves: bool = False
     state_is_a_guess: bool = False
+    smooth: bool = True
+    inexactness: float = 0.1
     file: Path | None = None
 
     @property
@@ -80,6 +89,21 @@ class Law(ABC):
     @abstractmethod
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the parameters that the law has at a place."""
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return how the law becomes columns, and where a fit of it begins.
+
+        By default the tangents of all parameters without a grid, at the points of the grids of the
+        others.  `columns` has recipes for other laws.
+
+        Parameters
+        ----------
+        place : str
+            One of `places`.
+        signals : frozenset of str
+            Components with a thermometer.
+        """
+        return tangents(self.parameters(place))
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

@@ -73,6 +73,9 @@ class Parameter:
     linear : bool
         Whether the effect is proportional to it (all linear parameters of a law together), so that
         a regression may treat it as a column.
+    grid : tuple of float
+        Two or more increasing values to try first of a parameter in which the law is not linear;
+        those of the catalogue are assumed.
     """
 
     key: str
@@ -81,6 +84,11 @@ class Parameter:
     scale: float
     mean: float = 0.0
     linear: bool = True
+    grid: tuple[float, ...] = ()
+
+    def within(self, value: float) -> float:
+        """Return a value, brought within the bounds."""
+        return min(max(value, self.lower), self.upper)
 
     def usual_sizes(self, value: float) -> float:
         """Return how many prior standard deviations a value is from the prior mean."""

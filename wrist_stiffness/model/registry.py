@@ -11,6 +11,7 @@ from pkgutil import iter_modules
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model import effects
+from wrist_stiffness.model.effect import effect_at
 from wrist_stiffness.model.law import STAGES, Law, require_id
 
 ENTRY_POINTS = "wrist_stiffness.effects"
@@ -96,16 +97,31 @@ def law_of(found: object, place: str) -> Law:
 
 
 def _require_parameters(law: Law, place: str) -> None:
-    """Refuse parameters that no fit can begin with."""
+    """Refuse what no fit can begin with."""
+    if not 0.0 <= law.inexactness <= 1.0:
+        raise InputError(f"{place}: inexactness = {law.inexactness} is not from 0 to 1")
     for component in law.places:
+        asked = "parameters"
         try:
             scales = {each.key: each.scale for each in law.parameters(component)}
+            asked = "linearised"
+            _begin(law, component)
         except (Exception, SystemExit) as error:
             said = f"{type(error).__name__}: {error}"
-            raise InputError(f"{place}: parameters({component!r}): {said}") from error
+            raise InputError(f"{place}: {asked}({component!r}): {said}") from error
         for key, scale in scales.items():
             if not scale > 0.0:
                 raise InputError(f"{place}: {key}: scale = {scale} is not above 0")
+
+
+def _begin(law: Law, component: str) -> None:
+    """Make the first columns of a law and the effect with which a fit would begin."""
+    recipe = law.linearised(component, frozenset())
+    shape = recipe.shapes[0]
+    columns = recipe.columns(shape)
+    factors = {column.factor.name: 0.0 for column in columns}
+    for values in (recipe.start(factors, shape), *(column.trial for column in columns)):
+        effect_at(law, component, values)
 
 
 def law_from_file(reference: str, folder: Path) -> Law:

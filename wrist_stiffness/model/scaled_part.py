@@ -20,6 +20,7 @@ class ScaledPart(Law):
     """
 
     stage = "parts"
+    inexactness = 0.03
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the fraction."""

@@ -38,6 +38,7 @@ class Spring(Law):
     """
 
     stage = "reaction"
+    inexactness = 0.03
 
     @abstractmethod
     def centre(self, geometry: Geometry, place: str) -> Array:

@@ -13,11 +13,16 @@ from wrist_stiffness.model.memory import lag
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
 
-LAG = Parameter("lag_s", 0.0, 1e5, 600.0, mean=600.0, linear=False)
-SHARE = Parameter("motor_share_percent", 0.0, 100.0, 30.0, linear=False)
+LAG = Parameter("lag_s", 0.0, 1e5, 600.0, 600.0, linear=False, grid=(0.0, 200.0, 1200.0))
+SHARE = Parameter("motor_share_percent", 0.0, 100.0, 30.0, linear=False, grid=(0.0, 100.0))
 WARMTH = (LAG, SHARE)
 """Time constant of a part without a thermometer, 0 for none; and how far its limb's motor (for the
 frame and the platform motor 1) rather than ambient decides where its temperature goes."""
+
+
+def unused(place: str, signals: frozenset[str]) -> tuple[str, ...]:
+    """Return those of `WARMTH` that do nothing: all where the part has its own thermometer."""
+    return tuple(each.key for each in WARMTH) if place in signals else ()
 
 
 def warmth(at: Situation, place: str, values: Mapping[str, float], state: Any) -> tuple[Array, Any]:

@@ -134,7 +134,7 @@ def wrist(monkeypatch):
     """A wrist whose catalogue is all that any of its fits knows."""
     wrist = Wrist()
 
-    def catalogue(point, held, near, laws=None):
+    def catalogue(point, held, seen, laws=None):
         names = sorted(frozenset().union(*wrist.left))
         names = [name for name in names if laws is None or name.split("@")[0] in laws]
         return tuple(candidate(name) for name in names if name not in held)

@@ -17,7 +17,6 @@ from wrist_stiffness.campaign.fitting.free_effects import (
 )
 from wrist_stiffness.campaign.fitting.judge import Judged, judged
 from wrist_stiffness.campaign.fitting.problem import FitProblem
-from wrist_stiffness.campaign.fitting.recipes import recipe
 from wrist_stiffness.campaign.fitting.result import Fit, FittedParameter
 from wrist_stiffness.campaign.fitting.start_search import start_values
 from wrist_stiffness.campaign.measured_session import MeasuredSession
@@ -283,7 +282,7 @@ def _free(effect: Effect, units: Sequence[UnitSession]) -> FreeEffect:
     """Return the effect with all parameters free that do anything in these recordings."""
     signals = frozenset.intersection(*(frozenset(each.block.temperatures) for each in units))
     known = all(np.isfinite(parameter.scale) for parameter in effect.parameters)
-    idle = recipe(effect.law, effect.component, signals).idle if known else ()
+    idle = effect.law.linearised(effect.component, signals).idle if known else ()
     scale = {p.key: p.scale for p in effect.parameters if p.key not in idle}
     return FreeEffect(effect, scale)
 

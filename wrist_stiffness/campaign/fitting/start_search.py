@@ -9,9 +9,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.recipes import Column, recipe
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.columns import Column
 from wrist_stiffness.model.effect import Effect
 
 FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
@@ -41,9 +41,9 @@ def start_values(found: Fit, effect: Effect) -> dict[str, float]:
     signals = frozenset.intersection(
         *(frozenset(each.block.temperatures) for each in found.problem.sessions)
     )
-    how = recipe(effect.law, effect.component, signals)
+    how = effect.law.linearised(effect.component, signals)
     best: tuple[float, dict[str, float]] = (np.inf, {})
-    for shape in product(*(parameter.grid for parameter in how.shape)):
+    for shape in how.shapes:
         found_at = _factors(judge, effect, how.columns(shape))
         if found_at[0] < best[0]:
             best = found_at[0], how.start(found_at[1], shape)
@@ -68,7 +68,7 @@ def _factors(
         ],
         axis=1,
     )
-    size = np.array([column.factor.plausible or 1.0 for column in columns])
+    size = np.array([column.factor.plausible for column in columns])
     lower = np.array([column.factor.lower for column in columns]) / size
     upper = np.array([column.factor.upper for column in columns]) / size
     rows = np.vstack([design * size, np.eye(len(size))])

@@ -231,9 +231,9 @@ def fit_base(
     added = {effect.name: effect for effect in extras}
     usual = {each.effect.name for each in free}
     # Those on top of the base follow it, and play comes last.
-    ordered = sorted(added.values(), key=lambda e: (e.law.id in LOOSE, e.name not in usual))
+    ordered = sorted(added.values(), key=lambda e: (e.law.state_is_a_guess, e.name not in usual))
     more = [_about_zero(each) for each in ordered]
-    firm = len(ordered) if beside else sum(each.law.id not in LOOSE for each in ordered)
+    firm = len(ordered) if beside else sum(not each.law.state_is_a_guess for each in ordered)
     whole = model.with_effects(*held)
     if start is not None and start.bare.whole is model and start.bare.sessions is sessions:
         alone = start.bare

@@ -9,17 +9,17 @@ from itertools import product
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.fitting.recipes import Recipe, Shape, Values, effect_at, recipe
 from wrist_stiffness.campaign.refitted import SET_UP, TOLERATED
 from wrist_stiffness.campaign.units import Mask
-from wrist_stiffness.diagnosis import Candidate, Observations
+from wrist_stiffness.diagnosis import Candidate, Observations, ShapeParameter
 from wrist_stiffness.diagnosis import Parameter as Factor
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.components import MOTORS, Array
-from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.effects.transmission_error import HARMONICS, RUN_OUT
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.columns import Carried, Recipe, Shape, Values
+from wrist_stiffness.model.columns import Factor as ColumnFactor
+from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import Law
-from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.model.registry import catalogue, find_law
 
 LARGE = 5.0
 """An effect so many times its usual size would still surprise nobody who looks for a fault."""
@@ -87,7 +87,7 @@ class WristCandidate:
     @property
     def shapes(self) -> list[Shape]:
         """Every point of the grid."""
-        return _points(self.recipe)
+        return self.recipe.shapes
 
     def effect(self, found: Mapping[str, float], shape: Shape) -> Effect:
         """Return the effect with which a fit may begin.
@@ -131,7 +131,7 @@ class WristCandidate:
     def usual(self) -> Array:
         """Usual size of the factor of each column, (k,)."""
         first = self.recipe.columns(self.shapes[0])
-        return np.array([column.factor.plausible for column in first], dtype=float)
+        return np.array([column.factor.plausible for column in first])
 
     def changed_by(self, change: Array, strain: float) -> WristCandidate:
         """Return it with what a whole fit changes, (u, 6), in place of its columns."""
@@ -152,30 +152,26 @@ class WristCandidate:
         )
 
     def _by_columns(self) -> Candidate:
-        first = self.recipe.columns(tuple(p.grid[0] for p in self.recipe.shape))
         law = self.law
-        factors = [c.factor for c in first]
+        factors = [column.factor for column in self.recipe.columns(self.shapes[0])]
         return Candidate(
             law.id,
             self.place,
             tuple(self._testable(f) for f in factors),
             self.columns,
-            self.recipe.shape,
+            tuple(ShapeParameter(each.name, each.grid) for each in self.recipe.shape),
             needs=law.excited_by,
             evidence=law.sentence.format(place=self.place),
             check=law.check,
             compensable=compensable(law, self.place, self.points),
         )
 
-    def _testable(self, factor: Factor) -> Factor:
+    def _testable(self, factor: ColumnFactor) -> Factor:
         """Return a factor with the size at which it must show to be tested, and its far bounds."""
-        plausible = factor.plausible
-        if self.seen or self.law.id in TOLERATED or plausible is None:
-            size = None
-        else:
-            size = LARGE * plausible
+        tested = not (self.seen or self.law.id in TOLERATED)
         far = (BEYOND_BOUNDS * factor.lower, BEYOND_BOUNDS * factor.upper)
-        return Factor(factor.name, *far, size, plausible)
+        size = LARGE * factor.plausible if tested else None
+        return Factor(factor.name, *far, size, factor.plausible)
 
 
 def compensable(law: Law, place: str, points: bool = True) -> str:
@@ -266,7 +262,7 @@ class Point:
 def wrist_candidates(
     point: Point,
     absent: Collection[str],
-    near: Mapping[str, Mapping[str, float]],
+    seen: Collection[str] = (),
     laws: Collection[str] | None = None,
 ) -> tuple[WristCandidate, ...]:
     """Evaluate the catalogue about a point.
@@ -277,8 +273,8 @@ def wrist_candidates(
         The base.
     absent : collection of str
         Effects that cannot be candidates: the model has them, and they are no part of the base.
-    near : dict of str to dict
-        Values of some effects, by name, about which their columns are wanted.
+    seen : collection of str
+        Effects that a fit has found before.
     laws : collection of str, optional
         Which of the catalogue; if None, all.
 
@@ -287,8 +283,9 @@ def wrist_candidates(
     InputError
         If a law of another package does not say how large it usually is.
     """
+    signals = point.signals
     plans = [
-        (law, place, recipe(law, place, point.signals, near.get(f"{law.id}@{place}")))
+        (law, place, law.linearised(place, signals))
         for law in catalogue().values()
         if law.id not in SET_UP_ANEW and (laws is None or law.id in laws)
         for place in law.places
@@ -307,20 +304,25 @@ def wrist_candidates(
         return trials[key]
 
     for law, place, own in plans:
-        for column in (c for shape in _points(own) for c in own.columns(shape)):
-            if law.id != WAVE:
-                index(law, place, column.trial)
-                if column.origin:
-                    index(law, place, column.origin)
+        if own.carried:
+            index(find_law(own.carried.law), place, own.carried.values)
+            continue
+        for column in (c for shape in own.shapes for c in own.columns(shape)):
+            index(law, place, column.trial)
+            if column.origin:
+                index(law, place, column.origin)
     changes, normal = point.changes(listed), point.normal
     found = []
     for law, place, own in plans:
-        if law.id == WAVE:
-            wave = _wave(point, place, dict(near.get(f"{law.id}@{place}", {})))
-            found.append(WristCandidate(law, place, own, {}, wave, f"{law.id}@{place}" in near))
+        already = f"{law.id}@{place}" in seen
+        if own.carried:
+            carrier = changes[index(find_law(own.carried.law), place, own.carried.values)]
+            exact = _times_signals(point, carrier, own.carried)
+            points = turns_normal(carrier[:, :, None], normal)
+            found.append(WristCandidate(law, place, own, {}, exact, already, points=points))
             continue
         known = {}
-        for shape in _points(own):
+        for shape in own.shapes:
             stack = []
             for column in own.columns(shape):
                 change = changes[index(law, place, column.trial)]
@@ -329,8 +331,7 @@ def wrist_candidates(
                 stack.append(change / column.size)
             known[shape] = np.stack(stack, axis=-1)
         points = any(turns_normal(columns, normal) for columns in known.values())
-        seen = f"{law.id}@{place}" in near
-        found.append(WristCandidate(law, place, own, known, seen=seen, points=points))
+        found.append(WristCandidate(law, place, own, known, seen=already, points=points))
     return tuple(found)
 
 
@@ -343,30 +344,16 @@ def _require_usual_sizes(law: Law, place: str) -> None:
             )
 
 
-WAVE = "transmission_error"
-"""Its columns are those of a turned motor times a wave: exact at every order."""
-
-
-def _wave(point: Point, place: str, near: Values) -> Callable[[Shape], Array]:
-    turn = point.changes([(catalogue()["encoder_offset"], place, {"offset_mdeg": 1.0})])[0]
-    motor = MOTORS.index(place)
-    run_out = [0.01 * near.get(key, 0.0) for key in RUN_OUT]
+def _times_signals(point: Point, carrier: Array, carried: Carried) -> Callable[[Shape], Array]:
+    """Return columns (u, 6, k) at any shape from what a carrier changes of each unit, (u, 6)."""
 
     def columns(shape: Shape) -> Array:
-        def wave(model: SessionModel) -> Array:
-            angle = model.session.block.theta[:, motor]
-            phases = [harmonic * shape[0] * angle for harmonic in HARMONICS]
-            waves = np.stack([w(phase) for phase in phases for w in (np.cos, np.sin)], axis=-1)
-            height = 1.0 + run_out[0] * np.cos(angle) + run_out[1] * np.sin(angle)
-            return model.session.mean(height[:, None] * waves)
+        def signals(model: SessionModel) -> Array:
+            return model.session.mean(carried.signals(shape, model.session.block))
 
-        return turn[:, :, None] * point.mean(wave)[:, None, :]
+        return carrier[:, :, None] * point.mean(signals)[:, None, :]
 
     return columns
-
-
-def _points(own: Recipe) -> list[Shape]:
-    return list(product(*(parameter.grid for parameter in own.shape)))
 
 
 def _with(effects: Effects, law: Law, place: str, values: Mapping[str, float]) -> Effects:

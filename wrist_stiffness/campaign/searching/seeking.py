@@ -24,8 +24,6 @@ from wrist_stiffness.campaign.searching.place import (
 )
 from wrist_stiffness.campaign.searching.stepwise import extended, with_one_more, without_one
 from wrist_stiffness.campaign.unit_session import UnitSession
-from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.error_model import ErrorModel
 
 Sessions = tuple[UnitSession, ...]
 
@@ -312,7 +310,7 @@ class Search:
         gaps = [each.component for each in base.beyond().values() if each.law.id in LOOSE]
         held |= {f"{law}@{gap}" for law in CLOSING for gap in gaps}
         point = point_of(base, with_extras=True)
-        return Place(base, self._evaluated(point, held, {}, laws), known=True)
+        return Place(base, self._evaluated(point, held, (), laws), known=True)
 
     def after(self, base: BaseFit) -> Place:
         """Return the place of a whole fit, to ask whether anything is left.
@@ -324,19 +322,19 @@ class Search:
 
     def _at(self, reached: Reached) -> Candidates:
         held = {effect.name for effect in reached.base.problem.model.effects}
-        near = _near(self._fitter.model, reached.effects)
-        return self._evaluated(point_of(reached.base), held, near)
+        usual = {each.effect.name for each in free_base(self._fitter.model)[0]}
+        return self._evaluated(point_of(reached.base), held, reached.effects.keys() - usual)
 
     def _evaluated(
         self,
         point: Point,
         held: Collection[str],
-        near: Mapping[str, Mapping[str, float]],
+        seen: Collection[str],
         laws: Collection[str] | None = None,
     ) -> Candidates:
         tried = ", ".join(sorted(laws)) if laws else "every effect of the catalogue"
         self._fitter.tell(f"trying {tried}")
-        return wrist_candidates(point, held, near, laws)
+        return wrist_candidates(point, held, seen, laws)
 
 
 def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached]) -> Place:
@@ -353,13 +351,3 @@ def _as_they_are(begun: Reached, known: Candidates, trials: Mapping[str, Reached
         for each in known
     )
     return Place(alone, catalogue, fits)
-
-
-def _near(model: ErrorModel, extras: Mapping[str, Effect]) -> dict[str, Mapping[str, float]]:
-    """Return the values found, of effects that are no part of the base."""
-    usual = {each.effect.name for each in free_base(model)[0]}
-    return {
-        name: {key: own.value for key, own in each.estimates.items()}
-        for name, each in extras.items()
-        if name not in usual
-    }

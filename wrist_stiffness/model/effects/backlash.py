@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from wrist_stiffness.mechanism.components import MOTORS
+from wrist_stiffness.model.columns import Recipe, at_usual_size
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.memory import play
 from wrist_stiffness.model.parameters import Parameter
@@ -29,6 +30,11 @@ class Backlash(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the full width."""
         return (Parameter("width_mdeg", 0.0, 5000.0, 20.0, linear=False),)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return the column of a usual width: motions are longer than that."""
+        (width,) = self.parameters(place)
+        return at_usual_size(width, width.scale)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from wrist_stiffness.mechanism.components import JOINTS
+from wrist_stiffness.model.columns import Recipe, share_of_shape
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.scaled_part import extra
@@ -24,7 +25,12 @@ class BushingHardening(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the loss of flexibility by the force."""
-        return (Parameter("hardening_percent_per_N", 0.0, 500.0, 10.0, linear=False),)
+        grid = (5.0, 50.0, 300.0)
+        return (Parameter("hardening_percent_per_N", 0.0, 500.0, 10.0, linear=False, grid=grid),)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return what hardening of several sizes does, times a share of each."""
+        return share_of_shape(self.parameters(place), "hardening_percent_per_N")
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

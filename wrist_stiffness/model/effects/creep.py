@@ -11,6 +11,9 @@ from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.warmth import lagged
 
+TIMES_S = (2.0, 8.0, 25.0, 90.0, 400.0)
+"""Time constants that are tried first."""
+
 
 class Creep(Law):
     """Standard linear solid: a delayed part of the flexibility follows the wrench with a lag."""
@@ -26,7 +29,7 @@ class Creep(Law):
         """Return the delayed part of the flexibility and its time constant."""
         return (
             Parameter("delayed_percent", 0.0, 500.0, 20.0),
-            Parameter("time_constant_s", 0.1, 1e5, 60.0, mean=60.0, linear=False),
+            Parameter("time_constant_s", 0.1, 1e5, 60.0, 60.0, linear=False, grid=TIMES_S),
         )
 
     def advance(

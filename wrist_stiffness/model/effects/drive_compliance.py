@@ -21,6 +21,7 @@ class DriveCompliance(Law):
     sentence = "the gearbox of {place} winds up under torque"
     check = "lock the motor, load the link with a weight and a dial gauge, compare both directions"
     excited_by = "loads with a torque about the motor axis, of both signs"
+    inexactness = 0.03
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the compliance."""

@@ -22,6 +22,7 @@ class EncoderEccentricity(Law):
     sentence = "the encoder disc of {place} runs out of true: an error once (twice) per turn"
     check = "compare the encoder over a full turn with a polygon or an autocollimator"
     excited_by = "the whole travel of the motor"
+    inexactness = 0.03
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return cosine and sine amplitudes of both orders."""

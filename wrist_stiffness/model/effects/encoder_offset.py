@@ -23,6 +23,7 @@ class EncoderOffset(Law):
     check = "drive to the reference mark or a gauge block and compare"
     excited_by = "poses all over the workspace"
     constant = True
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the true angle minus the encoder's."""

@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS
+from wrist_stiffness.model.columns import Recipe, share_of_shape
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
+
+GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
+"""Changes of a gap that are tried first, of both signs."""
 
 
 class FlangeContact(Law):
@@ -23,10 +27,16 @@ class FlangeContact(Law):
     check = "measure the axial play of the joint with a feeler gauge"
     excited_by = "axial forces of both signs at the joint"
     constant = True
+    smooth = False
+    inexactness = 0.03
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the change of the gap."""
-        return (Parameter("gap_um", -1000.0, 1000.0, 30.0, linear=False),)
+        return (Parameter("gap_um", -1000.0, 1000.0, 30.0, linear=False, grid=GAPS_UM),)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return what gaps of several sizes do, times a share of each."""
+        return share_of_shape(self.parameters(place), "gap_um")
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

@@ -11,12 +11,17 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.mechanism.components import ELASTIC, LINKS
 from wrist_stiffness.mechanism.statics import component_rotations, weight_response
 from wrist_stiffness.mechanism.vectors import cross
+from wrist_stiffness.model.columns import Column, Recipe, Shape, Values, factor
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.point_mass import mass_columns, place_of
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.vector_keys import vector
 
 TILTS = ("tilt_x_mdeg", "tilt_y_mdeg")
+
+TRIAL_G, TRIAL_MM, TRIAL_MDEG = 10.0, 10.0, 100.0
+"""Of the trials for columns; the effect is linear in the mass, its first moment and small tilts."""
 
 
 class Gravity(Law):
@@ -32,6 +37,7 @@ class Gravity(Law):
     sentence = "{place} carries a weight that is not modelled, or the wrist is mounted tilted"
     check = "weigh payload and fittings; lay a level on the base"
     excited_by = "unloaded poses all over the workspace"
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return mass and centre of gravity in the body at home, and the tilt of the base."""
@@ -41,6 +47,23 @@ class Gravity(Law):
             return (mass, *centre)
         tilt = (Parameter(key, -2e5, 2e5, 1000.0, linear=False) for key in TILTS)
         return (mass, *centre, *tilt)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return columns of the mass and its first moment, and of the tilt of the base."""
+        parameters = self.parameters(place)
+        nothing = {each.key: 0.0 for each in parameters}
+        columns = mass_columns(parameters, TRIAL_G, nothing, TRIAL_MM)
+        tilts = [each for each in parameters if each.key in TILTS]
+        columns += tuple(
+            Column(factor(each), nothing | {each.key: TRIAL_MDEG}, TRIAL_MDEG) for each in tilts
+        )
+
+        def start(found: Mapping[str, float], at: Shape) -> Values:
+            mass = found["mass_g"]
+            centre = place_of(parameters, found, mass or 1.0, nothing)
+            return centre | {"mass_g": mass} | {each.key: found[each.key] for each in tilts}
+
+        return Recipe((), lambda at: columns, start)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

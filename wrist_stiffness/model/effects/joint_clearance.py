@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from wrist_stiffness.mechanism.components import JOINTS
+from wrist_stiffness.model.columns import Recipe, at_usual_size
 from wrist_stiffness.model.law import NOTHING, Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.pin_play import SMALL_FORCE
@@ -37,6 +38,7 @@ class JointClearance(Law):
     sentence = "{place} has play: the pin lies on the side of its bearing force"
     check = "push and pull the joint across its axis with a dial gauge; swap the bushing"
     excited_by = "loads of opposite directions, so that the bearing force changes sides"
+    smooth = False
 
     def __init__(
         self, small_force: float = SMALL_FORCE, sharp: JointClearance | None = None
@@ -50,6 +52,11 @@ class JointClearance(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the diametral clearance."""
         return (Parameter("clearance_um", 0.0, 2000.0, 20.0),)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return the column of a small clearance, in which no flange stands in the way."""
+        (clearance,) = self.parameters(place)
+        return at_usual_size(clearance, 5.0)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS
+from wrist_stiffness.model.columns import Recipe, share_of_shape
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.rubbing import Rubbing, slip
@@ -30,15 +31,21 @@ class JointFriction(Law):
     sentence = "{place} rubs: the pose depends on the way it was reached"
     check = "turn the joint by hand; clean it; compare an approach under load with a load at rest"
     excited_by = "approaches from both sides, and loads applied at rest against carried through"
+    smooth = False
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return coefficient, preload, pre-sliding distance and flexibility of the bristle."""
         return (
-            Parameter("coefficient", 0.0, 2.0, 0.1, linear=False),
+            Parameter("coefficient", 0.0, 2.0, 0.1, linear=False, grid=(0.03, 0.15, 0.6)),
             Parameter("preload_N", 0.0, 100.0, 1.0, linear=False),
             Parameter("presliding_um", 0.01, 200.0, 5.0, mean=5.0, linear=False),
-            Parameter("bristle_um_per_N", 0.0, 1000.0, 10.0, linear=False),
+            Parameter("bristle_um_per_N", 0.0, 1000.0, 10.0, linear=False, grid=(0.0, 30.0)),
         )
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return what friction of several sizes does, of short and soft bristles, times a share."""
+        fixed = {"preload_N": 0.0, "presliding_um": 3.0}
+        return share_of_shape(self.parameters(place), "coefficient", fixed)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

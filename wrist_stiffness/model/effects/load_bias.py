@@ -23,6 +23,7 @@ class LoadBias(Law):
     check = "tare the sensor; read it with the platform free"
     excited_by = "loads of several directions, and none"
     constant = True
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return what the sensor reads without load."""

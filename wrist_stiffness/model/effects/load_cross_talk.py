@@ -43,6 +43,7 @@ class LoadCrossTalk(Law):
     sentence = "the axes of the load sensor read shares of one another, or differ in their gain"
     check = "load one axis of the sensor at a time and read all six"
     excited_by = "forces and moments of every direction, one without the others"
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the shares."""

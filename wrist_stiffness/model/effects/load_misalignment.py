@@ -25,6 +25,7 @@ class LoadMisalignment(Law):
     sentence = "the load sensor's axes are turned against the wrist's"
     check = "hang a weight and compare the direction that the sensor says at several tilts"
     excited_by = "loads of several directions at several poses"
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the turns of a sensor in the base and of one on the platform."""

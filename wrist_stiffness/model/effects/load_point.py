@@ -25,6 +25,7 @@ class LoadPoint(Law):
     sentence = "the load acts beside the point for which it is given"
     check = "measure where the load touches; move it by a known distance and compare"
     excited_by = "forces of several directions at several poses"
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return both lever arms."""

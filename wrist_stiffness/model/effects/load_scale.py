@@ -19,6 +19,7 @@ class LoadScale(Law):
     sentence = "the load sensor reads too much (or too little) by a constant factor"
     check = "hang a reference weight on the platform: does the sensor say newtons, not kg or kN?"
     excited_by = "loads of several sizes beside a known weight"
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the excess."""

@@ -23,6 +23,7 @@ class MeasurementFrame(Law):
     check = "register again on the base's datum points"
     excited_by = "poses all over the workspace"
     constant = True
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the screw."""

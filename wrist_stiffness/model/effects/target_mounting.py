@@ -21,6 +21,7 @@ class TargetMounting(Law):
     check = "measure the target against the platform's datum; look whether it is loose"
     excited_by = "poses all over the workspace"
     constant = True
+    inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the screw."""

@@ -10,10 +10,11 @@ import numpy as np
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.at_point import bushing_centre
+from wrist_stiffness.model.columns import Recipe, tangents
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.warmth import WARMTH, warmth
+from wrist_stiffness.model.warmth import WARMTH, unused, warmth
 
 
 class ThermalExpansion(Law):
@@ -30,11 +31,16 @@ class ThermalExpansion(Law):
     check = "measure one unloaded pose cold and after warm-up; feel or measure the part's warmth"
     signals = ("temperature of the part, or ambient, or its motor",)
     excited_by = "unloaded returns to one pose from cold to warm"
+    inexactness = 0.03
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the coefficient of expansion and how the part warms."""
         mean = {"platform": 23.0}.get(place, 11.5)
         return (Parameter("expansion_ppm_per_K", 0.0, 30000.0, 5.0, mean=mean), *WARMTH)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return tangents, on a grid of how the part warms where no thermometer says it."""
+        return tangents(self.parameters(place), unused(place, signals))
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

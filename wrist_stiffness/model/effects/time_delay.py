@@ -90,6 +90,7 @@ class TimeDelay(Law):
     check = "synchronise the clocks; hit the platform and compare the stamps of the shock"
     signals = ("motor speeds, or a dense recording",)
     excited_by = "fast motions of both directions; for the load sensor, fast load changes"
+    inexactness = 0.03
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the delay."""

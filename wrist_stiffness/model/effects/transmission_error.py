@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import MOTORS
+from wrist_stiffness.mechanism.components import MOTORS, Array
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.columns import Carried, Recipe, Shape, tangents
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.situation import Situation
@@ -15,6 +18,9 @@ from wrist_stiffness.model.situation import Situation
 HARMONICS = (1, 2, 3)
 
 RUN_OUT = ("run_out_cos_percent", "run_out_sin_percent")
+
+ORDERS = tuple(3.0 + 1.2 * i for i in range(40))
+"""Waves a turn that are tried first (assumed): a search goes on between two of them."""
 
 
 def amplitudes(harmonic: int) -> tuple[str, str]:
@@ -43,9 +49,20 @@ class TransmissionError(Law):
         waves = (symmetric(key, 5000.0, 10.0) for n in HARMONICS for key in amplitudes(n))
         return (
             *waves,
-            Parameter("order", 3.0, 500.0, 50.0, mean=10.0, linear=False),
+            Parameter("order", 3.0, 500.0, 50.0, mean=10.0, linear=False, grid=ORDERS),
             *(Parameter(key, -100.0, 100.0, 10.0, linear=False) for key in RUN_OUT),
         )
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return columns of the waves on a grid of orders; the run-out is found by a fit."""
+
+        def turns(at: Shape, block: Block) -> Array:
+            angle = block.theta[:, MOTORS.index(place)]
+            phases = [harmonic * at[0] * angle for harmonic in HARMONICS]
+            return np.stack([wave(p) for p in phases for wave in (np.cos, np.sin)], axis=-1)
+
+        carried = Carried("encoder_offset", {"offset_mdeg": 1.0}, turns)
+        return replace(tangents(self.parameters(place), held=RUN_OUT), carried=carried)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

@@ -1,0 +1,61 @@
+"""A user's own law is searched as well as one of the catalogue."""
+
+from importlib import metadata
+from inspect import getsource
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.searching.base_fit import fit_base
+from wrist_stiffness.campaign.searching.candidates import Point, wrist_candidates
+from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.model import registry
+from wrist_stiffness.model.effects import joint_friction
+from wrist_stiffness.simulation.cell import CellSettings
+
+LAW = "joint_friction"
+
+
+@pytest.fixture(scope="module")
+def point(model, in_the_cell):
+    settings = CellSettings(rate_hz=10.0, program_seconds=30.0, program_seed=41, base="exact")
+    base = fit_base(model, (as_units(model, in_the_cell(model.table, settings, 3)),))
+    return Point((base.model(0),), tuple(each.measured for each in base.problem.sessions))
+
+
+@pytest.fixture
+def as_a_users_own(monkeypatch, tmp_path):
+    """Take friction out of the catalogue and let another package offer the same class."""
+    (tmp_path / "own_laws.py").write_text(getsource(joint_friction))
+    monkeypatch.syspath_prepend(tmp_path)
+    modules = list(registry.iter_modules(registry.effects.__path__))
+    others = [each for each in modules if each.name != LAW]
+    assert len(others) == len(modules) - 1
+    own = metadata.EntryPoint("own", "own_laws:JointFriction", registry.ENTRY_POINTS)
+
+    def swap():
+        monkeypatch.setattr(registry, "iter_modules", lambda path: others)
+        monkeypatch.setattr(registry.metadata, "entry_points", lambda group: [own])
+        registry.catalogue.cache_clear()
+
+    yield swap
+    monkeypatch.undo()
+    registry.catalogue.cache_clear()
+
+
+def test_a_sticky_law_of_ones_own_has_the_columns_and_starts_of_ours(point, as_a_users_own):
+    ours = wrist_candidates(point, (), laws=(LAW,))
+    as_a_users_own()
+    own = wrist_candidates(point, (), laws=(LAW,))
+    assert [each.name for each in own] == [each.name for each in ours] != []
+    for one, other in zip(ours, own, strict=True):
+        assert other.law.foreign
+        assert (other.law.smooth, other.law.inexactness) == (one.law.smooth, one.law.inexactness)
+        assert not one.law.smooth
+        assert one.shapes == other.shapes
+        assert np.array_equal(one.usual, other.usual)
+        for shape in one.shapes:
+            columns = one.at(shape)
+            assert np.allclose(other.at(shape), columns, rtol=0.0, atol=1e-9 * abs(columns).max())
+            starts = [e.effect({"coefficient": 0.2}, shape).estimates for e in (one, other)]
+            assert starts[0] == starts[1]

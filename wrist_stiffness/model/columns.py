@@ -1,0 +1,230 @@
+"""How a law becomes columns of a linear fit, and where a fit with the law itself begins.
+
+A law is linear in some parameters and not in others.  The linear ones become columns by
+differences; the others are a grid of shapes.  Some laws need other coordinates: a gap, a hardening
+or a friction is a shape times a share of it; a mass and its place are linear as a mass and its
+first moment (`point_mass`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.parameters import Parameter
+
+Shape = tuple[float, ...]
+Values = dict[str, float]
+
+SMALL = 0.1
+"""Share of a parameter's prior scale at which a column is the tangent."""
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What stands in front of a column.
+
+    Parameters
+    ----------
+    name : str
+        With its unit; the parameter's where the column is one of a parameter.
+    lower, upper : float
+        What is physically possible.
+    plausible : float
+        Usual size.
+    """
+
+    name: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    plausible: float = 1.0
+
+
+@dataclass(frozen=True)
+class ShapeGrid:
+    """What a law is not linear in, with the values to try first.
+
+    Parameters
+    ----------
+    name : str
+        With its unit.
+    grid : tuple of float
+        Two or more increasing values; a search stays between the first and the last.
+
+    Raises
+    ------
+    InputError
+        If the grid cannot be searched.
+    """
+
+    name: str
+    grid: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Check the grid."""
+        if len(self.grid) < 2 or not np.all(np.diff(self.grid) > 0.0):
+            raise InputError(f"{self.name}: grid {self.grid}: not two or more increasing values")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: (prediction at `trial` - prediction at `origin`) / size, per unit of a factor.
+
+    Parameters
+    ----------
+    factor : Factor
+        What stands in front of the column.
+    trial, origin : dict of str to float
+        Values of the law's parameters, all of them; an empty origin is the law's absence.
+    size : float
+        How many units of the factor the trial has more than the origin.
+    """
+
+    factor: Factor
+    trial: Values
+    size: float
+    origin: Values = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Columns that are the effect of another law at the same place, times signals.
+
+    For waves that come round more than once in the second of a unit: the effect of the carrier is
+    taken once a unit, the signals at all its moments, and columns are exact between the points of
+    the grid as well.
+
+    Parameters
+    ----------
+    law : str
+        Id of the carrier.
+    values : dict of str to float
+        Of its parameters, all of them.
+    signals : callable
+        (shape, block of n samples) -> (n, k), one for each column of the recipe.
+    """
+
+    law: str
+    values: Values
+    signals: Callable[[Shape, Block], Array]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Columns of a law at a place.
+
+    Parameters
+    ----------
+    shape : tuple of ShapeGrid
+        Grids of what is not linear.
+    columns : callable
+        shape -> its columns, of the same factors at every shape.
+    start : callable
+        (factors by name, shape) -> values of the law's parameters with which a fit may begin; they
+        may be out of bounds.
+    idle : tuple of str
+        Parameters that do nothing here.
+    carried : Carried, optional
+        Another way to the same columns.
+    """
+
+    shape: tuple[ShapeGrid, ...]
+    columns: Callable[[Shape], tuple[Column, ...]]
+    start: Callable[[Mapping[str, float], Shape], Values]
+    idle: tuple[str, ...] = ()
+    carried: Carried | None = None
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """Every point of the grid; one without a shape where all is linear."""
+        return list(product(*(each.grid for each in self.shape)))
+
+
+def factor(parameter: Parameter) -> Factor:
+    """Return a parameter as the factor of its column."""
+    return Factor(parameter.key, parameter.lower, parameter.upper, parameter.scale)
+
+
+def tangents(
+    parameters: Sequence[Parameter], idle: Collection[str] = (), held: Collection[str] = ()
+) -> Recipe:
+    """Return the recipe of a law that is linear in all parameters without a grid.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Of the law at a place.
+    idle : collection of str
+        Those that do nothing there; they stay zero.
+    held : collection of str
+        Those that are left to a fit of the law itself, which begins with zero.
+    """
+    active = [each for each in parameters if each.key not in {*idle, *held}]
+    gridded = [each for each in active if each.grid]
+    other = [each for each in active if not each.grid]
+    nothing = {each.key: 0.0 for each in parameters}
+
+    def still(at: Shape) -> Values:
+        return nothing | dict(zip((each.key for each in gridded), at, strict=True))
+
+    def columns(at: Shape) -> tuple[Column, ...]:
+        sizes = {each: SMALL * each.scale for each in other}
+        return tuple(
+            Column(factor(each), still(at) | {each.key: size}, size) for each, size in sizes.items()
+        )
+
+    def start(found: Mapping[str, float], at: Shape) -> Values:
+        return still(at) | {each.key: found[each.key] for each in other}
+
+    shape = tuple(ShapeGrid(each.key, each.grid) for each in gridded)
+    return Recipe(shape, columns, start, tuple(p.key for p in parameters if p.key in idle))
+
+
+def at_usual_size(parameter: Parameter, size: float) -> Recipe:
+    """Return the recipe of a law with one parameter that is nearly linear, by its effect at a size.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        The only one.
+    size : float
+        In its unit.
+    """
+    column = Column(factor(parameter), {parameter.key: size}, size)
+    return Recipe((), lambda at: (column,), lambda found, at: {parameter.key: found[parameter.key]})
+
+
+def share_of_shape(
+    parameters: Sequence[Parameter], key: str, fixed: Mapping[str, float] | None = None
+) -> Recipe:
+    """Return the recipe of a law that is linear in nothing: its shapes on grids, times a share.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Of the law at a place; those with a grid are the shape.
+    key : str
+        The one of them in units of which the share counts, so that it reads as that parameter.
+    fixed : dict of str to float
+        Values of the others in every trial.
+    """
+    gridded = [each for each in parameters if each.grid]
+    own = next(factor(each) for each in parameters if each.key == key)
+
+    def values(at: Shape) -> Values:
+        return {**(fixed or {}), **dict(zip((each.key for each in gridded), at, strict=True))}
+
+    def columns(at: Shape) -> tuple[Column, ...]:
+        return (Column(own, values(at), values(at)[key]),)
+
+    def start(found: Mapping[str, float], at: Shape) -> Values:
+        return values(at) | {key: found[key]}
+
+    shape = tuple(ShapeGrid(f"at_{each.key}", each.grid) for each in gridded)
+    return Recipe(shape, columns, start)
