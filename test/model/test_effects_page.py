@@ -1,6 +1,6 @@
 """The page on effects says what the code does: names, parameters, sizes, and its code runs.
 
-`python test/model/test_effects_page.py` writes the table of usual sizes.
+`python test/model/test_effects_page.py` writes the tables of usual sizes and of exactness.
 """
 
 import re
@@ -20,7 +20,6 @@ ROWS = {
     row[0]: row[3] for row in re.findall(r"^\| `(\w+)` \| (.*?) \| (.*?) \| (.*?) \|$", TEXT, re.M)
 }
 
-BEGIN, END = "<!-- usual sizes: begin -->\n", "<!-- usual sizes: end -->\n"
 SIGNS = {"um": "µm", "percent": "%", "Nmm": "N mm", "gmm2": "g mm²", "Nm": "(N m)"}
 
 
@@ -66,8 +65,30 @@ def usual_sizes():
     return "\n".join(lines) + "\n"
 
 
-def test_the_usual_sizes_on_the_page_are_the_laws():
-    assert TEXT.split(BEGIN)[1].split(END)[0] == usual_sizes()
+def exactness():
+    """Return the table of how exact laws are; a star marks those that columns do not show."""
+    shares = {}
+    for law in sorted(catalogue().values(), key=lambda law: (law.inexactness, law.id)):
+        shares.setdefault(law.inexactness, []).append(f"`{law.id}`" + "*" * (not law.smooth))
+    lines = ["| wrong by | effects |", "|---|---|"]
+    lines += [f"| {100.0 * share:g} % | {', '.join(laws)} |" for share, laws in shares.items()]
+    return "\n".join(lines) + "\n"
+
+
+TABLES = {"usual sizes": usual_sizes, "exactness": exactness}
+
+
+def written(text, name):
+    """Return the page before a table that code writes, the table, and the page after it."""
+    begin, end = (f"<!-- {name}: {mark} -->\n" for mark in ("begin", "end"))
+    before, rest = text.split(begin)
+    table, after = rest.split(end)
+    return before + begin, table, end + after
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_on_the_page_is_what_the_laws_say(name):
+    assert written(TEXT, name)[1] == TABLES[name]()
 
 
 def test_every_effect_has_its_row():
@@ -113,5 +134,6 @@ def test_python_on_the_page_runs(monkeypatch):
 
 
 if __name__ == "__main__":
-    before, rest = TEXT.split(BEGIN)
-    PAGE.write_text(before + BEGIN + usual_sizes() + END + rest.split(END)[1])
+    for name, table in TABLES.items():
+        before, _, after = written(PAGE.read_text(), name)
+        PAGE.write_text(before + table() + after)

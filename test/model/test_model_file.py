@@ -223,6 +223,13 @@ def test_bad_model_files_give_one_line(tmp_path, old, new, text):
     assert "\n" not in str(caught.value)
 
 
+LINEARISED = """def linearised(self, place, signals):
+        from wrist_stiffness.model.columns import at_usual_size
+        return at_usual_size(Parameter("turn", -10.0, 10.0, 1.0), 1.0)
+
+    """
+
+
 @pytest.mark.parametrize(
     ("own", "text"),
     [
@@ -238,6 +245,18 @@ def test_bad_model_files_give_one_line(tmp_path, old, new, text):
         ),
         (OWN.replace("return (Parameter(", "return (Parametre("), "NameError: name 'Parametre'"),
         (OWN.replace("10.0, 1.0)", "10.0, 0.0)"), "turn_mdeg: scale = 0.0 is not above 0"),
+        (
+            OWN.replace("10.0, 1.0)", "10.0, 1.0, grid=(2, 1))"),
+            "turn_mdeg: grid .* not two or more",
+        ),
+        (
+            OWN.replace("def adv", LINEARISED + "def adv"),
+            r"linearised\('platform'\): KeyError: 'turn'",
+        ),
+        (
+            OWN.replace("    stage =", "    inexactness = 3\n    stage ="),
+            "inexactness = 3 is not from 0",
+        ),
     ],
 )
 def test_bad_law_files_give_one_line(tmp_path, own, text):

@@ -103,15 +103,16 @@ def _require_parameters(law: Law, place: str) -> None:
     for component in law.places:
         asked = "parameters"
         try:
-            scales = {each.key: each.scale for each in law.parameters(component)}
+            for each in law.parameters(component):
+                if not each.scale > 0.0:
+                    raise InputError(f"{each.key}: scale = {each.scale} is not above 0")
             asked = "linearised"
             _begin(law, component)
+        except InputError as error:
+            raise InputError(f"{place}: {error}") from error
         except (Exception, SystemExit) as error:
             said = f"{type(error).__name__}: {error}"
             raise InputError(f"{place}: {asked}({component!r}): {said}") from error
-        for key, scale in scales.items():
-            if not scale > 0.0:
-                raise InputError(f"{place}: {key}: scale = {scale} is not above 0")
 
 
 def _begin(law: Law, component: str) -> None:

@@ -42,6 +42,7 @@ class AxisMisalignment(Law):
     check = "indicate the pin against its neighbours' axes on a coordinate measuring machine"
     excited_by = "poses all over the workspace, without load"
     constant = True
+    smooth = False
     inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:

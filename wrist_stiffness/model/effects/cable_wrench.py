@@ -28,6 +28,7 @@ class CableWrench(Law):
     sentence = "a cable or hose pulls at the platform, differently from pose to pose"
     check = "unplug the cable or hold it up by hand and repeat a pose"
     excited_by = "unloaded poses all over the workspace, approached from both sides"
+    smooth = False
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return twelve slopes and the width of the hysteresis."""

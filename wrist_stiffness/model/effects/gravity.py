@@ -37,6 +37,7 @@ class Gravity(Law):
     sentence = "{place} carries a weight that is not modelled, or the wrist is mounted tilted"
     check = "weigh payload and fittings; lay a level on the base"
     excited_by = "unloaded poses all over the workspace"
+    smooth = False
     inexactness = 0.0
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
