@@ -1,5 +1,7 @@
 """Where the fit of a new effect begins: near what is there, from the base's residuals alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.columns import tangents
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
@@ -46,6 +49,24 @@ def test_a_law_begins_near_its_true_value(model, law, place, key, size):
     hidden = Effect(find_law(law), place).with_values({key: size})
     found = start_values(base_of(model, hidden), Effect(find_law(law), place))
     assert found[key] == pytest.approx(size, rel=0.25)
+
+
+class Worn(type(find_law("backlash"))):
+    """Play that is never nothing."""
+
+    id = "worn"
+
+    def parameters(self, place):
+        return (replace(super().parameters(place)[0], lower=30.0, mean=40.0),)
+
+    def linearised(self, place, signals):
+        return tangents(self.parameters(place))
+
+
+def test_a_law_whose_bounds_leave_out_zero_begins_within_them(model):
+    hidden = Effect(find_law("backlash"), "motor_2").with_values({"width_mdeg": 60.0})
+    worn = Effect(Worn(), "motor_2", {"width_mdeg": Estimate(40.0)})
+    assert 30.0 <= start_values(base_of(model, hidden), worn)["width_mdeg"] < 60.0
 
 
 def test_a_shape_begins_at_the_point_of_its_grid_that_explains_most(model):

@@ -12,7 +12,7 @@ from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.columns import Column
-from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.effect import Effect, effect_at
 
 FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
 """Multiples of the typed values that are tried where a law knows no prior."""
@@ -47,18 +47,17 @@ def start_values(found: Fit, effect: Effect) -> dict[str, float]:
         found_at = _factors(judge, effect, how.columns(shape))
         if found_at[0] < best[0]:
             best = found_at[0], how.start(found_at[1], shape)
-    known = {parameter.key: parameter for parameter in effect.parameters}
-    return {
-        key: min(max(value, known[key].lower), known[key].upper) for key, value in best[1].items()
-    }
+    begun = effect_at(effect.law, effect.component, best[1])
+    return {key: estimate.value for key, estimate in begun.estimates.items()}
 
 
 def _factors(
     judge: _Judge, effect: Effect, columns: Sequence[Column]
 ) -> tuple[float, dict[str, float]]:
     """Return half the sum of squares that is left, priors included, and the factors by name."""
-    trials = [effect.with_values(column.trial) for column in columns]
-    origins = [effect.with_values(column.origin) if column.origin else None for column in columns]
+    law, place = effect.law, effect.component
+    trials = [effect_at(law, place, column.trial) for column in columns]
+    origins = [effect_at(law, place, c.origin) if c.origin else None for c in columns]
     changes = judge.changes([*trials, *(origin for origin in origins if origin)])
     moved, rest = changes[: len(trials)], iter(changes[len(trials) :])
     design = np.stack(
