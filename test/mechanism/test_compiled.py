@@ -49,7 +49,8 @@ def found_at(mechanism, theta, rectangle=ANYWHERE, singularity=0.0):
     """Return the compiled configuration, None where it is refused."""
     row = np.empty(native.CONFIGURATION)
     constants = mechanism_constants(mechanism, rectangle, limits_of(singularity))
-    return None if native.forward(constants, theta, row) else Configuration.of_row(row)
+    refused = native.forward(constants, theta, row, np.empty(1, dtype=np.uint8))
+    return None if refused else Configuration.of_row(row)
 
 
 def test_it_is_built_here():
@@ -158,4 +159,6 @@ def test_one_motion_is_as_one_of_many(direction, size):
 def test_arrays_that_are_too_small_are_refused(shipped, size):
     """The compiled code trusts no length."""
     with pytest.raises(ValueError, match="are needed"):
-        native.forward(np.zeros(size), np.zeros(2), np.zeros(native.CONFIGURATION))
+        native.forward(
+            np.zeros(size), np.zeros(2), np.zeros(native.CONFIGURATION), np.zeros(1, np.uint8)
+        )

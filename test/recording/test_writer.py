@@ -176,7 +176,7 @@ def test_a_signal_before_the_first_message_leaves_nothing_behind(tmp_path, monke
         assert list(tmp_path.iterdir()) != []
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("wrist_stiffness.recording.writer.Writer.start", interrupted)
+    monkeypatch.setattr("wrist_stiffness.recording.writer.ChunkWriter.start", interrupted)
     with pytest.raises(KeyboardInterrupt), RecordingWriter(tmp_path / name):
         raise AssertionError("never begun")
     assert list(tmp_path.iterdir()) == []

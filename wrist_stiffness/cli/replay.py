@@ -12,7 +12,7 @@ from wrist_stiffness.cli.recording_options import add_recording_options, setting
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.output_changes import TopicChanges
-    from wrist_stiffness.workflows.replay import ReplaySummary
+    from wrist_stiffness.workflows.replay_summary import ReplaySummary
 
 DESCRIPTION = """\
 Run the very code of the nodes over a recording and write it again with predicted pose errors and
@@ -91,8 +91,6 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _print(summary: ReplaySummary) -> None:
-    import numpy as np
-
     print(
         f"{summary.predictions} predictions for {summary.joint_states} joint states, "
         f"{summary.corrections} of {summary.commands} commands corrected"
@@ -100,8 +98,8 @@ def _print(summary: ReplaySummary) -> None:
     if summary.trajectories:
         print(f"{summary.corrected_trajectories} of {summary.trajectories} trajectories corrected")
     if summary.predictions:
-        for name, values in (("s [um]", summary.shift_norm_um), ("phi [mdeg]", summary.phi_mdeg)):
-            print(f"  predicted {name:10} mean {np.mean(values):8.3f}   max {np.max(values):8.3f}")
+        for name, sizes in (("s [um]", summary.shift_um), ("phi [mdeg]", summary.phi_mdeg)):
+            print(f"  predicted {name:10} mean {sizes.mean:8.3f}   max {sizes.most:8.3f}")
     if summary.damage:
         print(f"input is damaged: {summary.damage}")
     if summary.replaced:

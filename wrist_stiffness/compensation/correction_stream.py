@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.correction import Correction
-from wrist_stiffness.compensation.corrector import Corrector, faded, search
+from wrist_stiffness.compensation.corrector import Correcting, Corrector, faded, search
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.payload import Payload, Thresholds
@@ -18,7 +19,7 @@ from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import within_joint_limits
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import Stream
+from wrist_stiffness.compensation.stream import Stream, as_rows
 from wrist_stiffness.compensation.supervisor import Held, Supervision, Supervisor
 from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point, neighbours
 from wrist_stiffness.errors import (
@@ -28,7 +29,9 @@ from wrist_stiffness.errors import (
     UnreachablePoseError,
     WristError,
 )
+from wrist_stiffness.mechanism.compiled import CompiledCommands, Flags
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.topics import CORRECTED_FRAME
 
@@ -93,6 +96,34 @@ class CorrectedTrajectory:
     points: tuple[PlannedPoint, ...]
     fault: WristError | None
     valid: bool = False
+
+
+@dataclass(frozen=True)
+class CorrectedBlock:
+    """What to send to the motors for n commands.
+
+    Parameters
+    ----------
+    theta : (n, 2) float
+        Corrected motor angles [rad].
+    corrected : (n,) bool
+        Which of them have a correction; residual and covariance of the others are undefined.
+    after : (n, 6) float
+        Residual with the correction as it is applied, at O in F [m, rad].
+    covariance : (n, 6, 6) float
+        Of the prediction behind it.
+    faults : dict of int to WristError
+        Why a command has none.
+    platform : (n, 3, 3) float
+        U -> F of the rigid platform at the corrected angles.
+    """
+
+    theta: Array
+    corrected: Flags
+    after: Array
+    covariance: Array
+    faults: dict[int, WristError]
+    platform: Array
 
 
 class CorrectionStream(Stream):
@@ -255,6 +286,99 @@ class CorrectionStream(Stream):
             correction,
             fault,
             correction is not None and self.supervisor.valid,
+        )
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether `on_commands` can be asked: compiled, correcting, each command for itself."""
+        running = self._running
+        if running is None or running.compiled is None or not self.correcting:
+            return False
+        return running.model.certain and not running.model.constants.warnings
+
+    def within_limits(self, theta: Array) -> bool:
+        """Tell whether all commands (n, 2) [rad] are within the joint limits."""
+        if self.model is None:
+            return True
+        limits = self.model.table.geometry.limits
+        step = limits.encoder_step
+        inside = (limits.joint_lower - step <= theta) & (theta <= limits.joint_upper + step)
+        return bool(inside.all())
+
+    def task_points(self, platform: Array) -> Array | None:
+        """Return the tool point in F (n, 3) [m] at platform rotations (n, 3, 3); None at O."""
+        tool_point = self.running_model().model.table.geometry.platform.tool_point
+        return np.array([each @ tool_point for each in platform]) if tool_point.any() else None
+
+    def on_commands(self, stamps: NDArray[np.int64], theta: Array) -> CorrectedBlock:
+        """Correct many commands, to the bit as `on_command` would one by one.
+
+        Parameters
+        ----------
+        stamps : (n,) int
+            Not falling [ns].
+        theta : (n, 2) float
+            Motor angles, finite and within the joint limits [rad].
+
+        Returns
+        -------
+        CorrectedBlock
+            For all of them.
+        """
+        running, settings, supervisor = self.running_model(), self.settings, self.supervisor
+        compiled = running.compiled
+        if compiled is None:
+            raise InputError("this model is corrected command by command")
+        measured = self.loads.block_at(stamps)
+        wrench, on_platform, known = as_rows(measured)
+        table, n = running.model.table, len(stamps)
+        limits = table.geometry.limits
+        at, inside = compiled.forward(theta)
+        usable = inside & (np.linalg.norm(wrench[:, :3], axis=1) <= 0.999 * limits.force)
+        usable &= np.linalg.norm(wrench[:, 3:], axis=1) <= 0.999 * limits.moment
+        commands = CompiledCommands(stamps, theta, wrench, on_platform, known.copy())
+        block = Correcting(self._corrector, running, compiled, settings, commands)
+        angles, platforms, begin = theta.tolist(), at.platform, 0
+        for i, stamp_ns in enumerate(stamps.tolist()):
+            try:
+                found = measured[i]
+                if found is None or not usable[i]:
+                    load = self._load(stamp_ns, theta[i])
+                else:
+                    load = supervisor.judge(
+                        stamp_ns,
+                        angles[i],
+                        found,
+                        platforms[i],
+                        table.geometry,
+                        settings.supervisor,
+                        settings.correction_limit,
+                    )
+                commands.wanted[i] = True
+                wrench[i], on_platform[i] = load.wrench, load.on_platform
+            except WristError as error:
+                block.faults[i] = error
+                commands.wanted[i] = False
+                if isinstance(error, StaleLoadError):
+                    supervisor.lost()
+            if not supervisor.undisturbed:
+                block.correct(begin, i)
+                block.correct(i, i + 1, supervisor.share)
+                begin = i + 1
+        block.correct(begin, n)
+        corrected = commands.wanted.copy()
+        corrected[list(block.faults)] = False
+        predicted = block.found.predicted
+        there = Configuration.of_row(np.ascontiguousarray(predicted.configuration))
+        twist = np.ascontiguousarray(predicted.twist)
+        covariance = running.model.table_covariance(there, twist)
+        return CorrectedBlock(
+            theta + block.found.applied,
+            corrected,
+            np.ascontiguousarray(block.found.rows[:, 2:8]),
+            covariance,
+            block.faults,
+            there.platform,
         )
 
     def on_trajectory(

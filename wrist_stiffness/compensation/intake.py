@@ -210,6 +210,16 @@ class Frames:
         turned_moment = sign * (frame.rotation @ wrench[3:]) + cross(frame.position, turned_force)
         return Load(np.concatenate([turned_force, turned_moment]), frame.parent == PLATFORM_FRAME)
 
+    def is_at_origin(self, frame_id: str) -> bool:
+        """Tell whether loads of a frame are at O as they come."""
+        name = frame_name(frame_id)
+        return name in (BASE_FRAME, PLATFORM_FRAME) and name not in self.sensors
+
+    def loads(self, frame_id: str, wrenches: Array) -> list[Load]:
+        """Return finite wrenches (k, 6) of a frame that is at O."""
+        on_platform = frame_name(frame_id) == PLATFORM_FRAME
+        return [Load(wrench, on_platform) for wrench in wrenches]
+
     def in_base(self, frame_id: str, what: str) -> tuple[Array, Array]:
         """Return how to turn and move what was measured in a frame to F.
 

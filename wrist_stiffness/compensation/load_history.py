@@ -6,9 +6,10 @@ import bisect
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.intake import Frames
-from wrist_stiffness.errors import InputError, StaleLoadError
+from wrist_stiffness.errors import InputError, StaleLoadError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import Load
 
@@ -105,6 +106,41 @@ class LoadHistory:
         self._served_ns = (self._stamps[place], max(stamp_ns, self._served_ns[1]))
         return self._stamps[place], self._loads[place]
 
+    def keeps(self, stamps: NDArray[np.int64], first_ns: int) -> bool:
+        """Tell whether loads of further stamps (k,) [ns] leave that of a first sample in place."""
+        surplus = len(self._stamps) + len(stamps) - self.CAPACITY
+        if surplus <= 0:
+            return True
+        return surplus < len(self._stamps) and self._stamps[surplus] <= first_ns
+
+    def rises_with(self, stamps: NDArray[np.int64]) -> bool:
+        """Tell whether loads of these stamps (k,) [ns] would all be newer than the one before."""
+        if not len(stamps):
+            return True
+        newest = self._stamps[-1] if self._stamps else stamps[0] - 1
+        return bool(stamps[0] > newest and (np.diff(stamps) > 0).all())
+
+    def extend(self, stamps: NDArray[np.int64], loads: Sequence[Load]) -> None:
+        """Keep loads that rise (see `rises_with`), as `add` would one after the other."""
+        load_served_ns, served_ns = self._served_ns
+        self.late += int(np.count_nonzero((load_served_ns < stamps) & (stamps <= served_ns)))
+        self._stamps += stamps.tolist()
+        self._loads += loads
+        surplus = max(0, len(self._stamps) - self.CAPACITY)
+        del self._stamps[:surplus], self._loads[:surplus]
+
+    def places(self, stamps: NDArray[np.int64]) -> tuple[NDArray[np.intp], list[Load]]:
+        """Return which of the loads kept belongs to each stamp (n,) [ns], -1 where `at` refuses."""
+        kept = np.array(self._stamps, dtype=np.int64)
+        found = np.searchsorted(kept, stamps, side="right") - 1
+        known = (found >= 0) & (stamps != 0)
+        known[known] = stamps[known] - kept[found[known]] <= self._age_limit_ns
+        if known.any():
+            last = int(np.flatnonzero(known)[-1])
+            newest = max(int(stamps[known].max()), self._served_ns[1])
+            self._served_ns = int(kept[found[last]]), newest
+        return np.where(known, found, -1), self._loads
+
     def mean_since(self, window_s: float) -> tuple[Load, Array]:
         """Return mean and scatter of the newest loads over a window, for the tare.
 
@@ -189,6 +225,45 @@ class LoadIntake:
         """
         self.zero, self.scatter = self.history.mean_since(TARE_WINDOW_S)
         return self.zero
+
+    def add_block(
+        self, stamps: NDArray[np.int64], frame_id: str, wrenches: NDArray[np.float64]
+    ) -> list[WristError]:
+        """Take in wrench messages of one frame and return why some cannot be used.
+
+        Parameters
+        ----------
+        stamps : (k,) int
+            [ns].
+        frame_id : str
+            Frame of the messages.
+        wrenches : (k, 6) float
+            Force and moment [N, N m].
+        """
+        finite = bool(np.isfinite(wrenches).all())
+        if finite and self.history.rises_with(stamps) and self.frames.is_at_origin(frame_id):
+            self.history.extend(stamps, self.frames.loads(frame_id, wrenches))
+            return []
+        faults: list[WristError] = []
+        for stamp_ns, wrench in zip(stamps.tolist(), wrenches.tolist(), strict=True):
+            try:
+                self.add(stamp_ns, frame_id, wrench[:3], wrench[3:])
+            except WristError as error:
+                faults.append(error)
+        return faults
+
+    def block_at(self, stamps: NDArray[np.int64]) -> list[Load | None]:
+        """Return the loads that belong to n stamps [ns], None where `at` refuses."""
+        places, kept = self.history.places(stamps)
+        tare = self.zero
+        if tare is None:
+            return [None if place < 0 else kept[place] for place in places.tolist()]
+        return [
+            None
+            if place < 0 or kept[place].on_platform != tare.on_platform
+            else Load(kept[place].wrench - tare.wrench, tare.on_platform)
+            for place in places.tolist()
+        ]
 
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`).

@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_covariance import load_covariance
@@ -16,6 +19,9 @@ from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.static_transforms import StaticTransform, sensor_frames
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.compiled import Flags
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
 
@@ -122,6 +128,25 @@ class PredictedSample:
     prediction: Prediction
 
 
+@dataclass(frozen=True)
+class PredictedBlock:
+    """Predictions for n joint states.
+
+    Parameters
+    ----------
+    known : (n,) bool
+        Which of them could be predicted; the rest of the others is undefined.
+    twist : (n, 6) float
+        At O in F [m, rad].
+    covariance : (n, 6, 6) float
+        Of the twist.
+    """
+
+    known: Flags
+    twist: Array
+    covariance: Array
+
+
 class PredictionStream(Stream):
     """Pose error for every joint state.
 
@@ -171,3 +196,47 @@ class PredictionStream(Stream):
                 added = added + prediction.added_covariance
             prediction = replace(prediction, added_covariance=added)
         return PredictedSample(stamp_ns, load_stamp_ns, prediction)
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether `on_joint_states` can be asked: compiled, and each sample stands for itself."""
+        running = self._running
+        if running is None or running.compiled is None or self.settings.load_noise is not None:
+            return False
+        return running.model.certain and not running.model.constants.warnings
+
+    def on_joint_states(self, stamps: NDArray[np.int64], theta: Array) -> PredictedBlock:
+        """Predict for many joint states, to the bit as `on_joint_state` would one by one.
+
+        Parameters
+        ----------
+        stamps : (n,) int
+            Not falling [ns].
+        theta : (n, 2) float
+            Motor angles [rad].
+
+        Returns
+        -------
+        PredictedBlock
+            `on_joint_state` says why one could not be predicted.
+        """
+        running = self.running_model()
+        compiled = running.compiled
+        if compiled is None:
+            raise InputError("this model is predicted sample by sample")
+        loads = self.loads.block_at(stamps)
+        wrench, on_platform, known = as_rows(loads)
+        rows = compiled.predict(theta, wrench, on_platform, running.contact, known)
+        known &= rows.status == 0
+        at = Configuration.of_row(rows.configuration)
+        covariance = running.model.table_covariance(at, rows.twist)
+        return PredictedBlock(known, rows.twist, covariance)
+
+
+def as_rows(loads: Sequence[Load | None]) -> tuple[Array, Flags, Flags]:
+    """Return wrenches (n, 6), which are in U (n,), and which are there at all (n,)."""
+    nothing = np.zeros(6)
+    wrench = np.array([nothing if load is None else load.wrench for load in loads])
+    on_platform = np.array([load is not None and load.on_platform for load in loads])
+    known = np.array([load is not None for load in loads])
+    return wrench.reshape(-1, 6), on_platform, known

@@ -333,6 +333,11 @@ class Supervisor:
         """Return what is held now, in full, for plans: it stays that, whatever is judged later."""
         return Held(self._scales, copy(self._payload), self._followed, self._share, self.valid)
 
+    @property
+    def undisturbed(self) -> bool:
+        """Whether `share` is 1 whatever the correction, and stays so."""
+        return self._against is None and self._share == 1.0
+
     def share(self, turn: Array) -> float:
         """Return the part of a correction to apply, less where a contact works against it.
 

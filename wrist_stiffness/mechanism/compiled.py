@@ -244,6 +244,16 @@ class CompiledWrist:
         self.sectors = len(components.sectors.gap)
         self._parts = parts_constants(components, gravity, screws, opening, load_scale, load_added)
 
+    def forward(self, theta: Array) -> tuple[Configuration, Flags]:
+        """Return the configurations at motor angles (n, 2) [rad], and which lie in the domain (n,).
+
+        Those of the others are undefined.
+        """
+        rows = np.empty((len(theta), native.CONFIGURATION))
+        status = np.empty(len(theta), dtype=np.uint8)
+        native.forward(self._mechanism, np.ascontiguousarray(theta), rows, status)
+        return Configuration.of_row(rows), status == 0
+
     def respond(
         self,
         configuration: Configuration,

@@ -131,7 +131,7 @@ class Workspace:
         theta = np.array(theta, dtype=float)
         if native is not None:
             row = np.empty(native.CONFIGURATION)
-            if not native.forward(self.constants, theta, row):
+            if not native.forward(self.constants, theta, row, np.empty(1, dtype=np.uint8)):
                 return Configuration.of_row(row)
         # It says why there is none.
         configuration = self.mechanism.forward(theta)

@@ -162,6 +162,11 @@ class ErrorModel:
             return float(errors["stated_relative"])
         return float(errors["mesh_relative"] + max(errors["predicted"]["domain"].values()))
 
+    @property
+    def certain(self) -> bool:
+        """Whether no parameter adds to the covariance."""
+        return self.joint is None and not self.variations
+
     def session(self) -> Session:
         """Return a fresh memory for a stream of samples."""
         return Session(self)
@@ -225,14 +230,13 @@ class ErrorModel:
             moved = [other.predict(theta, load, active).twist for other in self.variations]
             return self.parameter_covariance(twist, moved)
 
-        uncertain = self.joint is not None or self.variations
         return Prediction(
             twist,
             configuration,
             active,
             self.table_covariance,
             self.constants.sensor(configuration),
-            of_parameters if uncertain else None,
+            None if self.certain else of_parameters,
             warnings=self.constants.warnings,
         )
 

@@ -159,6 +159,20 @@ class Layout:
         )
         return numbers[:, 0] if leaf.count is None else numbers
 
+    def write(self, rows: NDArray[np.uint8], leaf: Leaf, column: NDArray[Any]) -> None:
+        """Write numbers (m,) or (m, k), or times (m,) [ns], into payloads (m, size)."""
+        begin = ENCAPSULATION_SIZE + leaf.offset
+        if leaf.element in SECONDS_NANOSECONDS:
+            parts = [(column // 1_000_000_000, "i"), (column % 1_000_000_000, "I")]
+        else:
+            parts = [(column, PRIMITIVES[leaf.element].format)]
+        for numbers, code in parts:
+            kind = np.dtype(code).newbyteorder(self.byte_order)
+            columns = numbers if numbers.ndim == 2 else numbers[:, None]
+            raw = np.ascontiguousarray(columns, dtype=kind).view(np.uint8)
+            rows[:, begin : begin + raw.shape[1]] = raw
+            begin += raw.shape[1]
+
     def _numbers(
         self, rows: NDArray[np.uint8], offset: int, code: str, size: int, count: int
     ) -> NDArray[Any]:

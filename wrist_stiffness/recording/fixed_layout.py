@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.batch import layout_of
@@ -40,7 +41,7 @@ class FixedLayout:
     """
 
     def __init__(self, message_type: type[Message], payload: bytes) -> None:
-        layout = layout_of(message_type, payload)
+        self._layout = layout = layout_of(message_type, payload)
         self._ros_type = message_type.ros_type
         self._size = len(payload)
         # As one long integer: no other comparison of bytes here and there is as quick.
@@ -59,6 +60,21 @@ class FixedLayout:
     def of(cls, message: Message) -> FixedLayout:
         """Return the little-endian layout of messages like this one."""
         return cls(type(message), encode(message))
+
+    def rows(self, *columns: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return the payloads of n messages, (n, size), with zeros for padding.
+
+        Parameters
+        ----------
+        columns : (n,) or (n, k) arrays
+            One for each number, time [ns] and run of numbers, in the order of the wire.
+        """
+        n = len(columns[0])
+        fixed = np.frombuffer(self._fixed.to_bytes(self._size, "little"), np.uint8)
+        out = np.broadcast_to(fixed, (n, self._size)).copy()
+        for leaf, column in zip(self._layout.leaves, columns, strict=True):
+            self._layout.write(out, leaf, column)
+        return out
 
     def matches(self, payload: bytes) -> bool:
         """Tell whether a payload differs from the first one in numbers and padding only."""

@@ -165,7 +165,7 @@ class Contents:
             starts = self.begins[own] + MESSAGE.itemsize
             if sizes.size and sizes[0] and (sizes == sizes[0]).all():
                 size = int(sizes[0])
-                rows = _from_each_byte(self.buffer, np.dtype(f"V{size}"))[starts]
+                rows = from_each_byte(self.buffer, np.dtype(f"V{size}"))[starts]
                 found[number] = times, rows.view(np.uint8).reshape(-1, size)
             else:
                 ends = (starts + sizes).tolist()
@@ -261,13 +261,13 @@ def _walked(buffer: bytes, chunk: Chunk) -> Contents:
     places = np.array(begins, dtype=np.int64)
     if position != total or (begins and begins[-1] + MESSAGE.itemsize > total):
         raise RecordingError(f"{chunk.place}: no record at byte {position} of its {total}")
-    heads = _from_each_byte(buffer, MESSAGE)[places]
+    heads = from_each_byte(buffer, MESSAGE)[places]
     if (heads["length"] < MESSAGE_HEAD_SIZE).any():
         raise RecordingError(f"{chunk.place}: a message record is too short")
     return Contents(buffer, places, heads, others)
 
 
-def _from_each_byte(buffer: bytes, kind: np.dtype[np.void]) -> NDArray[np.void]:
+def from_each_byte(buffer: bytes, kind: np.dtype[np.void]) -> NDArray[np.void]:
     """Return what a buffer holds from each of its bytes on, as far as there are enough of them."""
     count = max(len(buffer) - kind.itemsize + 1, 0)
     return np.ndarray((count,), kind, buffer if count else None, strides=(1,))

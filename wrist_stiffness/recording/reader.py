@@ -7,16 +7,15 @@ import os
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import islice, pairwise
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.bag_folder import METADATA_FILE, Bag, bag_of
 from wrist_stiffness.recording.cdr import decode
-from wrist_stiffness.recording.channel import Channel
 from wrist_stiffness.recording.mcap_chunk import (
     Contents,
     Payloads,
@@ -27,9 +26,13 @@ from wrist_stiffness.recording.mcap_chunk import (
 )
 from wrist_stiffness.recording.mcap_index import McapIndex, index_mcap
 from wrist_stiffness.recording.messages import Message
+from wrist_stiffness.recording.raw_block import Integers, RawBlock, RawMessage
 
 MOST_OPENED_BYTES = 256 << 20
 """Of chunks that overlap in time.  A recorder's overlap by as much as a message is late."""
+
+MESSAGES_AT_A_TIME = 4096
+"""A block of messages: enough that a step for all of them costs little for each one."""
 
 PAYLOADS_AT_A_TIME = 10_000
 """So many of one topic are given together: a chunk has some hundred, and each step of decoding them
@@ -58,14 +61,6 @@ class TopicInfo:
     first_ns: int | None
     last_ns: int | None
     is_readable: bool
-
-
-class RawMessage(NamedTuple):
-    """A message as stored: channel, log time and undecoded payload."""
-
-    channel: Channel
-    log_time_ns: int
-    payload: bytes
 
 
 class Recording:
@@ -103,6 +98,7 @@ class Recording:
         undecodable = (
             f"{topic}: {count} messages cannot be decoded"
             for topic, count in self._undecodable.items()
+            if count
         )
         return "; ".join([*self._flaws, *undecodable])
 
@@ -165,6 +161,85 @@ class Recording:
                 heapq.heapreplace(opened, following)
             else:
                 heapq.heappop(opened)
+
+    def blocks(
+        self, topics: Collection[str] | None = None, least: int = MESSAGES_AT_A_TIME
+    ) -> Iterator[RawBlock]:
+        """Iterate over the stored messages in log-time order, many at a time, without decoding.
+
+        Parameters
+        ----------
+        topics : Collection[str], optional
+            Names to keep; None keeps all.
+        least : int
+            So many messages at a time, or up to a chunk more.
+
+        Yields
+        ------
+        RawBlock
+            The same messages in the same order as `raw_messages`.
+
+        Raises
+        ------
+        RecordingError
+            As `raw_messages`.
+        """
+        waiting: list[RawBlock] = []
+        for part in self._parts(least):
+            if topics is not None:
+                wanted = [channel.topic in topics for channel in part.channels]
+                part = part.take(np.flatnonzero(np.array(wanted)[part.channel]))
+            waiting.append(part)
+            if sum(map(len, waiting)) >= least:
+                yield RawBlock.joined(waiting)
+                waiting = []
+        if sum(map(len, waiting)):
+            yield RawBlock.joined(waiting)
+
+    def decoded(self, block: RawBlock, rows: Integers) -> tuple[list[Message], Integers]:
+        """Decode messages of a block one by one, of types that are known.
+
+        Parameters
+        ----------
+        block : RawBlock
+            Of this recording.
+        rows : (k,) int
+            Which ones.
+
+        Returns
+        -------
+        list of Message, (l,) int
+            Those that can be decoded, and which they are; the others count as damage.
+        """
+        messages, places = [], []
+        for place, payload in zip(rows.tolist(), block.payloads(rows), strict=True):
+            channel = block.channels[int(block.channel[place])]
+            if channel.message_type is None:
+                continue
+            try:
+                messages.append(decode(channel.message_type, bytes(payload)))
+                places.append(place)
+            except RecordingError:
+                self._undecodable[channel.topic] += 1
+        return messages, np.array(places, dtype=np.int64)
+
+    def undecodable(self, topic: str, count: int) -> None:
+        """Count payloads of a topic that somebody could not decode as damage."""
+        self._undecodable[topic] += count
+
+    def _parts(self, size: int) -> Iterator[RawBlock]:
+        chunks = [chunk for index in self._indices for chunk in index.chunks]
+        if all(before.end_ns <= after.start_ns for before, after in pairwise(chunks)):
+            for index in self._indices:
+                for position in range(len(index.chunks)):
+                    contents = self._contents(index, position)
+                    if contents is not None:
+                        yield RawBlock.of_contents(contents, index.channels)
+            return
+        # Chunks that reach into each other are merged message by message.
+        messages = self.raw_messages()
+        while part := list(islice(messages, size)):
+            yield RawBlock.of(part)
 
     def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
         """Iterate over the payloads of topics, many of one topic at a time.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections import Counter
 from contextlib import suppress
 from errno import EEXIST
 from os import PathLike
@@ -13,12 +12,12 @@ from types import TracebackType
 from typing import Any, BinaryIO
 
 import yaml
-from mcap.writer import CompressionType, Writer
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.bag_folder import METADATA_FILE
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import Channel, channel_of
+from wrist_stiffness.recording.chunk_writer import ChunkWriter, Messages
 from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.reader import open_recording
 
@@ -77,9 +76,6 @@ class RecordingWriter:
         self._stream: BinaryIO | None = None
         self._refused: OSError | None = None
         self._channels: dict[str, tuple[Channel, int]] = {}
-        self._counts: Counter[str] = Counter()
-        self._first_ns = _LAST_TIME_NS
-        self._last_ns = 0
 
     def __enter__(self) -> RecordingWriter:
         """Begin the recording under its temporary name."""
@@ -88,8 +84,8 @@ class RecordingWriter:
             if self._is_folder:
                 self._partial.mkdir()
             self._stream = self._storage_path.open("xb")
-            self._mcap = Writer(self._stream, CHUNK_BYTES, CompressionType.ZSTD)
-            self._mcap.start(profile="ros2", library="wrist_stiffness")
+            self._mcap = ChunkWriter(self._stream, CHUNK_BYTES)
+            self._mcap.start("ros2", "wrist_stiffness")
         except BaseException as error:
             # A signal may end the program here, before the `with` block has begun.
             self.__exit__(type(error), error, error.__traceback__)
@@ -163,24 +159,50 @@ class RecordingWriter:
             If the topic has another type, the time is out of range or the disk refuses, or has
             refused a message before.
         """
-        if self._stream is None:
-            raise RecordingError(f"{self.path}: written to outside of its `with` block")
-        if self._refused is not None:
-            # Nothing behind a torn chunk can be read.
-            raise self._refusal(self._refused) from self._refused
+        self._check_open()
         if not 0 <= log_time_ns <= _LAST_TIME_NS:
             raise RecordingError(
                 f"{channel.topic}: log time {log_time_ns} ns is outside 0 … {_LAST_TIME_NS}"
             )
         try:
             channel_id = self._register(channel)
-            self._mcap.add_message(channel_id, log_time_ns, payload, publish_time=log_time_ns)
+            self._mcap.add_message(channel_id, log_time_ns, payload)
         except OSError as error:
             self._refused = error
             raise self._refusal(error) from error
-        self._counts[channel.topic] += 1
-        self._first_ns = min(self._first_ns, log_time_ns)
-        self._last_ns = max(self._last_ns, log_time_ns)
+
+    def channel_id(self, channel: Channel) -> int:
+        """Return the number of a channel, for `write_block`; it is made known where it is new.
+
+        Raises
+        ------
+        RecordingError
+            If its topic has another type.
+        """
+        self._check_open()
+        return self._register(channel)
+
+    def write_block(self, messages: Messages) -> None:
+        """Append many messages, with log times as `write_raw` takes them.
+
+        Raises
+        ------
+        RecordingError
+            If the disk refuses, or has refused a message before.
+        """
+        self._check_open()
+        try:
+            self._mcap.add_messages(messages)
+        except OSError as error:
+            self._refused = error
+            raise self._refusal(error) from error
+
+    def _check_open(self) -> None:
+        if self._stream is None:
+            raise RecordingError(f"{self.path}: written to outside of its `with` block")
+        if self._refused is not None:
+            # Nothing behind a torn chunk can be read.
+            raise self._refusal(self._refused) from self._refused
 
     def __exit__(
         self,
@@ -292,10 +314,11 @@ class RecordingWriter:
             os.replace(self._partial, self.path)
 
     def _metadata(self) -> dict[str, Any]:
-        total = self._counts.total()
-        first_ns = self._first_ns if total else 0
+        counts = self._mcap.counts
+        total = counts.total()
+        first_ns, last_ns = self._mcap.times_ns
         times = {
-            "duration": {"nanoseconds": self._last_ns - first_ns},
+            "duration": {"nanoseconds": last_ns - first_ns},
             "starting_time": {"nanoseconds_since_epoch": first_ns},
             "message_count": total,
         }
@@ -314,9 +337,9 @@ class RecordingWriter:
                             "offered_qos_profiles": [_QOS_PROFILE],
                             "type_description_hash": channel.type_hash,
                         },
-                        "message_count": self._counts[channel.topic],
+                        "message_count": counts[channel_id],
                     }
-                    for channel, _ in self._channels.values()
+                    for channel, channel_id in self._channels.values()
                 ],
                 "compression_format": "",
                 "compression_mode": "",

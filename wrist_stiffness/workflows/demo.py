@@ -18,7 +18,8 @@ from wrist_stiffness.workflows.before_after import Pass, before_and_after
 from wrist_stiffness.workflows.cell import Tell, check_numbers, run_cell
 from wrist_stiffness.workflows.compare_runs import RunComparison, compare_runs
 from wrist_stiffness.workflows.pictures.before_after import draw_before_after
-from wrist_stiffness.workflows.replay import ReplaySummary, replay
+from wrist_stiffness.workflows.replay import replay
+from wrist_stiffness.workflows.replay_summary import ReplaySummary
 from wrist_stiffness.workflows.table import draw_maps
 
 LIVE, REPLAYED = "live", "replayed"

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -37,6 +34,7 @@ from wrist_stiffness.recording.messages import (
     TFMessage,
     WrenchStamped,
 )
+from wrist_stiffness.recording.raw_block import RawMessage
 from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.topics import (
@@ -50,13 +48,17 @@ from wrist_stiffness.topics import (
     MOTOR_POSITIONS_CORRECTED,
     MOTOR_TRAJECTORY,
     MOTOR_TRAJECTORY_CORRECTED,
+    POSE_ERROR_PHI_MDEG,
     POSE_ERROR_PREDICTED,
     POSE_ERROR_RESIDUAL,
     POSE_ERROR_RESIDUAL_TASK,
+    POSE_ERROR_S_UM,
     TEMPERATURES,
     TF_STATIC,
 )
 from wrist_stiffness.workflows.parameter_file import node_settings
+from wrist_stiffness.workflows.replay_block import BlockReplay
+from wrist_stiffness.workflows.replay_summary import MICROMETRES, MILLIDEGREES, ReplaySummary
 from wrist_stiffness.workflows.signals_ahead import SignalsAhead
 
 OUTPUTS = (
@@ -67,6 +69,9 @@ OUTPUTS = (
     MOTOR_POSITIONS_CORRECTED,
     MOTOR_TRAJECTORY_CORRECTED,
 )
+
+LEFT_OUT = frozenset({*OUTPUTS, POSE_ERROR_S_UM, POSE_ERROR_PHI_MDEG})
+"""What an earlier run left in the input; s and phi follow from the pose and need no comparing."""
 
 TYPES: dict[str, type[Message]] = {
     JOINT_STATES: JointState,
@@ -81,71 +86,6 @@ TYPES: dict[str, type[Message]] = {
 REQUIRED = (JOINT_STATES, LOAD_ESTIMATE)
 SAMPLED = (JOINT_STATES, MOTOR_COMMANDS, MOTOR_TRAJECTORY)
 """Topics whose messages are answered."""
-
-PROGRESS_EVERY = 500
-
-NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
-"""A value in a message; not the digits of a name such as motor_1_joint."""
-
-
-@dataclass
-class ReplaySummary:
-    """What a replay did.
-
-    Parameters
-    ----------
-    joint_states, predictions : int
-        Joint states read, predictions written.
-    commands, corrections : int
-        Commands read, commands that were changed.
-    trajectories, corrected_trajectories : int
-        The same of trajectories.
-    refused : Counter
-        Samples without a result. Reasons that differ only in their numbers are one, told by the
-        first of them.
-    warnings : Counter
-        Predictions by what the model had to leave out of them, such as an effect whose temperature
-        the recording lacks.
-    replaced : int
-        Outputs of an earlier run in the input, left out.
-    shift_norm_um, phi_mdeg : list of float
-        Predicted |s| [um] and phi [mdeg] at each prediction.
-    damage : str
-        What is wrong with the input; empty if nothing.
-    """
-
-    joint_states: int = 0
-    predictions: int = 0
-    commands: int = 0
-    corrections: int = 0
-    trajectories: int = 0
-    corrected_trajectories: int = 0
-    refused: Counter[str] = field(default_factory=Counter)
-    warnings: Counter[str] = field(default_factory=Counter)
-    replaced: int = 0
-    shift_norm_um: list[float] = field(default_factory=list)
-    phi_mdeg: list[float] = field(default_factory=list)
-    damage: str = ""
-    _first_of_kind: dict[str, str] = field(default_factory=dict, repr=False)
-
-    def refuse(self, topic: str, reason: object) -> None:
-        """Count a message of a topic that gave no result."""
-        text = f"{topic}: {reason}"
-        self.refused[self._first_of_kind.setdefault(NUMBER.sub("#", text), text)] += 1
-
-    def as_values(self) -> dict[str, Any]:
-        """Return the counts and reasons as programs read them."""
-        return {
-            "joint_states": self.joint_states,
-            "predictions": self.predictions,
-            "commands": self.commands,
-            "corrections": self.corrections,
-            "trajectories": self.trajectories,
-            "corrected_trajectories": self.corrected_trajectories,
-            "warnings": dict(self.warnings),
-            "refused": dict(self.refused),
-            "damage": self.damage,
-        }
 
 
 def replay(
@@ -199,29 +139,27 @@ def replay(
     ahead = SignalsAhead(source, signals, (predicting, correcting), summary.refuse)
     total = sum(topic.count for topic in source.topics)
     with RecordingWriter(output, overwrite=overwrite) as writer:
-        for done, raw in enumerate(source.raw_messages()):
-            if done % PROGRESS_EVERY == 0:
-                progress(done, total)
-            topic = raw.channel.topic
-            if topic in OUTPUTS:
-                summary.replaced += 1
+        blocks = BlockReplay(writer, predicting, correcting, ahead, sampled, LEFT_OUT, summary)
+        done = 0
+        for block in source.blocks():
+            progress(done, total)
+            done += len(block)
+            if blocks.answer(block):
                 continue
-            writer.write_raw(raw.channel, raw.payload, raw.log_time_ns)
-            if topic not in sampled:
-                continue
-            ahead.read_for(raw.log_time_ns)
-            try:
-                if sampled[topic] == MOTOR_TRAJECTORY:
-                    plan = decode(JointTrajectory, raw.payload)
-                    answers = _plan(plan, raw.log_time_ns, correcting, summary)
-                elif sampled[topic] == MOTOR_COMMANDS:
-                    answers = _correct(decode(JointState, raw.payload), correcting, summary)
-                else:
-                    answers = _predict(decode(JointState, raw.payload), predicting, summary)
-                for name, message in answers:
-                    writer.write(name, message, raw.log_time_ns)
-            except WristError as error:
-                summary.refuse(topic, error)
+            for raw in block.messages():
+                if raw.channel.topic in LEFT_OUT:
+                    summary.replaced += 1
+                    continue
+                writer.write_raw(raw.channel, raw.payload, raw.log_time_ns)
+                standard = sampled.get(raw.channel.topic)
+                if standard is None:
+                    continue
+                ahead.read_for(raw.log_time_ns)
+                try:
+                    for name, message in _answers(standard, raw, predicting, correcting, summary):
+                        writer.write(name, message, raw.log_time_ns)
+                except WristError as error:
+                    summary.refuse(raw.channel.topic, error)
         if not summary.predictions:
             reason = next(iter(summary.refused), source.damage or "there is none")
             raise RecordingError(
@@ -231,6 +169,22 @@ def replay(
     progress(total, total)
     summary.damage = source.damage
     return summary
+
+
+def _answers(
+    standard: str,
+    raw: RawMessage,
+    predicting: PredictionStream,
+    correcting: CorrectionStream,
+    summary: ReplaySummary,
+) -> Iterator[tuple[str, Message]]:
+    if standard == MOTOR_TRAJECTORY:
+        plan = decode(JointTrajectory, raw.payload)
+        return _plan(plan, raw.log_time_ns, correcting, summary)
+    state = decode(JointState, raw.payload)
+    if standard == MOTOR_COMMANDS:
+        return _correct(state, correcting, summary)
+    return _predict(state, predicting, summary)
 
 
 def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str]:
@@ -273,10 +227,13 @@ def _predict(
     prediction = sample.prediction
     summary.predictions += 1
     summary.warnings.update((*prediction.warnings, *predicting.dropped_signals))
-    summary.shift_norm_um.append(1e6 * prediction.shift_norm)
-    summary.phi_mdeg.append(1e3 * float(np.degrees(prediction.phi)))
+    s_um, phi_mdeg = prediction.shift_norm * MICROMETRES, prediction.phi * MILLIDEGREES
+    summary.shift_um.add(np.array([s_um]))
+    summary.phi_mdeg.add(np.array([phi_mdeg]))
     header = Header(state.header.stamp_ns, BASE_FRAME)
     yield POSE_ERROR_PREDICTED, pose_message(header, prediction.twist, prediction.covariance)
+    yield POSE_ERROR_S_UM, Float64(s_um)
+    yield POSE_ERROR_PHI_MDEG, Float64(phi_mdeg)
 
 
 def _correct(

@@ -62,15 +62,28 @@ static int sectors(PyObject *number, long *m) {
     return -1;
 }
 
+/* Mechanism, angles (n, 2); configurations (n, 66), statuses (n).  Returns the first status that is
+ * not OK. */
 static PyObject *forward_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
-    const Py_ssize_t sizes[] = {sizeof(Mechanism), 2 * sizeof(double), sizeof(Configuration)};
+    if (counted(count, 4)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[3]);
+    if (n < 0) return 0;
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), 2 * n * sizeof(double),
+                                n * sizeof(Configuration), n};
     Buffers b;
-    if (counted(count, 3) || take(&b, args, sizes, 3, 1u << 2)) return 0;
+    if (take(&b, args, sizes, 4, 3u << 2)) return 0;
+    const double *theta = b.view[1].buf;
     Configuration *at = b.view[2].buf;
-    int status = forward(b.view[0].buf, b.view[1].buf, at);
-    if (!status) status = in_domain(b.view[0].buf, at);
+    unsigned char *statuses = b.view[3].buf;
+    int first = OK;
+    for (Py_ssize_t i = 0; i < n; i++) {
+        int status = forward(b.view[0].buf, theta + 2 * i, at + i);
+        if (!status) status = in_domain(b.view[0].buf, at + i);
+        statuses[i] = (unsigned char)status;
+        if (!first) first = status;
+    }
     release(&b);
-    return PyLong_FromLong(status);
+    return PyLong_FromLong(first);
 }
 
 static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
@@ -243,7 +256,7 @@ static PyObject *log_of(PyObject *self, PyObject *const *args, Py_ssize_t count)
     {name, (PyCFunction)(void (*)(void))function, METH_FASTCALL, text}
 
 static PyMethodDef METHODS[] = {
-    FAST("forward", forward_of, "Fill the configuration of one pose in the domain."),
+    FAST("forward", forward_of, "Fill the configurations of n poses in the domain."),
     FAST("respond", respond_of, "Fill twist, force and contact state at one configuration."),
     FAST("predict", predict_of, "Fill twists and configurations of n samples in their order."),
     FAST("correct", correct_of, "Fill the corrections of n commands in their order."),

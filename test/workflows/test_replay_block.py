@@ -1,0 +1,178 @@
+"""A replay in blocks: what a node would have sent, to the bit, also of a recording with faults."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.errors import WristError
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording.messages import (
+    Float64,
+    Header,
+    JointState,
+    Temperature,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
+from wrist_stiffness.recording.reader import MESSAGES_AT_A_TIME, open_recording
+from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.ros.stream_messages import (
+    JointSample,
+    angles_payload,
+    error_payload,
+    joint_payload,
+    number_payload,
+)
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.parameter_file import node_settings
+from wrist_stiffness.workflows.replay import replay
+from wrist_stiffness.workflows.signals_ahead import LOOKAHEAD_NS
+
+MODEL = shipped_file("config/palmieri2015_model.yaml")
+MOTORS = ("motor_1_joint", "motor_2_joint")
+STEP_NS = 2_000_000
+SAMPLES = 2600
+FAR, HEAVY, LATE, GAP, JUMP, EMPTY = 300, 500, 700, 900, 1700, 2300
+"""Samples at which: the pose is out of the domain, the load beyond the table, a load comes after
+its joint state, loads are missing for a second, the clock jumps back, a command is not finite."""
+
+
+def signals(seed=5):
+    """Return stamps [ns], angles [rad] and wrenches of a path with faults; NaN where none came."""
+    rng = np.random.default_rng(seed)
+    stamps = STEP_NS * np.arange(1, SAMPLES + 1)
+    stamps[JUMP:] -= 600 * STEP_NS
+    second = 1e-3 * np.arange(SAMPLES)
+    theta = 0.5 * np.stack([np.sin(9.0 * second), np.cos(7.0 * second)], axis=1)
+    theta[FAR : FAR + 3] = 0.95
+    wrench = np.zeros((SAMPLES, 6))
+    # Nothing, then a weight, then a push aside.
+    wrench[400:, 2] = -0.8
+    wrench[1200:1500, 0] = 0.5
+    wrench += 1e-4 * rng.normal(size=wrench.shape)
+    wrench[HEAVY : HEAVY + 3] *= 1000.0
+    wrench[GAP : GAP + 500] = np.nan
+    return stamps, theta, wrench
+
+
+def recorded(path):
+    """Write these signals, once a millisecond or so."""
+    stamps, theta, wrench = signals()
+    with RecordingWriter(path) as writer:
+        for i in range(SAMPLES):
+            at_ns, header = STEP_NS * (i + 1), Header(int(stamps[i]))
+            force, moment = wrench[i, :3].tolist(), wrench[i, 3:].tolist()
+            load = WrenchStamped(
+                replace(header, frame_id="wrist_base"), Wrench(Vector3(*force), Vector3(*moment))
+            )
+            if np.isfinite(wrench[i]).all() and i != LATE:
+                writer.write("/load_estimate", load, at_ns)
+            angles = tuple(theta[i].tolist())
+            writer.write("/joint_states", JointState(header, MOTORS, angles), at_ns)
+            if i == LATE:
+                writer.write("/load_estimate", load, at_ns)
+            names = ("other", *MOTORS)
+            first = np.nan if i == EMPTY else 0.5
+            command = JointState(header, names, (first, *angles), effort=(1.0, 2.0, 3.0))
+            writer.write("/motor_commands", command, at_ns)
+            if i % 50 == 0:
+                writer.write("/temperatures", Temperature(header, 20.0 + i), at_ns)
+            if i == 10:
+                writer.write("/pose_error/s_um", Float64(1.0), at_ns)
+    return path
+
+
+def wanted(settings):
+    """Return the payloads that nodes would send by topic and what they refuse, one by one."""
+    prediction, correction = settings
+    model = load_model(MODEL)
+    predicting = PredictionStream(model, prediction)
+    correcting = CorrectionStream(model, correction, enabled=True)
+    stamps, theta, wrench = signals()
+    sent = {topic: [] for topic in TOPICS}
+    refused = heard = 0
+    for i in range(SAMPLES):
+        stamp_ns, angles = int(stamps[i]), theta[i].tolist()
+        # A replay hears loads a second ahead: that makes a difference where the clock jumps.
+        while heard < min(SAMPLES, i + 1 + LOOKAHEAD_NS // STEP_NS):
+            load = wrench[heard].tolist()
+            if np.isfinite(load).all():
+                for stream in (predicting, correcting):
+                    stream.loads.add(int(stamps[heard]), "wrist_base", load[:3], load[3:])
+            heard += 1
+        try:
+            found = predicting.on_joint_state(stamp_ns, MOTORS, angles).prediction
+            payload = error_payload(stamp_ns, found.twist, found.covariance)
+            sent["/pose_error_predicted"].append(payload)
+            sent["/pose_error/s_um"].append(number_payload(1e6 * found.shift_norm))
+            degrees = 1e3 * float(np.degrees(1.0))
+            sent["/pose_error/phi_mdeg"].append(number_payload(found.phi * degrees))
+        except WristError:
+            refused += 1
+        names, first = ("other", *MOTORS), np.nan if i == EMPTY else 0.5
+        try:
+            command = correcting.on_command(stamp_ns, "", names, (first, *angles))
+        except WristError:
+            refused += 1
+            continue
+        positions = tuple(command.positions.tolist())
+        efforts = (1.0, 2.0, 3.0)
+        sample = JointSample(stamp_ns, "wrist_corrected", names, positions, (), efforts)
+        sent["/motor_commands_corrected"].append(joint_payload(sample))
+        sent["/motor_positions_corrected"].append(angles_payload(command.theta))
+        refused += command.fault is not None
+        if command.correction is not None:
+            covariance = command.correction.prediction.covariance
+            payload = error_payload(stamp_ns, command.correction.after, covariance)
+            sent["/pose_error_residual"].append(payload)
+    return sent, refused
+
+
+TOPICS = (
+    "/pose_error_predicted",
+    "/pose_error/s_um",
+    "/pose_error/phi_mdeg",
+    "/motor_commands_corrected",
+    "/motor_positions_corrected",
+    "/pose_error_residual",
+)
+
+
+@pytest.mark.parametrize("follow", [False, True], ids=["supervised", "every load followed"])
+def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, follow):
+    prediction, correction = node_settings(None)
+    own = replace(correction, supervisor=SupervisorSettings(follow=follow))
+    assert SAMPLES * 3 > 1.5 * MESSAGES_AT_A_TIME  # some blocks in one piece, some not
+    summary = replay(
+        recorded(tmp_path / "in.mcap"), MODEL, tmp_path / "out.mcap", (prediction, own)
+    )
+    sent, refused = wanted((prediction, own))
+    found = {topic: [] for topic in TOPICS}
+    for raw in open_recording(tmp_path / "out.mcap").raw_messages(TOPICS):
+        found[raw.channel.topic].append(raw.payload)
+    for topic in TOPICS:
+        assert len(found[topic]) == len(sent[topic])
+        pairs = zip(found[topic], sent[topic], strict=True)
+        different = [i for i, (one, other) in enumerate(pairs) if one != other]
+        assert not different, f"{topic}: {len(different)}, the first {different[0]}"
+    assert summary.refused.total() == refused > 50
+    assert summary.replaced == 1
+    assert 0 < summary.corrections < summary.commands == SAMPLES
+
+
+def test_answers_follow_their_messages_in_time(tmp_path):
+    replay(recorded(tmp_path / "in.mcap"), MODEL, tmp_path / "out.mcap")
+    at_joints = 0
+    before = -1
+    for raw in open_recording(tmp_path / "out.mcap").raw_messages():
+        assert raw.log_time_ns >= before
+        before = raw.log_time_ns
+        if raw.channel.topic == "/joint_states":
+            at_joints = raw.log_time_ns
+        if raw.channel.topic == "/pose_error_predicted":
+            assert raw.log_time_ns == at_joints

@@ -1,0 +1,136 @@
+"""Some thousand stored messages at a time, in log-time order, undecoded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.recording.channel import Channel
+from wrist_stiffness.recording.mcap_chunk import (
+    MESSAGE,
+    MESSAGE_HEAD_SIZE,
+    Contents,
+    Payloads,
+    from_each_byte,
+)
+
+Integers = NDArray[np.int64]
+
+
+class RawMessage(NamedTuple):
+    """A message as stored: channel, log time and undecoded payload."""
+
+    channel: Channel
+    log_time_ns: int
+    payload: bytes
+
+
+@dataclass(frozen=True)
+class RawBlock:
+    """n stored messages.
+
+    Attributes
+    ----------
+    buffer : bytes
+        Holds their payloads.
+    channels : tuple of Channel
+        Of the file or files.
+    channel : (n,) int
+        Place of each message's channel among them.
+    time_ns : (n,) int
+        Log times, not falling [ns].
+    begin, size : (n,) int
+        Where each payload is in the buffer.
+    """
+
+    buffer: bytes
+    channels: tuple[Channel, ...]
+    channel: Integers
+    time_ns: Integers
+    begin: Integers
+    size: Integers
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return len(self.time_ns)
+
+    def take(self, rows: slice | Integers) -> RawBlock:
+        """Return some of the messages, in their order."""
+        own = (self.channel[rows], self.time_ns[rows], self.begin[rows], self.size[rows])
+        return RawBlock(self.buffer, self.channels, *own)
+
+    def topics(self) -> dict[str, Integers]:
+        """Return which messages each topic has."""
+        names = [channel.topic for channel in self.channels]
+        found: dict[str, list[Integers]] = {}
+        for place in np.unique(self.channel).tolist():
+            found.setdefault(names[place], []).append(np.flatnonzero(self.channel == place))
+        return {name: np.sort(np.concatenate(rows)) for name, rows in found.items()}
+
+    def payloads(self, rows: Integers) -> Payloads:
+        """Return the payloads of some messages, as an array where all have one size."""
+        begin, size = self.begin[rows], self.size[rows]
+        if len(rows) and size[0] and (size == size[0]).all():
+            own = from_each_byte(self.buffer, np.dtype(f"V{int(size[0])}"))[begin]
+            return own.view(np.uint8).reshape(len(rows), -1)
+        return [
+            self.buffer[a:b] for a, b in zip(begin.tolist(), (begin + size).tolist(), strict=True)
+        ]
+
+    def messages(self) -> Iterator[RawMessage]:
+        """Iterate over the messages one by one."""
+        columns = self.channel.tolist(), self.time_ns.tolist(), self.begin.tolist()
+        ends = (self.begin + self.size).tolist()
+        for channel, time_ns, begin, end in zip(*columns, ends, strict=True):
+            yield RawMessage(self.channels[channel], time_ns, self.buffer[begin:end])
+
+    @classmethod
+    def joined(cls, blocks: list[RawBlock]) -> RawBlock:
+        """Return blocks of one recording, one after the other, as one."""
+        if len(blocks) == 1:
+            return blocks[0]
+        channels: dict[Channel, int] = {}
+        columns = []
+        shift = 0
+        for block in blocks:
+            place = [channels.setdefault(channel, len(channels)) for channel in block.channels]
+            columns.append(
+                (np.array(place)[block.channel], block.time_ns, block.begin + shift, block.size)
+            )
+            shift += len(block.buffer)
+        own = (np.concatenate(column) for column in zip(*columns, strict=True))
+        return cls(b"".join([block.buffer for block in blocks]), tuple(channels), *own)
+
+    @classmethod
+    def of(cls, messages: Iterable[tuple[Channel, int, bytes]]) -> RawBlock:
+        """Return messages, by channel, log time [ns] and payload, as a block."""
+        channels: dict[Channel, int] = {}
+        payloads, rows = [], []
+        for channel, time_ns, payload in messages:
+            rows.append((channels.setdefault(channel, len(channels)), time_ns, len(payload)))
+            payloads.append(payload)
+        number, times, size = np.array(rows, dtype=np.int64).reshape(-1, 3).T
+        begin = np.cumsum(size) - size
+        return cls(b"".join(payloads), tuple(channels), number, times, begin, size)
+
+    @classmethod
+    def of_contents(cls, contents: Contents, channels: dict[int, Channel]) -> RawBlock:
+        """Return the messages of a chunk that have a channel, by log time."""
+        numbers = np.sort(np.array(list(channels), dtype=np.int64))
+        heads, begins = contents.heads, contents.begins
+        known = np.isin(heads["channel"], numbers)
+        order = np.flatnonzero(known)
+        order = order[np.argsort(heads["log_time"][known], kind="stable")]
+        heads = heads[order]
+        return cls(
+            contents.buffer,
+            tuple(channels[number] for number in numbers.tolist()),
+            np.searchsorted(numbers, heads["channel"].astype(np.int64)),
+            heads["log_time"].astype(np.int64),
+            begins[order] + MESSAGE.itemsize,
+            heads["length"].astype(np.int64) - MESSAGE_HEAD_SIZE,
+        )
