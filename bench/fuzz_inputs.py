@@ -2,7 +2,8 @@
 
 Run as ``python bench/fuzz_inputs.py [--cases N] [--seconds S] [--seed N] [--only PARSER]``; a
 minute of it runs in ``.ci/run``.  Each case is a good input with bits, bytes, words or lines
-changed.  A case that raises anything but a WristError, takes more than 2 s of the processor or
+changed; of `flips` one bit of a recording, which must give the same result or tell its damage.
+A case that raises anything but a WristError, takes more than 2 s of the processor or
 500 MB is kept in a folder and ends the run with exit code 1.
 """
 
@@ -134,17 +135,34 @@ def words_changed(data: bytes, rng: random.Random) -> bytes:
     return bytes_changed(changed, rng) if rng.random() < 0.2 else changed
 
 
+def records(data: bytes) -> list[tuple[int, int, int]]:
+    """Return opcode, begin and length of the records of an MCAP file."""
+    found, position = [], 8
+    while position + 9 <= len(data):
+        opcode, length = struct.unpack_from("<BQ", data, position)
+        found.append((opcode, position, length))
+        position += 9 + length
+    return found
+
+
+def one_bit_flipped(data: bytes, rng: random.Random) -> bytes:
+    """Flip one bit in a record, each kind of record as often as any other."""
+    places = records(data)
+    kind = rng.choice(sorted({opcode for opcode, _, _ in places if opcode in range(1, 16)}))
+    _, begin, length = rng.choice([place for place in places if place[0] == kind])
+    out = bytearray(data)
+    out[begin + rng.randrange(9 + length)] ^= 1 << rng.randrange(8)
+    return bytes(out)
+
+
 def records_changed(data: bytes, rng: random.Random) -> bytes:
     """Change heads of MCAP records, drop and repeat them; take their checksums out."""
-    out, heads, position = bytearray(data), [], 8
-    while position + 9 <= len(out):
-        opcode, length = struct.unpack_from("<BQ", out, position)
-        heads.append((position, length))
+    out, heads = bytearray(data), records(data)
+    for opcode, begin, _ in heads:
         if opcode == 6 and rng.random() < 0.5:
-            out[position + 33 : position + 37] = bytes(4)
-        position += 9 + length
+            out[begin + 33 : begin + 37] = bytes(4)
     for _ in range(rng.choice([0, 1, 1, 2])):
-        place, length = rng.choice(heads)
+        _, place, length = rng.choice(heads)
         kind = rng.randrange(5)
         if kind == 0:
             out[place : place + 1] = bytes([rng.randrange(20)])
@@ -164,12 +182,15 @@ def recordings() -> list[bytes]:
     """Small recordings in every form of MCAP."""
     source = open_recording(PROJECT / "test/data/replay/recording.mcap")
     forms: list[dict] = [{"compression": kind} for kind in CompressionType]
-    forms += [{"use_chunking": False}, {"index_types": IndexType.NONE, "use_statistics": False}]
+    forms += [{"use_chunking": False, "enable_data_crcs": True}]
+    forms += [{"index_types": IndexType.NONE, "use_statistics": False}]
     made = []
     for form in forms:
         out = io.BytesIO()
         writer = Writer(out, chunk_size=4096, **form)
         writer.start("ros2")
+        writer.add_attachment(1, 2, "a.txt", "text/plain", b"attached")
+        writer.add_metadata("made", {"by": "a benchmark"})
         known: dict[str, int] = {}
         for count, (channel, time_ns, payload) in enumerate(source.raw_messages()):
             if channel.topic not in known:
@@ -181,6 +202,36 @@ def recordings() -> list[bytes]:
         writer.finish()
         made.append(out.getvalue())
     return made
+
+
+class SilentError(Exception):
+    """A recording gave something else, and told nothing."""
+
+
+def same_or_told(goods: list[bytes]) -> Callable[[Path], None]:
+    """Return who reads a flipped recording and holds it against the good one of its size."""
+    whole: dict[int, object] = {}
+
+    def read(path: Path) -> None:
+        size = path.stat().st_size
+        recording = open_recording(path)
+        raw = list(recording.raw_messages())
+        columns = [
+            (name, times.tolist(), [bytes(row) for row in rows])
+            for name, times, rows in recording.payloads([info.name for info in recording.topics])
+        ]
+        found = (recording.topics, raw, columns)
+        if whole.setdefault(size, found) != found and not recording.damage:
+            raise SilentError
+
+    with tempfile.TemporaryDirectory() as folder:
+        for number, good in enumerate(goods):
+            path = Path(folder) / f"{number}.mcap"
+            path.write_bytes(good)
+            read(path)
+    if len(whole) != len(goods):
+        raise ValueError("two recordings of one size")
+    return read
 
 
 def read_recording(path: Path) -> None:
@@ -259,6 +310,7 @@ def parsers(folder: Path) -> dict[str, tuple[list[bytes], Mutate, Callable[[byte
     }
     return {
         "cdr": (payloads, bytes_changed, read_payload),
+        "flips": (recordings(), one_bit_flipped, file("f.mcap", same_or_told(recordings()))),
         "mcap": (recordings(), records_changed, file("r.mcap", read_recording)),
         "table": ([table], bytes_changed, file("x.npz", load_table)),
         **{name: (goods, words_changed, read) for name, (goods, read) in texts.items()},

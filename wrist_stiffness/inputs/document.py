@@ -84,25 +84,13 @@ class Node:
 
 
 def read_yaml(path: str | Path, error: type[WristError]) -> Node:
-    """Read a YAML file.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    error : type
-        Error to raise, also by the schema that reads the nodes.
-
-    Returns
-    -------
-    Node
-        Its one document; that of an empty file holds None.
+    """Read the one document of a YAML file; that of an empty file holds None.
 
     Raises
     ------
     WristError
-        Of the given type, if the file cannot be read, is too large, is not YAML, or has something
-        in it that this module refuses.
+        Of the given type, here and in the schema that reads the nodes: if the file cannot be read,
+        is too large, is not YAML, or has something in it that this module refuses.
     """
     return yaml_node(read_text(path, error, LARGEST_BYTES), str(path), error)
 
@@ -185,7 +173,8 @@ class _Builder:
             return
         if len(self._open) >= DEEPEST:
             raise self._refused(event, f"nested deeper than {DEEPEST}")
-        value: Any = self._scalar(event) if is_scalar else self._empty(event)
+        empty: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
+        value = self._scalar(event) if is_scalar else empty
         node = Node(value, self._file, self._path(), event.start_mark.line + 1, self._error)
         if not self._open:
             self._root = node
@@ -197,10 +186,6 @@ class _Builder:
         if not is_scalar:
             self._open.append(node)
             self._keys.append(None)
-
-    @staticmethod
-    def _empty(event: Any) -> Any:
-        return {} if isinstance(event, yaml.MappingStartEvent) else []
 
     def _path(self) -> str:
         if not self._open:

@@ -11,19 +11,7 @@ from wrist_stiffness.errors import WristError
 
 
 def open_input(path: str | Path, error: type[WristError]) -> BufferedReader:
-    """Open a regular file to read bytes.
-
-    Parameters
-    ----------
-    path : path
-        The file, or a link to it.
-    error : type
-        Error to raise.
-
-    Returns
-    -------
-    BufferedReader
-        To be closed by the caller.
+    """Open a regular file, or a link to one, to read bytes.
 
     Raises
     ------
@@ -49,24 +37,11 @@ def open_input(path: str | Path, error: type[WristError]) -> BufferedReader:
 def read_text(path: str | Path, error: type[WristError], limit: int) -> str:
     """Return the text of a file.
 
-    Parameters
-    ----------
-    path : path
-        The file, in UTF-8.
-    error : type
-        Error to raise.
-    limit : int
-        Largest size [bytes].
-
-    Returns
-    -------
-    str
-        All of it.
-
     Raises
     ------
     WristError
-        Of the given type, if the file cannot be opened or read, is larger or is not UTF-8.
+        Of the given type, if the file cannot be opened or read, has more than `limit` bytes or is
+        not UTF-8.
     """
     try:
         with open_input(path, error) as stream:

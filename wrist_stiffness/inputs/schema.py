@@ -197,30 +197,22 @@ def record(
 
     def read(node: Node) -> Any:
         found = _keys_of(node)
-        values = {}
+        values: dict[str, Any] = {}
         for key, schema in schemas.items():
             if key in found:
-                name, value = _value(key, schema, found[key])
-                values[name] = value
+                values.update([_value(key, schema, found[key])])
             elif key in keys:
                 raise node.refuse(f"{key} is missing")
         if sources:
             _check_source(node, sources)
         if not others:
-            no_more_keys(node, [*schemas, SOURCE] if sources else schemas)
+            _no_more_keys(node, [*schemas, SOURCE] if sources else schemas)
         return make(**values)
 
     return read
 
 
-def no_more_keys(node: Node, known: Iterable[str]) -> None:
-    """Check that a mapping has no other keys.
-
-    Raises
-    ------
-    WristError
-        With the keys that are not known.
-    """
+def _no_more_keys(node: Node, known: Iterable[str]) -> None:
     if unknown := sorted(set(node.value) - set(known)):
         # Within braces, `0,33` is the number 0 and a key 33.
         comma = any(key.isdecimal() for key in unknown)

@@ -116,7 +116,7 @@ def load_table(path: str | Path) -> Table:
     arrays = _read_arrays(path)
     try:
         header = json.loads(str(arrays.pop("header")))
-    except (KeyError, ValueError) as error:
+    except (KeyError, ValueError, RecursionError) as error:
         raise TableError(f"{path}: not a table of this program (no header)") from error
     if not isinstance(header, dict) or header.get("magic") != MAGIC:
         raise TableError(f"{path}: not a table of this program")

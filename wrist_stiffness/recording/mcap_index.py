@@ -17,6 +17,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -76,7 +77,6 @@ class McapIndex:
         What is wrong with it, as far as the walk sees.
     """
 
-    path: Path
     chunks: list[Chunk]
     chunk_spans: list[Spans]
     definitions: Definitions
@@ -173,9 +173,7 @@ class _Walk:
         self._look_into_chunks()
         for key, found in self.summary.items():
             self._define(key, found, "the summary")
-        index = McapIndex(
-            self.path, self.chunks, self.chunk_spans, self.data, channels_of(self.data), []
-        )
+        index = McapIndex(self.chunks, self.chunk_spans, self.data, channels_of(self.data), [])
         self._compare_counts(index)
         if self.flaws:
             readable = sum(span.count for span in index.spans.values())
@@ -219,8 +217,8 @@ class _Walk:
         if opcode != Opcode.MESSAGE:
             self.loose_run_is_open = False
         handlers: dict[int, Callable[[int, int], None]] = {
-            Opcode.SCHEMA: self._schema,
-            Opcode.CHANNEL: self._channel,
+            Opcode.SCHEMA: partial(self._definition, opcode),
+            Opcode.CHANNEL: partial(self._definition, opcode),
             Opcode.CHUNK: self._chunk,
             Opcode.MESSAGE_INDEX: self._message_index,
             Opcode.MESSAGE: self._loose_message,
@@ -231,8 +229,7 @@ class _Walk:
         if opcode in handlers:
             handlers[opcode](content, length)
         elif opcode > Opcode.DATA_END:
-            self.last_is_lost = True
-            self.lost.append({})
+            self._lose_chunk()
         self.stream.seek(content + length)
         return opcode, content + length
 
@@ -240,16 +237,13 @@ class _Walk:
         """Leave the last chunk to be looked into: the damage may have taken a part of its index."""
         if self.chunk_spans and not self.last_is_lost:
             self.chunk_spans[-1].clear()
+        self._lose_chunk()
+
+    def _lose_chunk(self) -> None:
         self.last_is_lost = True
         self.lost.append({})
 
-    def _schema(self, _: int, length: int) -> None:
-        self._definition(Opcode.SCHEMA, length)
-
-    def _channel(self, _: int, length: int) -> None:
-        self._definition(Opcode.CHANNEL, length)
-
-    def _definition(self, opcode: int, length: int) -> None:
+    def _definition(self, opcode: int, _: int, length: int) -> None:
         key, found = definition(opcode, self.stream.read(length))
         if self.data_end:
             self.summary[key] = found

@@ -318,7 +318,7 @@ def notes_of(samples: Samples) -> tuple[dict[str, Any], list[str]]:
     for text in samples.notes:
         try:
             facts = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             facts = None
         if isinstance(facts, dict):
             notes |= facts
