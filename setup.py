@@ -49,6 +49,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        # Puts the command on PATH; colcon.pkg names it.  Nodes lie beside it.
+        (f"share/{NAME}/hook", ["resource/hook/path.dsv"]),
         shared("launch/*.launch.py"),
         shared("config/*.*"),
         shared("precomputed/*.npz"),

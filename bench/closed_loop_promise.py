@@ -98,7 +98,7 @@ class Corrected:
         """Return the corrected angles of a sample."""
         script = self.script
         if i == round(TARE_S * RATE_HZ):
-            self.stream.tare()
+            self.stream.use_zero(self.stream.loads.measured_zero())
             self.stream.enabled = True
         if i in script.told:
             told = script.told[i]

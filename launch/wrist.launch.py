@@ -1,34 +1,50 @@
-"""`ros2 launch wrist_stiffness wrist.launch.py [cell:=true]`: the nodes, and the virtual cell."""
+"""`ros2 launch wrist_stiffness wrist.launch.py`: the nodes of one wrist, and the virtual cell."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch_ros.actions import Node
 
-from wrist_stiffness.workflows.node_list import SIMULATOR_NODE, WRIST_NODES, NodeEntry
+from wrist_stiffness.workflows.node_list import (
+    CELL_PARAMETERS,
+    LAUNCH_ARGUMENTS,
+    SIMULATOR_NODE,
+    WRIST_NODES,
+    truth,
+    unknown_arguments,
+)
 
 
-def start(entry: NodeEntry, condition: IfCondition | None = None) -> Node:
-    """Return the launch action of one entry of the node list."""
-    return Node(
-        package="wrist_stiffness",
-        executable=entry.executable,
-        name=entry.name,
-        parameters=[entry.parameters],
-        remappings=list(entry.remappings),
-        condition=condition,
-    )
+def start(context: LaunchContext) -> list[LogInfo | Node]:
+    """Return the actions that start the nodes with the arguments that were given."""
+    given = context.launch_configurations
+    cell = truth("cell", given["cell"])
+    simulated = {"use_sim_time": truth("use_sim_time", given["use_sim_time"])}
+    parameters: list[dict[str, object] | str] = [simulated]
+    if given["params_file"]:
+        parameters.append(given["params_file"])
+    if given["model_file"]:
+        parameters.append({"model_file": given["model_file"]})
+    nodes = [
+        Node(
+            package="wrist_stiffness",
+            executable=entry.executable,
+            name=entry.name,
+            namespace=given["namespace"],
+            parameters=[*([CELL_PARAMETERS] if cell else []), entry.parameters, *parameters],
+            remappings=list(entry.remappings),
+            respawn=truth("respawn", given["respawn"]),
+            respawn_delay=1.0,
+        )
+        for entry in (*WRIST_NODES, *([SIMULATOR_NODE] if cell else []))
+    ]
+    warnings = [LogInfo(msg=line) for line in unknown_arguments(given)]
+    return [*warnings, *nodes]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return all nodes; the simulator only with `cell:=true`."""
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument(
-                "cell", default_value="false", description="start the virtual wrist as well"
-            ),
-            *(start(entry) for entry in WRIST_NODES),
-            start(SIMULATOR_NODE, IfCondition(LaunchConfiguration("cell"))),
-        ]
-    )
+    """Return the arguments, and what is started with them."""
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, (default, text) in LAUNCH_ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=start)])

@@ -24,6 +24,7 @@ PLATFORM_MARKERS = "/platform_markers_measured"
 FRAME_POSE = "/frame_pose_measured"
 MOTOR_COMMANDS = "/motor_commands"
 MOTOR_TRAJECTORY = "/motor_trajectory"
+PAYLOAD = "/payload"
 RECORDING_NOTES = "/recording_notes"
 TF, TF_STATIC = "/tf", "/tf_static"
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import InputError, TableError
 from wrist_stiffness.model import registry
 from wrist_stiffness.model.block import Load, Sample
@@ -16,6 +17,7 @@ from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.python_laws import ALLOWED, python_laws
 from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.shipped import shipped_file
 
@@ -63,6 +65,12 @@ class Twist(Law):
     def advance(self, at, place, values, state):
         return at.screw(place, np.array([0, 0, 0, 0, 0, values["turn_mdeg"]])), None
 '''
+
+
+@pytest.fixture(autouse=True)
+def _trusted():
+    with python_laws(True):
+        yield
 
 
 def write(folder, text=GOOD, own=OWN):
@@ -166,6 +174,18 @@ def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
     assert [(e.name, e.estimates) for e in again.effects] == [
         (e.name, e.estimates) for e in effects.values()
     ]
+
+
+def test_a_python_file_is_not_run_unasked(tmp_path, monkeypatch):
+    monkeypatch.setenv(ALLOWED, "")
+    path = write(tmp_path, own=f"__import__('os').mkdir({str(tmp_path / 'run')!r})\n{OWN}")
+    with python_laws(False), pytest.raises(InputError, match="own.py:Twist is a program"):
+        load_model(path)
+    command = ["predict", str(path), "--angles", "0", "0", "--load", "0", "0", "0", "0", "0", "0"]
+    assert main(command) == 2
+    assert not (tmp_path / "run").exists()
+    main([*command, "--allow-python-laws"])
+    assert (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ with warnings.catch_warnings():
 
 DEADLINE_S = 20.0
 NAMES = ("motor_1_joint", "motor_2_joint")
+OF_A_TEST = {"state_folder": "", "tare_needed": False, "command_age_limit_s": 0.0}
 
 
 class Graph:
@@ -47,6 +48,7 @@ class Graph:
         rclpy.try_shutdown(context=self.context)
 
     def add(self, make_node, **parameters):
+        parameters = OF_A_TEST | parameters
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         node = make_node(context=self.context, parameter_overrides=overrides)
         self.executor.add_node(node)

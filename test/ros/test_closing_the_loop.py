@@ -166,7 +166,12 @@ def test_record_diagnose_extend_reload_and_the_true_error_falls(graph, model, tm
     found = CatalogueEffect(answer.diagnosis.findings[0].name)
     extend_model(path, found, Recordings([recording], {}), extended, Run("test", "2026-01-01"))
 
-    graph.call(SetBool, "/angle_corrector/enable", SetBool.Request(data=True))
+    def is_enabled():
+        graph.load(1)
+        asked = SetBool.Request(data=True)
+        return graph.call(SetBool, "/angle_corrector/enable", asked).success
+
+    graph.until(is_enabled, "correction, once the load is there")
     cell = cell_of(with_fine_counts(model.table), 20.0, seed=7)
     before, count = pointing_at_rest(model.table, *wrist.work(cell, 0.0, 20.0))
     extended.replace(path)

@@ -234,6 +234,7 @@ def test_of_two_correctors_in_a_chain_only_one_corrects(graph, corrector, model,
         parameter_overrides=[
             Parameter("model_file", value=str(model_path)),
             Parameter("enabled_on_start", value=True),
+            Parameter("command_age_limit_s", value=0.0),
         ],
     )
     graph.executor.add_node(second)

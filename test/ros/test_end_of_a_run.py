@@ -195,7 +195,7 @@ def test_a_run_does_not_wait_for_ever_for_a_corrector_that_hangs(graph, monkeypa
     hung.destroy_node()
     assert ended.value.code == UNANSWERED
     (line,) = capsys.readouterr().err.splitlines()
-    assert "/angle_corrector/enable: no answer in 0.5 s" in line
+    assert "angle_corrector/enable: no answer in 0.5 s" in line
 
 
 def test_answers_are_counted_by_the_numbers_of_their_samples():

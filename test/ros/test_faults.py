@@ -20,7 +20,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.ros import wrist_node
+from wrist_stiffness.ros import model_loading
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, nanoseconds, time_message
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
@@ -64,7 +64,7 @@ def test_the_output_has_no_gap_while_a_model_is_loaded(graph, predictor, monkeyp
         assert released.wait(DEADLINE_S)
         return load_model(path)
 
-    monkeypatch.setattr(wrist_node, "load_model", slow)
+    monkeypatch.setattr(model_loading, "load_model", slow)
     client = graph.probe.create_client(Trigger, f"/{PREDICTOR}/reload_model")
     graph.until(client.service_is_ready, "service")
     answer, before = client.call_async(Trigger.Request()), predictor.stream.model
@@ -118,8 +118,12 @@ class Failing(Law):
 """
 
 
-def test_no_model_file_ends_a_node(graph, predictor, model, tmp_path):
+def test_no_model_file_ends_a_node(graph, model_path, model, tmp_path):
     """A law of the user's own is code, which can fail in any way."""
+    trusting = {"model_file": str(model_path), "allow_python_laws": True}
+    predictor = graph.add(PoseErrorPredictor, **trusting)
+    graph.listen(PoseWithCovarianceStamped, PREDICTED)
+    graph.connected(PREDICTED)
     (tmp_path / "own.py").write_text(FAILING_LAW)
     effect = {"effect": "python", "class": "own.py:Failing", "component": "platform"}
     content = {"schema": 1, "name": "x", "table": {"path": "table.npz"}, "effects": [effect]}
@@ -272,7 +276,10 @@ def test_lifecycle_stops_and_starts_the_output(graph, model_path):
             lambda: (graph.joints("/joint_states", SECOND), graph.heard[PREDICTED])[1], "prediction"
         )
         assert change(Transition.TRANSITION_DEACTIVATE)
-        graph.until(lambda: graph.probe.count_subscribers("/joint_states") == 0, "silence")
+        count = len(graph.heard[PREDICTED])
+        graph.joints("/joint_states", SECOND)
+        send_load(graph, node, SECOND + 1)
+        assert len(graph.heard[PREDICTED]) == count
         assert change(Transition.TRANSITION_CLEANUP)
         assert state() == State.PRIMARY_STATE_UNCONFIGURED
 

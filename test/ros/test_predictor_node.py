@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Vector3Stamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Temperature
-from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from wrist_stiffness.compensation.pose import pose_of_twist
@@ -11,7 +12,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import save_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.ros.conversions import nanoseconds, time_message
+from wrist_stiffness.ros.conversions import nanoseconds, three, time_message
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 
 SECOND = 1_000_000_000
@@ -26,8 +27,8 @@ def predictor(graph, model_path):
     node = graph.add(PoseErrorPredictor, model_file=str(model_path))
     for message_type, topic in (
         (PoseWithCovarianceStamped, "/pose_error_predicted"),
-        (Float64, "/pose_error/s_um"),
-        (Float64, "/pose_error/phi_mdeg"),
+        (Vector3Stamped, "/pose_error/s_um"),
+        (Vector3Stamped, "/pose_error/phi_mdeg"),
     ):
         graph.listen(message_type, topic)
         graph.connected(topic)
@@ -72,10 +73,13 @@ def test_publishes_what_the_model_predicts_to_the_bit(graph, predictor, model):
     assert numbers(message) == expected(model)
     assert message.pose.covariance.tolist() == prediction.covariance.ravel().tolist()
     graph.until(lambda: graph.heard["/pose_error/phi_mdeg"], "phi")
-    assert graph.heard["/pose_error/s_um"][0].data == pytest.approx(1e6 * prediction.shift_norm)
-    assert graph.heard["/pose_error/phi_mdeg"][0].data == pytest.approx(
-        1e3 * np.degrees(prediction.phi)
-    )
+    for topic, wanted in (
+        ("/pose_error/s_um", 1e6 * prediction.twist[:3]),
+        ("/pose_error/phi_mdeg", 1e3 * np.degrees(prediction.twist[3:])),
+    ):
+        shown = graph.heard[topic][0]
+        assert nanoseconds(shown.header.stamp) == SECOND + 7
+        assert three(shown.vector) == pytest.approx(wanted.tolist())
 
 
 BAD_JOINTS = {
@@ -166,7 +170,7 @@ def test_a_joint_state_waits_for_its_load(graph, model_path, model):
     assert numbers(predictions(graph)[1]) == expected(model)
 
 
-def test_without_a_model_nothing_is_predicted_until_one_is_loaded(graph, tmp_path, model_path):
+def test_without_a_model_the_node_is_not_configured_and_says_why(graph, tmp_path, model_path):
     graph.add(PoseErrorPredictor, model_file=str(tmp_path / "none.yaml"))
     status, _ = graph.status(NAME, lambda status, values: True)
     assert status.level == status.ERROR
@@ -176,8 +180,10 @@ def test_without_a_model_nothing_is_predicted_until_one_is_loaded(graph, tmp_pat
     assert "none.yaml" in refused.message
     node = next(node for node in graph.executor.get_nodes() if node.get_name() == NAME)
     node.set_parameters([Parameter("model_file", value=str(model_path))])
-    answer = graph.call(Trigger, f"/{NAME}/reload_model", Trigger.Request())
-    assert answer.success, answer.message
+    assert not graph.call(Trigger, f"/{NAME}/reload_model", Trigger.Request()).success
+    for step in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        request = ChangeState.Request(transition=Transition(id=step))
+        assert graph.call(ChangeState, f"/{NAME}/change_state", request).success
     graph.load(SECOND)
     wait_for_load(graph, node, SECOND)
     graph.listen(PoseWithCovarianceStamped, "/pose_error_predicted")

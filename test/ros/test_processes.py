@@ -15,7 +15,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording import open_recording
 from wrist_stiffness.ros.conversions import nanoseconds
 from wrist_stiffness.workflows import cell
-from wrist_stiffness.workflows.node_list import WRIST_NODES
+from wrist_stiffness.workflows.node_list import CELL_PARAMETERS, WRIST_NODES
 from wrist_stiffness.workflows.replay import replay
 
 DEADLINE_S = 60.0
@@ -66,7 +66,9 @@ def test_an_impatient_user_sees_no_traceback(graph):
     [
         ({"load_age_limit_s": -1.0}, "load_age_limit_s"),
         ({"load_age_limit_s": "long"}, "load_age_limit_s"),
-        ({"frames": "'{ft: {parent: moon}}'"}, "parent 'moon'"),
+        ({"frames": "'{ft: {parent: moon}}'"}, "'moon' is not one of"),
+        ({"model_fle": "x"}, "unknown parameter 'model_fle'; is model_file meant?"),
+        ({"frames.ft.parent": "x"}, "'frames.ft.parent': frames is one text"),
     ],
 )
 def test_a_node_does_not_start_with_wrong_parameters(parameters, text):
@@ -103,7 +105,7 @@ def test_a_killed_node_comes_back(graph):
 def test_a_killed_corrector_comes_back_and_ramps_from_zero(graph):
     """Nobody forwards while it is away; who comes back does not step to the full correction."""
     node = NODES["angle_corrector"].having(
-        {"enabled_on_start": True, "deadband_steps": 0.0, "load_policy": "follow"}
+        {"enabled_on_start": True, "deadband_steps": 0.0, **CELL_PARAMETERS}
     )
     corrected, theta = "/motor_commands_corrected", [0.1, -0.2]
     graph.listen(JointState, corrected)
@@ -235,10 +237,10 @@ def test_a_killed_cell_leaves_no_node_behind_and_a_whole_recording(tmp_path):
 
 
 def test_the_cell_says_which_node_failed(monkeypatch, capfd):
-    monkeypatch.setitem(cell.CELL_PARAMETERS, "model_monitor", {"load_age_limit_s": -1.0})
+    monkeypatch.setitem(cell.CELL_PARAMETERS, "noise_s_um", -1.0)
     with pytest.raises(InputError, match="node model_monitor ended with code 2"):
         cell.run_cell(seconds=20.0)
-    assert "load_age_limit_s" in capfd.readouterr().err
+    assert "noise_s_um" in capfd.readouterr().err
 
 
 def test_the_cell_refuses_wrong_input(tmp_path, capsys):

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseWithCovarianceStamped, WrenchStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, Vector3, Vector3Stamped, WrenchStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Float64MultiArray
+from std_msgs.msg import Float64MultiArray
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.ros.stream_messages import (
@@ -17,7 +17,7 @@ from wrist_stiffness.ros.stream_messages import (
     error_payload,
     joint_payload,
     joint_reader,
-    number_payload,
+    vector_payload,
     wrench_reader,
 )
 
@@ -105,7 +105,11 @@ def test_pose_errors_are_written_as_by_rclpy(stamp_ns, shift, turn, data):
 @THOROUGH
 @given(NUMBERS, NUMBERS)
 def test_plain_numbers_are_written_as_by_rclpy(first, second):
-    assert_bytes_of_rclpy(number_payload(first), Float64(data=first))
+    vector = Vector3Stamped(vector=Vector3(x=first, y=second, z=first))
+    vector.header.frame_id = "wrist_base"
+    vector.header.stamp.sec, vector.header.stamp.nanosec = 3, 7
+    given = vector_payload(3_000_000_007, np.array([first, second, first]))
+    assert_bytes_of_rclpy(given, vector)
     theta = np.array([first, second])
     assert_bytes_of_rclpy(angles_payload(theta), Float64MultiArray(data=theta.tolist()))
 

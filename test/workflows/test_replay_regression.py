@@ -84,7 +84,7 @@ def test_the_command_says_what_changed_where_and_by_how_much(tmp_path, capsys):
     assert "/motor_commands_corrected  120 in both, none changed" in capsys.readouterr().out
     result = tmp_path / "result.json"
     loud = tmp_path / "loud.yaml"
-    loud.write_text(PARAMETERS.read_text().replace("load_noise_N: 0.01", "load_noise_N: 0.02"))
+    loud.write_text(PARAMETERS.read_text().replace("noise_n: 0.01", "noise_n: 0.02"))
     told[1] = str(loud)
     assert main([*command, str(tmp_path / "loud"), *told, "--json", str(result)]) == 1
     out = capsys.readouterr().out

@@ -35,6 +35,7 @@ from wrist_stiffness.cli.parser import (
 )
 from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.model.python_laws import python_laws
 
 DESCRIPTION = """\
 Predict, correct and explain the pose error of a flexible two-degree-of-freedom wrist."""
@@ -120,6 +121,12 @@ def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
     subparsers = parser.add_subparsers(metavar="COMMAND", title="commands", required=True)
     for command in commands:
         command.add_parser(subparsers)
+    for each in subparsers.choices.values():
+        each.add_argument(
+            "--allow-python-laws",
+            action="store_true",
+            help="run the Python files that a model names as laws; only for models that you trust",
+        )
     return parser
 
 
@@ -149,7 +156,7 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
         for option, begins in RESULTS.items():
             _require_place(getattr(arguments, option, None), option, begins)
         _require_places_apart(arguments)
-        with cleaned_up_on_sigterm():
+        with cleaned_up_on_sigterm(), python_laws(arguments.allow_python_laws):
             code: int = arguments.run(arguments)
         for option in RESULTS:
             path = getattr(arguments, option, None)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from wrist_stiffness.compensation.correction import Correction
 from wrist_stiffness.compensation.corrector import Correcting, Corrector, faded, search
 from wrist_stiffness.compensation.intake import COMMAND
-from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
+from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
 from wrist_stiffness.compensation.payload import Payload, Thresholds
 from wrist_stiffness.compensation.perishable import require_within_limits
 from wrist_stiffness.compensation.pose import seen_from
@@ -201,13 +202,12 @@ class CorrectionStream(Stream):
         self._corrector.release()
         self.active = True
 
-    def tare(self) -> Load:
-        """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
-        zero = super().tare()
+    def use_zero(self, zero: Zero | None) -> None:
+        """Tare, and judge the load anew."""
+        super().use_zero(zero)
         self.supervisor.restore(None)
-        scatter = (SCATTERS * self.loads.scatter).reshape(2, 3).max(axis=1)
-        self.supervisor.scatter = Thresholds(*scatter.tolist())
-        return zero
+        scatter = np.zeros(6) if zero is None else SCATTERS * zero.scatter
+        self.supervisor.scatter = Thresholds(*scatter.reshape(2, 3).max(axis=1).tolist())
 
     def on_command(
         self,
@@ -476,25 +476,31 @@ class CorrectionStream(Stream):
             return CorrectedTrajectory(mark, tuple(points), fault)
         return CorrectedTrajectory(CORRECTED_FRAME, tuple(done), None, held.valid)
 
-    def residual_at_task_point(self, correction: Correction) -> tuple[Array, Array] | None:
-        """Return the residual as seen from the geometry's tool point.
+    def residuals(self, command: CorrectedCommand) -> list[tuple[Array, Array]]:
+        """Return what a correction leaves: actual minus desired pose.
 
         Parameters
         ----------
-        correction : Correction
-            As applied.
+        command : CorrectedCommand
+            With its correction.
 
         Returns
         -------
-        (6,) float, (6, 6) float or None
-            Twist in F with the tool point as origin, and its covariance; None where that is O.
+        list of ((6,) float, (6, 6) float)
+            Twist in F at O and its covariance, and the same at the geometry's tool point where that
+            is not O; empty without a correction.  Where the residual does not hold, the covariance
+            says so as that of a pose does that is not measured.
         """
+        if command.correction is None:
+            return []
+        twist, prediction = command.correction.after, command.correction.prediction
+        doubt = 0.0 if command.valid else NOT_MEASURED * np.eye(6)
+        found = [(twist, prediction.covariance + doubt)]
         tool_point = self.running_model().model.table.geometry.platform.tool_point
-        if not tool_point.any():
-            return None
-        prediction = correction.prediction
-        there = seen_from(prediction.configuration.platform @ tool_point)
-        return there @ correction.after, there @ prediction.covariance @ there.T
+        if tool_point.any():
+            there = seen_from(prediction.configuration.platform @ tool_point)
+            found.append((there @ twist, there @ prediction.covariance @ there.T + doubt))
+        return found
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
         theta = self.settings.motors.angles(names, positions, COMMAND)

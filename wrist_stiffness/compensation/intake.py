@@ -220,6 +220,28 @@ class Frames:
         on_platform = frame_name(frame_id) == PLATFORM_FRAME
         return [Load(wrench, on_platform) for wrench in wrenches]
 
+    def on_platform(
+        self, frame_id: str, point: Sequence[float], what: str
+    ) -> tuple[float, float, float]:
+        """Return the place in U of a point in a frame of the platform [m].
+
+        Raises
+        ------
+        FrameError
+            If the frame is neither `wrist_platform` nor mapped to it.
+        """
+        known = {PLATFORM_FRAME: ON_PLATFORM} | {
+            own: frame for own, frame in self.sensors.items() if frame.parent == PLATFORM_FRAME
+        }
+        name = frame_name(frame_id)
+        if name not in known:
+            raise FrameError(
+                f"{what}: frame '{frame_id}' is neither {PLATFORM_FRAME} nor mapped to it "
+                f"(known: {', '.join(known)})"
+            )
+        x, y, z = (known[name].rotation @ np.array(point) + known[name].position).tolist()
+        return x, y, z
+
     def in_base(self, frame_id: str, what: str) -> tuple[Array, Array]:
         """Return how to turn and move what was measured in a frame to F.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,22 @@ from wrist_stiffness.model.error_model import Load
 NANOSECONDS = 1_000_000_000
 
 TARE_WINDOW_S = 1.0
+
+
+@dataclass(frozen=True)
+class Zero:
+    """What a load sensor shows without a load.
+
+    Parameters
+    ----------
+    load : Load
+        In the frame in which loads come.
+    scatter : (6,) float
+        Standard deviations of the loads that it is the mean of [N, N m].
+    """
+
+    load: Load
+    scatter: Array
 
 
 class LoadHistory:
@@ -141,7 +158,7 @@ class LoadHistory:
             self._served_ns = int(kept[found[last]]), newest
         return np.where(known, found, -1), self._loads
 
-    def mean_since(self, window_s: float) -> tuple[Load, Array]:
+    def mean_since(self, window_s: float) -> Zero:
         """Return mean and scatter of the newest loads over a window, for the tare.
 
         Parameters
@@ -151,10 +168,8 @@ class LoadHistory:
 
         Returns
         -------
-        Load
+        Zero
             In the frame in which they came.
-        (6,) float
-            Standard deviations [N, N m].
 
         Raises
         ------
@@ -170,7 +185,8 @@ class LoadHistory:
         if len({load.on_platform for load in loads}) > 1:
             raise InputError("tare: loads in wrist_base and in wrist_platform are mixed")
         wrenches = np.array([load.wrench for load in loads])
-        return Load(wrenches.mean(axis=0), loads[0].on_platform), wrenches.std(axis=0)
+        mean = Load(wrenches.mean(axis=0), loads[0].on_platform)
+        return Zero(mean, wrenches.std(axis=0))
 
     def since(self, start_ns: int, stamp_ns: int) -> list[tuple[int, Load]]:
         """Return stamps [ns] and loads after one stamp and up to another."""
@@ -197,17 +213,14 @@ class LoadIntake:
     ----------
     history : LoadHistory
         Untared loads by stamp.
-    zero : Load or None
-        What is subtracted, as the last tare found it; may be set to a stored one.
-    scatter : (6,) float
-        Standard deviations of the loads of the last tare [N, N m].
+    zero : Zero or None
+        What is subtracted; may be set to one that was measured or stored.
     """
 
     def __init__(self, frames: Frames, age_limit_s: float) -> None:
         self.frames = frames
         self.history = LoadHistory(age_limit_s)
-        self.zero: Load | None = None
-        self.scatter = np.zeros(6)
+        self.zero: Zero | None = None
 
     def add(
         self, stamp_ns: int, frame_id: str, force: Sequence[float], moment: Sequence[float]
@@ -215,16 +228,15 @@ class LoadIntake:
         """Take in a wrench message (see `Frames.load` for its errors)."""
         self.history.add(stamp_ns, self.frames.load(frame_id, force, moment))
 
-    def tare(self) -> Load:
-        """Make the mean of the last second the new zero and return it.
+    def measured_zero(self) -> Zero:
+        """Return the mean of the last second, for a tare.
 
         Raises
         ------
         InputError
             If no load has arrived or loads in F and in U are mixed.
         """
-        self.zero, self.scatter = self.history.mean_since(TARE_WINDOW_S)
-        return self.zero
+        return self.history.mean_since(TARE_WINDOW_S)
 
     def add_block(
         self, stamps: NDArray[np.int64], frame_id: str, wrenches: NDArray[np.float64]
@@ -255,7 +267,7 @@ class LoadIntake:
     def block_at(self, stamps: NDArray[np.int64]) -> list[Load | None]:
         """Return the loads that belong to n stamps [ns], None where `at` refuses."""
         places, kept = self.history.places(stamps)
-        tare = self.zero
+        tare = None if self.zero is None else self.zero.load
         if tare is None:
             return [None if place < 0 else kept[place] for place in places.tolist()]
         return [
@@ -284,6 +296,7 @@ class LoadIntake:
     def _tared(self, load: Load) -> Load:
         if self.zero is None:
             return load
-        if self.zero.on_platform != load.on_platform:
+        zero = self.zero.load
+        if zero.on_platform != load.on_platform:
             raise InputError("load: the tare was taken in another frame than this load")
-        return Load(load.wrench - self.zero.wrench, load.on_platform)
+        return Load(load.wrench - zero.wrench, load.on_platform)

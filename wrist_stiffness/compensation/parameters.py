@@ -69,6 +69,35 @@ def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) 
 COMMON = (
     ParameterEntry("autostart", True, "configure and activate at the start", fixed=True),
     ParameterEntry("model_file", "", "model to load (YAML); empty for the shipped one"),
+    ParameterEntry(
+        "model_load_limit_s",
+        30.0,
+        "longest time that the loading of a model may take [s]",
+        lower=0.1,
+        upper=3600.0,
+    ),
+    ParameterEntry(
+        "allow_python_laws",
+        False,
+        "run the Python files that a model names as laws; only for models that you trust",
+        fixed=True,
+    ),
+    ParameterEntry(
+        "tare_needed", True, "warn while no tare was taken; false where the load comes tared"
+    ),
+    ParameterEntry(
+        "tare_age_limit_s",
+        3600.0,
+        "oldest tare that is taken up again after a restart [s]",
+        lower=0.0,
+        upper=604800.0,
+    ),
+    ParameterEntry(
+        "state_folder",
+        "~/.ros/wrist_stiffness",
+        "folder in which the tare outlives the node; empty to keep nothing",
+        fixed=True,
+    ),
     ParameterEntry("motor_1_joint", "motor_1_joint", "joint name of motor 1"),
     ParameterEntry("motor_2_joint", "motor_2_joint", "joint name of motor 2"),
     ParameterEntry(
@@ -94,15 +123,19 @@ COMMON = (
 
 PREDICTION = (
     ParameterEntry(
-        "load_noise_N",
+        "load_force_noise_n",
         0.0,
-        "standard deviation of a force component; with load_noise_Nm 0 it is left out of the "
-        "covariance [N]",
+        "standard deviation of a force component; with load_moment_noise_nm 0 it is left out of "
+        "the covariance [N]",
         lower=0.0,
         upper=1000.0,
     ),
     ParameterEntry(
-        "load_noise_Nm", 0.0, "the same of a moment component at O [N m]", lower=0.0, upper=100.0
+        "load_moment_noise_nm",
+        0.0,
+        "the same of a moment component at O [N m]",
+        lower=0.0,
+        upper=100.0,
     ),
     ParameterEntry(
         "load_wait_s",
@@ -120,8 +153,24 @@ PREDICTION = (
     ),
 )
 
+PASS_THROUGH, STOP = "pass_through", "stop"
+
 CORRECTION = (
     ParameterEntry("enabled_on_start", False, "correct from the start", fixed=True),
+    ParameterEntry(
+        "inactive_commands",
+        PASS_THROUGH,
+        "what becomes of commands while the node is not active, once the correction has faded out",
+        choices=(PASS_THROUGH, STOP),
+    ),
+    ParameterEntry(
+        "command_age_limit_s",
+        0.5,
+        "oldest command that is forwarded, like the reference timeout of ros2_control; 0 for any "
+        "[s]",
+        lower=0.0,
+        upper=3600.0,
+    ),
     ParameterEntry("objective", "pointing", "what the motors make right", choices=OBJECTIVES),
     ParameterEntry(
         "correction_limit_deg",
@@ -162,7 +211,7 @@ CORRECTION = (
         choices=("judge", "follow"),
     ),
     ParameterEntry(
-        "contact_force_N",
+        "contact_force_n",
         0.05,
         "force by which a load departs that is another load; never below five times the scatter "
         "that the tare found [N]",
@@ -170,7 +219,7 @@ CORRECTION = (
         upper=1000.0,
     ),
     ParameterEntry(
-        "contact_moment_Nm",
+        "contact_moment_nm",
         0.002,
         "the same of a moment at O [N m]",
         lower=0.00001,
@@ -282,7 +331,7 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
 
 def prediction_settings(values: Mapping[str, Any]) -> StreamSettings:
     """Return the same of the predictor, from the parameters `COMMON` and `PREDICTION`."""
-    noise = np.repeat([values["load_noise_N"], values["load_noise_Nm"]], 3)
+    noise = np.repeat([values["load_force_noise_n"], values["load_moment_noise_nm"]], 3)
     return replace(stream_settings(values), load_noise=noise if noise.any() else None)
 
 
@@ -306,7 +355,7 @@ def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
             singularity_fade=values["singularity_fade"],
         ),
         supervisor=SupervisorSettings(
-            Thresholds(values["contact_force_N"], values["contact_moment_Nm"]),
+            Thresholds(values["contact_force_n"], values["contact_moment_nm"]),
             follow=values["load_policy"] == "follow",
         ),
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_covariance import load_covariance
-from wrist_stiffness.compensation.load_history import LoadIntake
+from wrist_stiffness.compensation.load_history import LoadIntake, Zero
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.static_transforms import StaticTransform, sensor_frames
@@ -100,9 +100,9 @@ class Stream:
         names = (*self.temperatures.stale, *self.covariates.stale)
         return tuple(f"{name}: older than {limit_s:g} s, not used" for name in names)
 
-    def tare(self) -> Load:
-        """Make the mean load of the last second the new zero and return it (see `LoadIntake`)."""
-        return self.loads.tare()
+    def use_zero(self, zero: Zero | None) -> None:
+        """Tare: take a zero off every load (see `LoadIntake.measured_zero`)."""
+        self.loads.zero = zero
 
     def running_model(self) -> RunningModel:
         """Return the model with its memory, or raise InputError where there is none."""

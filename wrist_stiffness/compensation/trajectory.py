@@ -92,7 +92,8 @@ def neighbours(point: PlannedPoint, places: Sequence[int]) -> list[Array]:
     found = [theta]
     for derivative in (point.velocities, point.accelerations):
         if len(derivative) and derivative[at].any():
-            step = STEP / float(np.linalg.norm(derivative[at])) * derivative[at]
+            # Unlike the root of a sum of squares, `hypot` is not zero for the smallest numbers.
+            step = STEP * (derivative[at] / np.hypot(*derivative[at]))
             found += [theta + step, theta - step]
     return found
 
@@ -126,7 +127,7 @@ def corrected_point(
     positions[at] = there
     velocities, accelerations = point.velocities.copy(), point.accelerations.copy()
     if len(velocities) and velocities[at].any():
-        size = float(np.linalg.norm(velocities[at]))
+        size = float(np.hypot(*velocities[at]))
         after, before = next(beside), next(beside)
         velocities[at] = (after - before) * (0.5 * size / STEP)
         curvature = (after - 2.0 * there + before) * (size / STEP) ** 2
@@ -135,7 +136,7 @@ def corrected_point(
     if len(accelerations):
         along = np.zeros(2)
         if accelerations[at].any():
-            size = float(np.linalg.norm(accelerations[at]))
+            size = float(np.hypot(*accelerations[at]))
             after, before = next(beside), next(beside)
             along = (after - before) * (0.5 * size / STEP)
         accelerations[at] = along + curvature

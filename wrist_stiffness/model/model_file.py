@@ -31,6 +31,7 @@ from wrist_stiffness.model.joint_uncertainty import KEYS, JointUncertainty
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.python_laws import require_python_laws
 from wrist_stiffness.model.registry import find_law, law_from_file
 
 SCHEMA = 1
@@ -211,13 +212,18 @@ def _effect(node: Node, folder: Path) -> Effect:
             )
         else:
             law = (
-                law_from_file(values["class"], folder)
+                _users_law(values["class"], folder)
                 if word == PYTHON
                 else find_law(values["effect"])
             )
         return Effect(law, values["component"], estimates)
     except InputError as error:
         raise node.refuse(str(error)) from error
+
+
+def _users_law(reference: str, folder: Path) -> Law:
+    require_python_laws(reference)
+    return law_from_file(reference, folder)
 
 
 def _entry(effect: Effect, folder: Path) -> dict[str, Any]:

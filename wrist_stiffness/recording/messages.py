@@ -136,6 +136,15 @@ class Vector3(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Vector3Stamped(Message):
+    """A free vector in a frame; its unit belongs to the topic."""
+
+    ros_type = "geometry_msgs/msg/Vector3Stamped"
+    header: Header = line("std_msgs/Header header", Header())
+    vector: Vector3 = line("Vector3 vector", Vector3())
+
+
+@dataclass(frozen=True, slots=True)
 class Point(Message):
     """A position [m]."""
 
@@ -314,6 +323,7 @@ MESSAGE_TYPES: dict[str, type[Message]] = {
     message_type.ros_type: message_type
     for message_type in (
         Header,
+        Vector3Stamped,
         String,
         Bool,
         Float64,

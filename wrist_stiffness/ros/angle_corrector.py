@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import time
+from collections.abc import Callable, Generator, Mapping
+from functools import partial
+from typing import Any, NoReturn
 
-from geometry_msgs.msg import PoseWithCovarianceStamped
+import numpy as np
+from geometry_msgs.msg import InertiaStamped, PoseWithCovarianceStamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from wrist_stiffness.compensation.correction import Correction
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.parameters import CORRECTION, correction_settings
+from wrist_stiffness.compensation.parameters import CORRECTION, PASS_THROUGH, correction_settings
+from wrist_stiffness.compensation.payload import Payload
+from wrist_stiffness.compensation.perishable import require_fresh
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.trajectory import planned_point
-from wrist_stiffness.errors import WristError
-from wrist_stiffness.ros.conversions import nanoseconds
-from wrist_stiffness.ros.qos import COMMAND_QOS, RELIABLE_QOS
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.ros.changes import Change, all_or_none
+from wrist_stiffness.ros.conversions import three
+from wrist_stiffness.ros.guarded_node import ACTIVE, ALL_STATES, CONFIGURED
+from wrist_stiffness.ros.qos import COMMAND_QOS
 from wrist_stiffness.ros.run import run
+from wrist_stiffness.ros.sliced_work import SlicedWork
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
     angles_payload,
@@ -29,147 +34,204 @@ from wrist_stiffness.ros.stream_messages import (
     joint_payload,
     joint_reader,
 )
+from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan, stamp_of
 from wrist_stiffness.ros.wrist_node import WristNode
+from wrist_stiffness.topics import (
+    MOTOR_COMMANDS,
+    MOTOR_COMMANDS_CORRECTED,
+    MOTOR_POSITIONS_CORRECTED,
+    MOTOR_TRAJECTORY,
+    MOTOR_TRAJECTORY_CORRECTED,
+    PAYLOAD,
+    POSE_ERROR_RESIDUAL,
+    POSE_ERROR_RESIDUAL_TASK,
+)
+
+MILLIDEGREES = 1e3 * float(np.degrees(1.0))
 
 
 class AngleCorrector(WristNode):
     """Forwards commands, corrected where that is safe, unchanged where it is not.
 
-    A command that is not finite or lacks a motor is not forwarded.
+    A command that is old, not finite, beyond the joint limits or lacks a motor is not forwarded.
     """
 
     stream: CorrectionStream
 
     def __init__(self, **options: Any) -> None:
         super().__init__("angle_corrector", CORRECTION, **options)
-        self.create_service(SetBool, "~/enable", self._on_enable)
-        self.autostart()
+        self._command = self.say(JointState, MOTOR_COMMANDS_CORRECTED)
+        self._positions = self.say(Float64MultiArray, MOTOR_POSITIONS_CORRECTED)
+        self._trajectory = self.say(JointTrajectory, MOTOR_TRAJECTORY_CORRECTED)
+        self._residual = self.say(PoseWithCovarianceStamped, POSE_ERROR_RESIDUAL)
+        self._task_residual = self.say(PoseWithCovarianceStamped, POSE_ERROR_RESIDUAL_TASK)
+        self._plans = SlicedWork(self, self.on_fault)
+        self._paused_s = time.monotonic()
+        for action, kind in (("tare", Trigger), ("reload_model", Trigger), ("enable", SetBool)):
+            self.serve(kind, f"{action}_all", partial(self._on_all, action, kind))
+        self.start()
 
     def make_stream(self, settings: StreamSettings) -> CorrectionStream:
-        """Return the correction stream."""
-        return CorrectionStream(None, settings, self.get_parameter("enabled_on_start").value)
+        """Return the correction stream; it corrects once the node is active."""
+        stream = CorrectionStream(None, settings, self.get_parameter("enabled_on_start").value)
+        stream.active = False
+        return stream
 
     def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
         """Check parameters and return the settings that they stand for."""
         return correction_settings(values)
 
-    def facts(self) -> dict[str, str]:
-        """Return whether commands are corrected."""
-        return {
-            "enabled": str(self.stream.enabled).lower(),
-            "load": self.stream.supervision.state.value,
-        }
+    def make_inputs(self) -> None:
+        """Listen to commands, in every state but the last: see `inactive_commands`."""
+        self.hear(InertiaStamped, PAYLOAD, self._on_payload, COMMAND_QOS, CONFIGURED)
+        commands = joint_reader()
+        self.hear(JointState, MOTOR_COMMANDS, self._on_command, COMMAND_QOS, ALL_STATES, commands)
+        self.hear(
+            JointTrajectory, MOTOR_TRAJECTORY, self._on_trajectory, COMMAND_QOS, ALL_STATES, bytes
+        )
 
-    def restriction(self) -> str:
-        """Return what keeps the node from correcting in full."""
-        supervision = self.stream.supervision
-        if self.stream.enabled and supervision.text:
-            return f"{supervision.state.value}: {supervision.text}"
-        return ""
+    # Lifecycle
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the outputs and load the model."""
-        self._command = self.create_lifecycle_publisher(
-            JointState, "/motor_commands_corrected", RELIABLE_QOS
-        )
-        self._positions = self.create_lifecycle_publisher(
-            Float64MultiArray, "/motor_positions_corrected", RELIABLE_QOS
-        )
-        self._trajectory = self.create_lifecycle_publisher(
-            JointTrajectory, "/motor_trajectory_corrected", RELIABLE_QOS
-        )
-        self._residual = self.create_lifecycle_publisher(
-            PoseWithCovarianceStamped, "/pose_error_residual", RELIABLE_QOS
-        )
-        self._task_residual = self.create_lifecycle_publisher(
-            PoseWithCovarianceStamped, "/pose_error_residual/task_point", RELIABLE_QOS
-        )
-        return super().on_configure(state)
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Correct again, from what time has left of the last correction."""
+        self.stream.resume(time.monotonic() - self._paused_s)
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let the correction fade out with the commands that come."""
+        self._paused_s = time.monotonic()
+        self.stream.active = False
+        return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Remove the outputs."""
-        for publisher in (
-            self._command,
-            self._positions,
-            self._trajectory,
-            self._residual,
-            self._task_residual,
-        ):
-            self.destroy_lifecycle_publisher(publisher)
+        """Forget everything."""
+        self._plans.forget()
         return super().on_cleanup(state)
 
-    def make_inputs(self) -> list[Subscription]:
-        """Listen to commands."""
-        return [
-            self.hear_bytes(
-                JointState, "/motor_commands", joint_reader(), self._on_command, COMMAND_QOS
-            ),
-            self.hear(JointTrajectory, "/motor_trajectory", self._on_trajectory, COMMAND_QOS),
-        ]
+    # Commands
 
     def _on_command(self, joints: JointSample) -> None:
+        self._require_forwarding("command", joints.stamp_ns)
         stamp_ns = joints.stamp_ns
-        try:
-            command = self.stream.on_command(
-                stamp_ns, joints.frame_id, joints.names, joints.positions, joints.velocities
-            )
-        except WristError as error:
-            self.warn(error)
-            return
+        command = self.stream.on_command(
+            stamp_ns, joints.frame_id, joints.names, joints.positions, joints.velocities
+        )
         positions = tuple(command.positions.tolist())
         sent = joints._replace(frame_id=command.frame_id, positions=positions)
         self._command.publish(joint_payload(sent))
         self._positions.publish(angles_payload(command.theta))
         if command.fault is not None:
-            self.warn(command.fault)
+            self.on_fault(command.fault)
             return
         if command.correction is not None:
             self.left_out = command.correction.prediction.warnings
-            self._publish_residual(stamp_ns, command.correction)
+        publishers = (self._residual, self._task_residual)
+        for publisher, residual in zip(publishers, self.stream.residuals(command), strict=False):
+            publisher.publish(error_payload(stamp_ns, *residual))
         self.health.good()
 
-    def _publish_residual(self, stamp_ns: int, correction: Correction) -> None:
-        twist, prediction = correction.after, correction.prediction
-        self._residual.publish(error_payload(stamp_ns, twist, prediction.covariance))
-        at_task_point = self.stream.residual_at_task_point(correction)
-        if at_task_point is not None:
-            self._task_residual.publish(error_payload(stamp_ns, *at_task_point))
+    def _on_trajectory(self, payload: bytes) -> None:
+        self._require_forwarding("trajectory", stamp_of(payload), may_come=True)
+        self._plans.add(self._correct_plan(payload))
 
-    def _on_trajectory(self, message: JointTrajectory) -> None:
+    def _correct_plan(self, payload: bytes) -> Generator[None, None, None]:
+        plan = yield from read_plan(payload)
         # A zero stamp says "at once".
-        stamp_ns = nanoseconds(message.header.stamp) or self.get_clock().now().nanoseconds
-        try:
-            names = message.joint_names
-            points = [
-                planned_point(len(names), point.positions, point.velocities, point.accelerations)
-                for point in message.points
-            ]
-            trajectory = self.stream.on_trajectory(stamp_ns, message.header.frame_id, names, points)
-        except WristError as error:
-            self.warn(error)
-            return
-        message.header.frame_id = trajectory.frame_id
-        for point, planned in zip(message.points, trajectory.points, strict=True):
-            point.positions = planned.positions
-            point.velocities = planned.velocities
-            point.accelerations = planned.accelerations
-        self._trajectory.publish(message)
-        if trajectory.fault is not None:
-            self.warn(trajectory.fault)
+        stamp_ns = plan.stamp_ns or self.get_clock().now().nanoseconds
+        done = yield from self.stream.trajectory_work(
+            stamp_ns, plan.frame_id, plan.names, plan.points
+        )
+        answer = yield from plan_payload(plan, done.frame_id, done.points)
+        self._trajectory.publish(answer)
+        if done.fault is not None:
+            self.on_fault(done.fault)
         else:
             self.health.good()
 
-    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        self.stream.enabled = request.data
-        response.success = True
-        response.message = f"correction is {'on' if request.data else 'off'}"
-        return response
+    def _require_forwarding(self, what: str, stamp_ns: int, may_come: bool = False) -> None:
+        """Refuse what is old, and all where the node is told to stop.
+
+        A command without a stamp is as old as it was sent.  A trajectory may begin later.
+        """
+        limit_s = self.get_parameter("command_age_limit_s").value
+        if stamp_ns == 0:
+            require_fresh(what, self.sent_ns, time.time_ns(), limit_s)
+        else:
+            now_ns = self.get_clock().now().nanoseconds
+            require_fresh(what, min(stamp_ns, now_ns) if may_come else stamp_ns, now_ns, limit_s)
+        if self.mode == "stopped":
+            raise InputError(
+                f"{what}: not forwarded: the node is {self.state}, inactive_commands is stop"
+            )
+
+    @property
+    def mode(self) -> str:
+        """What is done with commands: correcting, fading out, passing or stopped."""
+        if self.stream.correcting:
+            return "correcting"
+        if self.stream.applied.any():
+            return "fading out"
+        passes = self.get_parameter("inactive_commands").value == PASS_THROUGH
+        return "passing" if self.state == ACTIVE or passes else "stopped"
+
+    def _on_payload(self, message: InertiaStamped) -> None:
+        """Take over what a gripper tells: mass and centre of gravity; no mass, no payload."""
+        inertia, frames = message.inertia, self.stream.loads.frames
+        payload: Payload | None = None
+        if inertia.m != 0.0:
+            centre = frames.on_platform(message.header.frame_id, three(inertia.com), "payload")
+            payload = Payload(inertia.m, centre)
+        self.stream.declare_payload(payload)
+
+    # Services
+
+    def enable_change(self, request: SetBool.Request) -> Change:
+        """Switch the correction on, where the node is ready for that, or off."""
+        if request.data:
+            self.require_ready()
+
+        def make() -> Callable[[], None]:
+            before, self.stream.enabled = self.stream.enabled, request.data
+            return partial(setattr, self.stream, "enabled", before)
+
+        return Change(f"correction is {'on' if request.data else 'off'}", make)
+
+    async def _on_all(self, action: str, kind: type, request: Any) -> str:
+        limit_s = self.get_parameter("model_load_limit_s").value
+        return await all_or_none(self, action, kind, request, limit_s)
+
+    # Status
+
+    def facts(self) -> dict[str, str]:
+        """Return what is done with commands, and what is believed of the load."""
+        supervision = self.stream.supervision
+        payload = supervision.payload
+        first, second = (MILLIDEGREES * self.stream.applied).tolist()
+        return {
+            "mode": self.mode,
+            "enabled": str(self.stream.enabled).lower(),
+            "applied correction [mdeg]": f"{first:.3f}, {second:.3f}",
+            "load": supervision.state.value,
+            "payload [kg]": "none" if payload is None else f"{payload.mass_kg:.4f}",
+            "payload told by the gripper": str(supervision.told).lower(),
+            "residual holds": str(supervision.valid).lower(),
+            "trajectories under way": str(len(self._plans)),
+        }
+
+    def restriction(self) -> str:
+        """Return what keeps the node from correcting in full."""
+        if self.state != ACTIVE:
+            return f"commands: {self.mode}"
+        supervision = self.stream.supervision
+        if self.stream.enabled and supervision.text:
+            return f"{supervision.state.value}: {supervision.text}"
+        return ""
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Run the node."""
-    return run(AngleCorrector)
+    run(AngleCorrector)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

@@ -36,7 +36,18 @@ from wrist_stiffness.ros.parameters import declare, model_path
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run, tell
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.topics import BASE_FRAME
+from wrist_stiffness.topics import (
+    BASE_FRAME,
+    JOINT_STATES,
+    LOAD_ESTIMATE,
+    MODEL_RESIDUAL,
+    MOTOR_COMMANDS,
+    MOTOR_COMMANDS_CORRECTED,
+    PLATFORM_POSE,
+    POSE_ERROR_PREDICTED,
+    RECORDING_NOTES,
+    relative,
+)
 from wrist_stiffness.workflows.node_list import LARGEST_SEED, RATES_HZ, UNANSWERED
 
 PARAMETERS = (
@@ -68,18 +79,16 @@ PARAMETERS = (
 SENT_QUEUE = QoSProfile(depth=1)
 """Motors follow the newest command only."""
 
-CORRECTED = "/motor_commands_corrected"
-
 ANSWERS = {
-    "/pose_error_predicted": PoseWithCovarianceStamped,
-    "/model_residual": PoseWithCovarianceStamped,
+    POSE_ERROR_PREDICTED: PoseWithCovarianceStamped,
+    MODEL_RESIDUAL: PoseWithCovarianceStamped,
 }
 """What the wrist's nodes say of a sample, beside the corrected command."""
 
 SPEAKERS = {
-    "/pose_error_predicted": "pose_error_predictor",
-    "/model_residual": "model_monitor",
-    CORRECTED: "angle_corrector",
+    POSE_ERROR_PREDICTED: "pose_error_predictor",
+    MODEL_RESIDUAL: "model_monitor",
+    MOTOR_COMMANDS_CORRECTED: "angle_corrector",
 }
 
 LONGEST_ANSWER_S = 1.0
@@ -126,23 +135,24 @@ class CellSimulator(Node):
         self._greetings: list[Future] = []
         self._found_s = 0.0
 
-        self._joints = self.create_publisher(JointState, "/joint_states", RELIABLE_QOS)
-        self._load = self.create_publisher(WrenchStamped, "/load_estimate", RELIABLE_QOS)
-        self._command = self.create_publisher(JointState, "/motor_commands", RELIABLE_QOS)
-        self._measured = self.create_publisher(PoseStamped, "/platform_pose_measured", RELIABLE_QOS)
+        self._joints = self.create_publisher(JointState, relative(JOINT_STATES), RELIABLE_QOS)
+        self._load = self.create_publisher(WrenchStamped, relative(LOAD_ESTIMATE), RELIABLE_QOS)
+        self._command = self.create_publisher(JointState, relative(MOTOR_COMMANDS), RELIABLE_QOS)
+        self._measured = self.create_publisher(PoseStamped, relative(PLATFORM_POSE), RELIABLE_QOS)
         self._true = self.create_publisher(PoseStamped, "~/platform_pose_true", RELIABLE_QOS)
         self._notes = self.create_publisher(
             String,
-            "/recording_notes",
+            relative(RECORDING_NOTES),
             NOTES_QOS,
         )
-        self._enable = self.create_client(SetBool, "/angle_corrector/enable")
+        self._enable = self.create_client(SetBool, "angle_corrector/enable")
         self._asked_s = time.monotonic()
         self._answers: dict[str, AnswerCount] = {}
-        self.create_subscription(JointState, CORRECTED, self._on_command, SENT_QUEUE)
+        corrected = relative(MOTOR_COMMANDS_CORRECTED)
+        self.create_subscription(JointState, corrected, self._on_command, SENT_QUEUE)
         for topic, message_type in ANSWERS.items():
             answer = partial(self._on_answer, topic)
-            self.create_subscription(message_type, topic, answer, SENT_QUEUE)
+            self.create_subscription(message_type, relative(topic), answer, SENT_QUEUE)
         self.create_timer(1.0 / settings.rate_hz, self._on_timer)
 
     def _on_answer(self, topic: str, message: JointState | PoseWithCovarianceStamped) -> None:
@@ -153,7 +163,7 @@ class CellSimulator(Node):
                 self._answers[topic].hear(number)
 
     def _on_command(self, message: JointState) -> None:
-        self._on_answer(CORRECTED, message)
+        self._on_answer(MOTOR_COMMANDS_CORRECTED, message)
         try:
             self._sent = MotorNames().angles(message.name, message.position)
         except WristError as error:
@@ -171,11 +181,11 @@ class CellSimulator(Node):
 
     def _may_move(self) -> bool:
         if self._start_ns is None:
-            listeners = self.count_subscribers("/joint_states")
+            listeners = self.count_subscribers(relative(JOINT_STATES))
             if listeners < self.get_parameter("listeners").value:
                 return False
             if self._enable_at_repeat and not (
-                self._enable.service_is_ready() and self.count_subscribers("/motor_commands")
+                self._enable.service_is_ready() and self.count_subscribers(relative(MOTOR_COMMANDS))
             ):
                 return False
             if listeners and not self._is_known():
@@ -192,7 +202,7 @@ class CellSimulator(Node):
         """
         self._found_s = self._found_s or time.monotonic()
         if not self._listeners:
-            found = self.get_subscriptions_info_by_topic("/joint_states")
+            found = self.get_subscriptions_info_by_topic(relative(JOINT_STATES))
             named = all(each.node_name != NAMELESS for each in found)
             for each in found if named else ():
                 name = f"{each.node_namespace.rstrip('/')}/{each.node_name}/get_parameters"
@@ -235,7 +245,7 @@ class CellSimulator(Node):
     def _is_answered(self) -> bool:
         """Tell whether those who are there have answered the last sample, or take too long."""
         return time.monotonic() > self._asked_s + LONGEST_ANSWER_S or all(
-            answers.last == self._step - 1 or not self.count_publishers(topic)
+            answers.last == self._step - 1 or not self.count_publishers(relative(topic))
             for topic, answers in self._answers.items()
         )
 
@@ -260,7 +270,7 @@ class CellSimulator(Node):
     def _publish(self, time_s: float) -> None:
         for topic in SPEAKERS:
             # Once it was there: of a node that hangs for long the middleware says that it has gone.
-            if topic not in self._answers and self.count_publishers(topic):
+            if topic not in self._answers and self.count_publishers(relative(topic)):
                 self._answers[topic] = AnswerCount(self._step)
         stamp_ns = self._stamp_ns(time_s)
         sample = self.cell.step(time_s, self._sent)
@@ -275,10 +285,10 @@ class CellSimulator(Node):
         self._asked_s = time.monotonic()
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Run the node."""
-    return run(CellSimulator)
+    run(CellSimulator)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

@@ -4,7 +4,7 @@ rclpy's single-threaded executor gathers every service, timer and topic of a nod
 message, in Python, twice; for a managed node that costs several times the prediction.  It also
 takes one message of each topic in turn, so that a joint state can overtake the load that belongs to
 it.  Here data are taken straight from their subscriptions, always from the first one that has any;
-rclpy's own loop serves all else.
+rclpy's own loop serves all else, one callback at a time between the data.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ LONGEST_RUN_S = 0.02
 LONGEST_WAIT_S = 1.0
 """What cannot be waited for, events of the middleware, is looked for this often."""
 
+TASK_WAIT_S = 0.01
+"""The same while a coroutine waits: rclpy does not say what would wake it."""
+
 NANOSECONDS = 1_000_000_000
 
 
@@ -36,43 +39,49 @@ class DataGroup(MutuallyExclusiveCallbackGroup):
     """Marks the subscriptions of a node's stream.
 
     `StreamExecutor` empties them in the order of their creation: a later one waits until the
-    earlier ones are empty.  Callbacks are plain functions of the message.  Under any other executor
-    this is a common group.
+    earlier ones are empty.  Callbacks are plain functions.  Under any other executor this is a
+    common group.
     """
 
 
+def is_data(entity: Any) -> bool:
+    """Tell whether an entity is a data subscription; its event handlers are none."""
+    return isinstance(entity, Subscription) and isinstance(entity.callback_group, DataGroup)
+
+
 class StreamExecutor(SingleThreadedExecutor):
-    """Single-threaded executor that serves subscriptions of a `DataGroup` first."""
+    """Single-threaded executor that serves subscriptions of a `DataGroup` first.
+
+    What a callback raises goes to its node's `on_fault` if it has one, else out of `spin`.
+    """
 
     def spin(self) -> None:
         """Execute callbacks until shutdown."""
         while self._context.ok() and not self._is_shutdown:
-            data = [
-                subscription
-                for node in self.get_nodes()
-                for subscription in node.subscriptions
-                if isinstance(subscription.callback_group, DataGroup)
-            ]
+            data = [each for node in self.get_nodes() for each in node.subscriptions]
+            data = list(filter(is_data, data))
             if data:
                 self._serve_data(data)
-                self._serve_others()
-            else:
-                self.spin_once()
+            self._serve_other(0.0 if data else LONGEST_WAIT_S)
 
     def can_execute(self, entity: Any) -> bool:
         """Tell whether rclpy's loop may run an entity: never a data subscription."""
-        return not isinstance(entity.callback_group, DataGroup) and super().can_execute(entity)
+        return not is_data(entity) and super().can_execute(entity)
 
-    def _serve_others(self) -> None:
-        """Run what rclpy's loop finds ready."""
-        while True:
-            try:
-                handler, _, _ = self.wait_for_ready_callbacks(0.0)
-            except (TimeoutException, ShutdownException):
-                return
-            handler()
-            if (error := handler.exception()) is not None:
-                raise error
+    def _serve_other(self, longest_s: float) -> None:
+        """Run one callback that rclpy's loop finds ready."""
+        try:
+            handler, _, node = self.wait_for_ready_callbacks(longest_s)
+        except (TimeoutException, ShutdownException):
+            return
+        handler()
+        error = handler.exception()
+        if error is None:
+            return
+        on_fault = getattr(node, "on_fault", None)
+        if on_fault is None:
+            raise error
+        on_fault(error)
 
     def _serve_data(self, data: Sequence[Subscription]) -> None:
         """Run data callbacks until something else is ready."""
@@ -80,10 +89,11 @@ class StreamExecutor(SingleThreadedExecutor):
         waiting = Waiting(self, data)
         while not self._is_shutdown:
             more = take_in_order(data)
-            others = waiting.for_others(0.0 if more else LONGEST_WAIT_S)
+            idle_s = TASK_WAIT_S if self._tasks else LONGEST_WAIT_S
+            others = waiting.for_others(0.0 if more else idle_s)
             if not self._context.ok():
                 raise ExternalShutdownException()
-            if others:
+            if others or self._tasks:
                 return
 
 
@@ -100,11 +110,15 @@ def take_in_order(subscriptions: Sequence[Subscription]) -> bool:
         for subscription in subscriptions:
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
             if taken is not None:
-                subscription.callback(taken[0])
+                with_info = subscription._callback_type is WITH_INFO
+                subscription.callback(*(taken if with_info else taken[:1]))
                 break
         else:
             return False
     return True
+
+
+WITH_INFO = Subscription.CallbackType.WithMessageInfo
 
 
 class Waiting:

@@ -37,12 +37,13 @@ class Health:
         """Count a sample that went well."""
         self._good += 1
 
-    def fault(self, error: WristError) -> None:
+    def fault(self, error: Exception) -> None:
         """Count a fault by the kind of error."""
         kind = type(error).__name__
         self._faults[kind] += 1
         # By kind: a load that is refused is soon followed by many samples without a load.
-        self._last[kind] = self._fresh[kind] = self._newest = str(error)
+        text = str(error) if isinstance(error, WristError) else repr(error)
+        self._last[kind] = self._fresh[kind] = self._newest = text
 
     def report(self, facts: Mapping[str, str], missing: str, restriction: str) -> DiagnosticStatus:
         """Return the state since the last report.

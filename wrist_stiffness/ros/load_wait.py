@@ -32,6 +32,10 @@ class LoadWait:
         """Return how many wait."""
         return len(self._waiting)
 
+    def forget(self) -> None:
+        """Drop all."""
+        self._waiting.clear()
+
     def put(self, joints: JointSample) -> None:
         """Add a joint state."""
         self._waiting.append((self._clock_ns() + self._limit_ns, joints))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 
@@ -19,13 +17,20 @@ from wrist_stiffness.compensation.monitor_stream import (
 )
 from wrist_stiffness.compensation.parameters import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.conversions import nanoseconds, pose_numbers, three
 from wrist_stiffness.ros.parameters import values_of
-from wrist_stiffness.ros.qos import ALARM_QOS, RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import JointSample, error_payload, joint_reader
 from wrist_stiffness.ros.wrist_node import WristNode
+from wrist_stiffness.topics import (
+    FRAME_POSE,
+    JOINT_STATES,
+    MODEL_ALARM,
+    MODEL_RESIDUAL,
+    PLATFORM_MARKERS,
+    PLATFORM_POSE,
+)
 
 
 class ModelMonitor(WristNode):
@@ -35,7 +40,9 @@ class ModelMonitor(WristNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("model_monitor", MONITOR, **options)
-        self.autostart()
+        self._residual = self.say(PoseWithCovarianceStamped, MODEL_RESIDUAL)
+        self._alarm = self.say(Bool, MODEL_ALARM, STATE_QOS)
+        self.start()
 
     def make_stream(self, settings: StreamSettings) -> MonitorStream:
         """Return the monitor's stream."""
@@ -66,51 +73,29 @@ class ModelMonitor(WristNode):
         """Return the alarm."""
         return "the residuals have changed" if self.stream.monitor.alarm else ""
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the outputs and load the model."""
-        self._residual = self.create_lifecycle_publisher(
-            PoseWithCovarianceStamped, "/model_residual", RELIABLE_QOS
-        )
-        self._alarm = self.create_lifecycle_publisher(Bool, "/model_alarm", ALARM_QOS)
-        return super().on_configure(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Remove the outputs."""
-        for publisher in (self._residual, self._alarm):
-            self.destroy_lifecycle_publisher(publisher)
-        return super().on_cleanup(state)
-
-    def make_inputs(self) -> list[Subscription]:
+    def make_inputs(self) -> None:
         """Listen to the motors and to the pose sensor; a topic can only have one type."""
-        pose: tuple[type, Callable[[Any], None]] = (PoseStamped, self._on_pose)
+        joints = joint_reader()
+        self.hear(JointState, JOINT_STATES, self._on_joints, SENSOR_QOS, read=joints)
+        # The frame before the platform: it is taken out of the pose of the same stamp.
+        self.hear(PoseStamped, FRAME_POSE, self._on_frame_pose, SENSOR_QOS)
         if self.get_parameter("pose_type").value == POSE_TYPES[1]:
-            pose = (PoseWithCovarianceStamped, self._on_pose_with_covariance)
-        return [
-            self.hear_bytes(
-                JointState, "/joint_states", joint_reader(), self._on_joints, SENSOR_QOS
-            ),
-            # The frame before the platform: it is taken out of the pose of the same stamp.
-            self.hear(PoseStamped, "/frame_pose_measured", self._on_frame_pose, SENSOR_QOS),
-            self.hear(pose[0], "/platform_pose_measured", pose[1], SENSOR_QOS),
-            self.hear(PoseArray, "/platform_markers_measured", self._on_markers, SENSOR_QOS),
-        ]
+            pose = self._on_pose_with_covariance
+            self.hear(PoseWithCovarianceStamped, PLATFORM_POSE, pose, SENSOR_QOS)
+        else:
+            self.hear(PoseStamped, PLATFORM_POSE, self._on_pose, SENSOR_QOS)
+        self.hear(PoseArray, PLATFORM_MARKERS, self._on_markers, SENSOR_QOS)
 
     def _on_joints(self, joints: JointSample) -> None:
-        try:
-            self.stream.on_joint_state(
-                joints.stamp_ns, joints.names, joints.positions, joints.velocities
-            )
-        except WristError as error:
-            self.warn(error)
+        self.stream.on_joint_state(
+            joints.stamp_ns, joints.names, joints.positions, joints.velocities
+        )
 
     def _on_frame_pose(self, message: PoseStamped) -> None:
         header = message.header
-        try:
-            self.stream.on_frame_pose(
-                nanoseconds(header.stamp), header.frame_id, *pose_numbers(message.pose)
-            )
-        except WristError as error:
-            self.warn(error)
+        self.stream.on_frame_pose(
+            nanoseconds(header.stamp), header.frame_id, *pose_numbers(message.pose)
+        )
 
     def _on_pose(self, message: PoseStamped) -> None:
         self._judge(message.header, self.stream.on_pose, *pose_numbers(message.pose))
@@ -126,11 +111,7 @@ class ModelMonitor(WristNode):
 
     def _judge(self, header: Header, judge: Callable[..., MonitoredPose], *measured: Any) -> None:
         stamp_ns = nanoseconds(header.stamp)
-        try:
-            judged = judge(stamp_ns, header.frame_id, *measured)
-        except WristError as error:
-            self.warn(error)
-            return
+        judged = judge(stamp_ns, header.frame_id, *measured)
         self.left_out = judged.warnings
         # What is not measured is sent as zero with a huge variance: poses cannot carry a NaN.
         residual = np.nan_to_num(judged.residual)
@@ -140,10 +121,10 @@ class ModelMonitor(WristNode):
         self.health.good()
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Run the node."""
-    return run(ModelMonitor)
+    run(ModelMonitor)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from wrist_stiffness.compensation.parameters import ParameterEntry
+from wrist_stiffness.compensation.parameters import (
+    COMMON,
+    CORRECTION,
+    MONITOR,
+    PREDICTION,
+    ParameterEntry,
+)
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
+
+EVERY_ENTRY = (*COMMON, *PREDICTION, *CORRECTION, *MONITOR)
+"""A params file may give one node's parameters to all (`/**`)."""
+
+OF_RCLPY = {"use_sim_time", "start_type_description_service"}
+QOS_OVERRIDES = "qos_overrides."
 
 SHIPPED_MODEL = "config/palmieri2015_model.yaml"
 
@@ -45,11 +59,26 @@ def declare(node: Node, entries: Sequence[ParameterEntry]) -> None:
 
     Raises
     ------
+    InputError
+        If the node was started with a parameter that no node of the wrist has: rclpy ignores it.
     rclpy.exceptions.ParameterException
         If a value that the node was started with has another type or is out of range.
     """
+    known = {entry.name for entry in (*entries, *EVERY_ENTRY)} | OF_RCLPY
+    for name in node._parameter_overrides:
+        if name not in known and not name.startswith(QOS_OVERRIDES):
+            raise InputError(f"unknown parameter {name!r}{_guess(name, known)}")
     for entry in entries:
         node.declare_parameter(entry.name, entry.default, descriptor(entry))
+
+
+def _guess(name: str, known: Collection[str]) -> str:
+    """Return what was meant, as far as that can be said."""
+    first = name.split(".")[0]
+    if "." in name and first in known:
+        return f": {first} is one text (YAML in quotes), not a mapping"
+    near = get_close_matches(name, known, 1)
+    return f"; is {near[0]} meant?" if near else ""
 
 
 def values_of(node: Node, entries: Sequence[ParameterEntry]) -> Mapping[str, Any]:

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
-from geometry_msgs.msg import PoseWithCovarianceStamped
-from rclpy.clock import Clock, ClockType
+from geometry_msgs.msg import PoseWithCovarianceStamped, Vector3Stamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
@@ -23,15 +20,22 @@ from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.error_model import Prediction
 from wrist_stiffness.ros.load_wait import LoadWait
 from wrist_stiffness.ros.markers import wrist_markers
-from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS
+from wrist_stiffness.ros.qos import SENSOR_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
     error_payload,
     joint_reader,
-    number_payload,
+    vector_payload,
 )
 from wrist_stiffness.ros.wrist_node import WristNode
+from wrist_stiffness.topics import (
+    JOINT_STATES,
+    POSE_ERROR_PHI_MDEG,
+    POSE_ERROR_PREDICTED,
+    POSE_ERROR_S_UM,
+    WRIST_MARKERS,
+)
 
 MICROMETRES = 1e6
 MILLIDEGREES = 1e3 * float(np.degrees(1.0))
@@ -48,12 +52,15 @@ class PoseErrorPredictor(WristNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
         self._drawn_ns = -NANOSECONDS
+        self._error = self.say(PoseWithCovarianceStamped, POSE_ERROR_PREDICTED)
+        self._s_um = self.say(Vector3Stamped, POSE_ERROR_S_UM)
+        self._phi_mdeg = self.say(Vector3Stamped, POSE_ERROR_PHI_MDEG)
+        self._markers = self.say(MarkerArray, WRIST_MARKERS)
         wait_s = self.get_parameter("load_wait_s").value
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.waiting = LoadWait(wait_s, time.monotonic_ns)
         if wait_s > 0.0:
-            self.create_timer(wait_s / CHECKS_PER_WAIT, self.after_load, clock=steady)
-        self.autostart()
+            self.every(wait_s / CHECKS_PER_WAIT, self.after_load)
+        self.start()
 
     def make_stream(self, settings: StreamSettings) -> PredictionStream:
         """Return the prediction stream."""
@@ -63,31 +70,15 @@ class PoseErrorPredictor(WristNode):
         """Check parameters and return the settings that they stand for."""
         return prediction_settings(values)
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make the outputs and load the model."""
-        self._error = self.create_lifecycle_publisher(
-            PoseWithCovarianceStamped, "/pose_error_predicted", RELIABLE_QOS
-        )
-        self._s_um = self.create_lifecycle_publisher(Float64, "/pose_error/s_um", RELIABLE_QOS)
-        self._phi_mdeg = self.create_lifecycle_publisher(
-            Float64, "/pose_error/phi_mdeg", RELIABLE_QOS
-        )
-        self._markers = self.create_lifecycle_publisher(MarkerArray, "/wrist_markers", RELIABLE_QOS)
-        return super().on_configure(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Remove the outputs."""
-        for publisher in (self._error, self._s_um, self._phi_mdeg, self._markers):
-            self.destroy_lifecycle_publisher(publisher)
-        return super().on_cleanup(state)
-
-    def make_inputs(self) -> list[Subscription]:
+    def make_inputs(self) -> None:
         """Listen to the motors."""
-        return [
-            self.hear_bytes(
-                JointState, "/joint_states", joint_reader(), self._on_joint_state, SENSOR_QOS
-            )
-        ]
+        joints = joint_reader()
+        self.hear(JointState, JOINT_STATES, self._on_joint_state, SENSOR_QOS, read=joints)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Drop the joint states that wait."""
+        self.waiting.forget()
+        return super().on_deactivate(state)
 
     def _on_joint_state(self, joints: JointSample) -> None:
         self.waiting.put(joints)
@@ -96,22 +87,21 @@ class PoseErrorPredictor(WristNode):
     def after_load(self) -> None:
         """Predict for the joint states that need not wait any longer."""
         for joints in self.waiting.ready(self.stream.loads.history.newest_ns):
-            self._predict(joints)
+            try:
+                self._predict(joints)
+            except WristError as error:
+                self.on_fault(error)
 
     def _predict(self, joints: JointSample) -> None:
         stamp_ns = joints.stamp_ns
-        try:
-            prediction = self.stream.on_joint_state(
-                stamp_ns, joints.names, joints.positions, joints.velocities
-            ).prediction
-        except WristError as error:
-            self.warn(error)
-            return
+        prediction = self.stream.on_joint_state(
+            stamp_ns, joints.names, joints.positions, joints.velocities
+        ).prediction
         self._error.publish(error_payload(stamp_ns, prediction.twist, prediction.covariance))
         if self._s_um.get_subscription_count():
-            self._s_um.publish(number_payload(prediction.shift_norm * MICROMETRES))
+            self._s_um.publish(vector_payload(stamp_ns, MICROMETRES * prediction.twist[:3]))
         if self._phi_mdeg.get_subscription_count():
-            self._phi_mdeg.publish(number_payload(prediction.phi * MILLIDEGREES))
+            self._phi_mdeg.publish(vector_payload(stamp_ns, MILLIDEGREES * prediction.twist[3:]))
         self.health.good()
         self.left_out = prediction.warnings
         self._draw(stamp_ns, prediction)
@@ -130,10 +120,10 @@ class PoseErrorPredictor(WristNode):
         self._markers.publish(wrist_markers(stamp_ns, table, prediction, exaggeration))
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Run the node."""
-    return run(PoseErrorPredictor)
+    run(PoseErrorPredictor)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

@@ -12,7 +12,7 @@ that cannot keep up drops older ones, so that it does not lag further."""
 RELIABLE_QOS = QoSProfile(depth=1000)
 """Everything out."""
 
-ALARM_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """A state: who comes later hears the newest, also where poses have stopped."""
 
 STATIC_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Any, NoReturn
 
 from rclpy.node import Node
 
@@ -17,7 +17,6 @@ from wrist_stiffness.recording.channel import Channel, channel_of
 from wrist_stiffness.recording.messages import (
     Bool,
     DiagnosticArray,
-    Float64,
     Float64MultiArray,
     JointState,
     JointTrajectory,
@@ -27,6 +26,7 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovarianceStamped,
     String,
     Temperature,
+    Vector3Stamped,
     WrenchStamped,
 )
 from wrist_stiffness.ros.executor import DataGroup, take_in_order
@@ -60,8 +60,8 @@ TOPICS: dict[str, type[Message]] = {
     topics.RECORDING_NOTES: String,
     topics.PLATFORM_POSE_TRUE: PoseStamped,
     topics.POSE_ERROR_PREDICTED: PoseWithCovarianceStamped,
-    topics.POSE_ERROR_S_UM: Float64,
-    topics.POSE_ERROR_PHI_MDEG: Float64,
+    topics.POSE_ERROR_S_UM: Vector3Stamped,
+    topics.POSE_ERROR_PHI_MDEG: Vector3Stamped,
     topics.MOTOR_COMMANDS_CORRECTED: JointState,
     topics.MOTOR_POSITIONS_CORRECTED: Float64MultiArray,
     topics.MOTOR_TRAJECTORY_CORRECTED: JointTrajectory,
@@ -101,7 +101,7 @@ class Recorder(Node):
         self._writer = self._recording.enter_context(RecordingWriter(output, keep_partial=True))
 
     def _look(self) -> None:
-        if not all(self.count_publishers(topic) for topic in self._begin_with):
+        if not all(self.count_publishers(topics.relative(each)) for each in self._begin_with):
             return
         self._looking.cancel()
         group = DataGroup()
@@ -109,7 +109,7 @@ class Recorder(Node):
             package, kind, name = message_type.ros_type.split("/")
             self.create_subscription(
                 getattr(import_module(f"{package}.{kind}"), name),
-                topic,
+                topics.relative(topic),
                 partial(self._on_message, channel_of(topic, message_type)),
                 NOTES_QOS if topic == topics.RECORDING_NOTES else RECORDING_QOS,
                 raw=True,
@@ -134,10 +134,10 @@ class Recorder(Node):
                 super().destroy_node()
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Run the node."""
-    return run(Recorder)
+    run(Recorder)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

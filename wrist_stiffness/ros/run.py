@@ -1,11 +1,15 @@
-"""Run a node as a process, with a clean end on SIGINT and SIGTERM."""
+"""Run a node as a process, with a clean end on SIGINT and SIGTERM, and an end in any case."""
 
 from __future__ import annotations
 
+import faulthandler
 import gc
+import os
 import signal
 import sys
 from collections.abc import Callable
+from types import FrameType
+from typing import NoReturn
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -18,9 +22,12 @@ from wrist_stiffness.ros.parent import end_with_parent
 
 EXIT_BAD_INPUT = 2
 
+END_S = 8.0
+"""A node that has not ended so long after it was told to ends by force, and says where it hung."""
 
-def run(make_node: Callable[[], Node]) -> int:
-    """Make a node and spin it until it is told to stop.
+
+def run(make_node: Callable[[], Node]) -> NoReturn:
+    """Make a node, spin it until it is told to stop, and end the process.
 
     One thread: the multi-threaded executor loses messages under load.
 
@@ -29,29 +36,40 @@ def run(make_node: Callable[[], Node]) -> int:
     make_node : callable
         Makes the node once ROS is initialised.
 
-    Returns
-    -------
-    int
-        0, or 2 if the node cannot start, go on or end as asked; one line on stderr says why.
+    Ends with 0, with 2 if the node cannot start, go on or end as asked (one line on stderr says
+    why), or as the node says with a SystemExit.
     """
     end_with_parent()
-    interrupted = _interrupts_without_raising()
+    told_to_end = _listen_to_signals()
+    code = 0
     try:
         rclpy.init()
-    # What rclpy raises for ROS arguments that cannot be read has no other public class.
-    except RuntimeError as error:
-        tell(f"ROS 2 cannot start: {error}")
-        return EXIT_BAD_INPUT
-    executor = StreamExecutor()
-    try:
-        if not interrupted:
-            _spin(executor, make_node)
+        if not told_to_end:
+            _spin(make_node)
     except (WristError, ParameterException) as error:
-        tell(str(error))
-        return EXIT_BAD_INPUT
+        code = _refuse(str(error))
+    except RuntimeError as error:
+        # What rclpy raises for ROS arguments that cannot be read has no other public class; and a
+        # context that a signal has shut down fails wherever the node happens to be.
+        if not told_to_end:
+            code = _refuse(f"ROS 2 cannot start: {error}")
+    except SystemExit as ending:
+        code = int(ending.code or 0)
     finally:
         rclpy.try_shutdown()
-    return 0
+    _leave(code)
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process without the middleware's own clearing up at exit.
+
+    All has been said and written by now; after a peer was killed, Fast DDS may crash there.
+    """
+    # Where a signal has shut the context down, rclpy leaves the log file open.
+    rclpy.get_default_context()._logging_fini()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def tell(error: str) -> None:
@@ -59,8 +77,14 @@ def tell(error: str) -> None:
     print(f"wrist-stiffness node: error: {' '.join(error.split())}", file=sys.stderr)
 
 
-def _spin(executor: StreamExecutor, make_node: Callable[[], Node]) -> None:
+def _refuse(error: str) -> int:
+    tell(error)
+    return EXIT_BAD_INPUT
+
+
+def _spin(make_node: Callable[[], Node]) -> None:
     """Make a node, run it until the context is shut down, and destroy it."""
+    executor = StreamExecutor()
     try:
         executor.add_node(make_node())
         # What a node starts with stays: the collector need not go through it again and again.
@@ -80,18 +104,27 @@ def _spin(executor: StreamExecutor, make_node: Callable[[], Node]) -> None:
             node.destroy_node()
 
 
-def _interrupts_without_raising() -> list[int]:
-    """Let SIGINT end the node as SIGTERM does: by the shutdown of its context, which rclpy sees to.
+def _listen_to_signals() -> list[int]:
+    """Let SIGINT and SIGTERM end the node, and see to it that they do.
 
-    rclpy calls the handler that was there before its own. Python's raises a KeyboardInterrupt
-    wherever the program happens to be, and inside a `__del__` it is printed as a traceback.
+    rclpy's own handlers shut the context down, and call those that were there before.  Python's of
+    SIGINT raises a KeyboardInterrupt wherever the program happens to be; inside a `__del__` it is
+    printed as a traceback.  A callback that never returns, of a user's law or of the middleware,
+    never sees that the context is shut down.
 
     Returns
     -------
     list of int
-        Not empty after a SIGINT, also one that comes before rclpy listens. No event: the next
+        Not empty after a signal, also one that comes before rclpy listens. No event: the next
         signal may come while its lock is held.
     """
-    interrupted: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, frame: interrupted.append(number))
-    return interrupted
+    told_to_end: list[int] = []
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        if not told_to_end:
+            faulthandler.dump_traceback_later(END_S, exit=True)
+        told_to_end.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    return told_to_end

@@ -15,11 +15,11 @@ from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording.fixed_layout import FixedLayout, FixedReader
 from wrist_stiffness.recording.messages import (
-    Float64,
     Float64MultiArray,
     Header,
     JointState,
     PoseWithCovarianceStamped,
+    Vector3Stamped,
     WrenchStamped,
 )
 from wrist_stiffness.topics import BASE_FRAME
@@ -115,14 +115,14 @@ def angles_payload(theta: Array) -> bytes:
     return TWO_NUMBERS.payload(NO_OFFSET, *theta.tolist())
 
 
-def number_payload(value: float) -> bytes:
-    """Return a std_msgs/Float64."""
-    return NUMBER.payload(value)
+def vector_payload(stamp_ns: int, vector: Array) -> bytes:
+    """Return a vector (3,) in `wrist_base` as geometry_msgs/Vector3Stamped."""
+    return VECTOR.payload(*divmod(stamp_ns, NANOSECONDS), *vector.tolist())
 
 
 POSE_ERROR = FixedLayout.of(PoseWithCovarianceStamped(Header(frame_id=BASE_FRAME)))
 TWO_NUMBERS = FixedLayout.of(Float64MultiArray(data=(0.0, 0.0)))
-NUMBER = FixedLayout.of(Float64())
+VECTOR = FixedLayout.of(Vector3Stamped(Header(frame_id=BASE_FRAME)))
 NO_OFFSET = 0
 """`data_offset` of the array's layout."""
 

@@ -1,57 +1,60 @@
-"""What the wrist's nodes share: parameters, model, lifecycle and diagnostics."""
+"""What the wrist's nodes share: parameters, lifecycle, common inputs, services and the status."""
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
-from threading import Thread
-from typing import Any, TypeVar
+from typing import Any
 
-import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TransformStamped, WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
-from rclpy.task import Future
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
-from wrist_stiffness.compensation.parameters import (
-    COMMON,
-    ParameterEntry,
-    stream_settings,
-)
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.parameters import COMMON, ParameterEntry, stream_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.model.error_model import ErrorModel, Load
-from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.ros import static_transforms
+from wrist_stiffness.ros.changes import Change, until
 from wrist_stiffness.ros.conversions import nanoseconds
-from wrist_stiffness.ros.executor import DataGroup
-from wrist_stiffness.ros.health import Health
+from wrist_stiffness.ros.guarded_node import (
+    ACTIVE,
+    ALL_STATES,
+    CONFIGURED,
+    UNCONFIGURED,
+    GuardedNode,
+)
+from wrist_stiffness.ros.kept_tare import KeptTare, Tare
+from wrist_stiffness.ros.model_loading import Loading
 from wrist_stiffness.ros.parameters import declare, model_path, values_of
-from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS, STATIC_QOS
+from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS, STATE_QOS, STATIC_QOS
 from wrist_stiffness.ros.stream_messages import WrenchSample, wrench_reader
+from wrist_stiffness.topics import (
+    COVARIATES,
+    DIAGNOSTICS,
+    LOAD_ESTIMATE,
+    TEMPERATURES,
+    TF_STATIC,
+    WRIST_STATUS,
+)
 
 REPORT_EVERY_S = 1.0
 
-Numbers = TypeVar("Numbers")
 
-
-class WristNode(LifecycleNode, ABC):
+class WristNode(GuardedNode, ABC):
     """A managed node around one stream of the core.
 
-    Without a model it is active all the same and gives the safe output, so that a wrong file never
-    cuts the commands off; `~/reload_model` heals it.
+    Unconfigured it has no model and knows nothing; inactive it takes in loads and slow signals;
+    active it answers.
 
     Parameters
     ----------
@@ -66,8 +69,6 @@ class WristNode(LifecycleNode, ABC):
     ----------
     stream : Stream
         Of the core.
-    health : Health
-        Counts of good samples and faults.
     left_out : tuple of str
         Effects that the model left out of its last prediction, and why.
 
@@ -85,152 +86,96 @@ class WristNode(LifecycleNode, ABC):
         super().__init__(name, **options)
         self._entries = (*COMMON, *entries)
         declare(self, self._entries)
-        self.health = Health(self.get_name())
         self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
-        self._model_fault = "no model is loaded"
         self.left_out: tuple[str, ...] = ()
+        self._fault = ""
+        self._load_heard_s: float | None = None
+        self._tare: Tare | None = None
+        self._kept_tare = KeptTare(
+            self.get_parameter("state_folder").value, self.get_fully_qualified_name()
+        )
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._use_parameters)
-        # Of a group of its own: while it waits for the model, no other callback of its group runs.
-        self.create_service(
-            Trigger,
-            "~/reload_model",
-            self._on_reload,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
-        self.create_service(Trigger, "~/tare", self._on_tare)
-        self._data_group = DataGroup()
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", RELIABLE_QOS)
-        # Not the node's clock: a simulated one may stand still.
-        self.create_timer(
-            REPORT_EVERY_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self.offer("tare", Trigger, lambda request: self._tare_change())
+        self.offer("reload_model", Trigger, lambda request: self._model_change())
+        self.offer("enable", SetBool, self.enable_change)
+        self._diagnostics = self.say(DiagnosticArray, DIAGNOSTICS, RELIABLE_QOS)
+        self._status = self.say(DiagnosticStatus, WRIST_STATUS, STATE_QOS)
+        self.every(REPORT_EVERY_S, self.report)
+
+    # What a node is made of
 
     @abstractmethod
     def make_stream(self, settings: StreamSettings) -> Stream:
         """Return the node's stream, without a model."""
+
+    @abstractmethod
+    def make_inputs(self) -> None:
+        """Hear what the node needs beside loads and slow signals, in the order of taking."""
 
     def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
         """Check parameters and return the settings that they stand for (may raise InputError)."""
         return stream_settings(values)
 
     def facts(self) -> dict[str, str]:
-        """Return what the node adds to its diagnostics."""
+        """Return what the node adds to its status."""
         return {}
 
     def restriction(self) -> str:
         """Return what keeps the node from its full work although all is well; a warning."""
         return ""
 
-    def autostart(self) -> None:
-        """Configure and activate, unless the parameter `autostart` says no."""
-        if self.get_parameter("autostart").value:
-            self.trigger_configure()
+    def start(self) -> None:
+        """Listen; configure and activate, unless the parameter `autostart` says no."""
+        self._hear_signals()
+        self.make_inputs()
+        if (
+            self.get_parameter("autostart").value
+            and self.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        ):
             self.trigger_activate()
+
+    def _hear_signals(self) -> None:
+        """Hear what all nodes need; a load is taken before a joint state that waits."""
+        transforms = static_transforms.message_type()
+        if transforms is not None:
+            self.hear(transforms, TF_STATIC, self._on_tf_static, STATIC_QOS, ALL_STATES)
+        loads = wrench_reader()
+        self.hear(WrenchStamped, LOAD_ESTIMATE, self._on_load, SENSOR_QOS, CONFIGURED, loads)
+        self.hear(Temperature, TEMPERATURES, self._on_temperature, SENSOR_QOS, CONFIGURED)
+        for name in self.get_parameter("covariates").value.split():
+            on_covariate = partial(self._on_covariate, name)
+            self.hear(Float64, COVARIATES + name, on_covariate, SENSOR_QOS, CONFIGURED)
 
     # Lifecycle
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Load the model."""
+        """Load the model; without one the node stays unconfigured and says why."""
+        loading = self._loading()
+        loading.wait()
         try:
-            self._use_model(loaded(self._model_path()))
+            self.stream.model = loading.result()
         except WristError as error:
-            self._model_fault = str(error)
-            self.warn(error)
+            self._fault = str(error)
+            self.on_fault(error)
+            return TransitionCallbackReturn.FAILURE
+        self._fault = ""
+        self._take_up_tare()
         return super().on_configure(state)
 
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to listen; the load first, so that it is taken before a joint state that waits."""
-        covariates = self.get_parameter("covariates").value.split()
-        transforms = static_transforms.message_type()
-        self._inputs = [
-            *(
-                []
-                if transforms is None
-                else [self.hear(transforms, "/tf_static", self._on_tf_static, STATIC_QOS)]
-            ),
-            self.hear_bytes(
-                WrenchStamped, "/load_estimate", wrench_reader(), self._on_load, SENSOR_QOS
-            ),
-            self.hear(Temperature, "/temperatures", self._on_temperature, SENSOR_QOS),
-            *(
-                self.hear(
-                    Float64, f"/covariates/{name}", partial(self._on_covariate, name), SENSOR_QOS
-                )
-                for name in covariates
-            ),
-            *self.make_inputs(),
-        ]
-        return super().on_activate(state)
-
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop listening."""
-        for subscription in self._inputs:
-            self.destroy_subscription(subscription)
-        return super().on_deactivate(state)
-
-    @abstractmethod
-    def make_inputs(self) -> list[Subscription]:
-        """Return the node's subscriptions beside the load's, what is to be taken first first."""
-
-    def hear(
-        self, message_type: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile
-    ) -> Subscription:
-        """Subscribe to a part of the node's stream."""
-        return self.create_subscription(
-            message_type, topic, callback, qos, callback_group=self._data_group
-        )
-
-    def hear_bytes(
-        self,
-        message_type: type,
-        topic: str,
-        read: Callable[[bytes], Numbers],
-        callback: Callable[[Numbers], None],
-        qos: QoSProfile,
-    ) -> Subscription:
-        """Subscribe to a part of the stream that is too quick for rclpy's message objects.
-
-        Parameters
-        ----------
-        message_type : type
-            Of the topic.
-        topic : str
-            Its name.
-        read : callable
-            Takes a payload apart; raises WristError where that is not possible, a fault.
-        callback : callable
-            Takes what was read.
-        qos : QoSProfile
-            Of the subscription.
-
-        Returns
-        -------
-        Subscription
-            To be destroyed when the node no longer listens.
-        """
-
-        def on_payload(payload: bytes) -> None:
-            try:
-                numbers = read(payload)
-            except WristError as error:
-                self.warn(error)
-                return
-            callback(numbers)
-
-        return self.create_subscription(
-            message_type, topic, on_payload, qos, callback_group=self._data_group, raw=True
-        )
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget everything: model, tare, payload, loads and whether the correction was on."""
+        self.stream = self.make_stream(self.stream.settings)
+        self.left_out, self._load_heard_s = (), None
+        self._set_tare(None)
+        return super().on_cleanup(state)
 
     # Inputs that all nodes have
 
     def _on_load(self, load: WrenchSample) -> None:
-        try:
-            self.stream.loads.add(*load)
-        except WristError as error:
-            self.warn(error)
-        else:
-            self.after_load()
+        self.stream.loads.add(*load)
+        self._load_heard_s = time.monotonic()
+        self.after_load()
 
     def _on_tf_static(self, message: Any) -> None:
         self.on_transforms(message.transforms)
@@ -241,131 +186,174 @@ class WristNode(LifecycleNode, ABC):
             try:
                 self.stream.on_static_transforms([static_transforms.converted(message)])
             except WristError as error:
-                self.warn(error)
+                self.on_fault(error)
 
     def _on_temperature(self, message: Temperature) -> None:
-        try:
-            self.stream.temperatures.add(
-                message.header.frame_id, nanoseconds(message.header.stamp), message.temperature
-            )
-        except WristError as error:
-            self.warn(error)
+        self.stream.temperatures.add(
+            message.header.frame_id, nanoseconds(message.header.stamp), message.temperature
+        )
 
     def _on_covariate(self, name: str, message: Float64) -> None:
         # The message has no stamp of its own.
-        try:
-            self.stream.covariates.add(name, self.get_clock().now().nanoseconds, message.data)
-        except WristError as error:
-            self.warn(error)
+        self.stream.covariates.add(name, self.get_clock().now().nanoseconds, message.data)
 
     def after_load(self) -> None:
         """Do what waited for a load."""
 
-    def warn(self, error: WristError) -> None:
-        """Count a fault and log it, at most every five seconds."""
-        self.health.fault(error)
-        self.get_logger().warning(str(error), throttle_duration_sec=5.0)
+    def require_ready(self) -> None:
+        """Refuse what needs a node at work: active, with a model and with loads that arrive.
 
-    # Services
+        Raises
+        ------
+        InputError
+            With the reason.
+        """
+        if self.state != ACTIVE:
+            raise InputError(f"refused: the node is {self.state}, not active")
+        limit_s = self.stream.settings.load_age_limit_s
+        if self._load_heard_s is None:
+            raise InputError("refused: no load estimate has arrived")
+        if (age_s := time.monotonic() - self._load_heard_s) > limit_s:
+            raise InputError(
+                f"refused: no load estimate has arrived for {age_s:.1f} s (limit {limit_s:g} s)"
+            )
 
-    async def _on_reload(
-        self, request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+    def enable_change(self, request: SetBool.Request) -> Change:
+        """Agree to a correction that is to be switched on, where this node is ready, or off."""
+        if request.data:
+            self.require_ready()
+        return Change("ready" if request.data else "agreed", lambda: lambda: None)
+
+    # Tare
+
+    def _tare_change(self) -> Change:
+        self.require_configured()
+        zero = self.stream.loads.measured_zero()
+        frames = self.get_parameter("frames").value
+        new = Tare(zero, time.time(), frames)
+
+        def make() -> Callable[[], None]:
+            before = self._tare
+            self._set_tare(new)
+            return partial(self._set_tare, before)
+
+        return Change(f"new zero of the load [N, N m]: {zero.load.wrench.tolist()}", make)
+
+    def _set_tare(self, tare: Tare | None) -> None:
+        self._tare = tare
+        self.stream.use_zero(None if tare is None else tare.zero)
         try:
-            loading: Future = Future(executor=self.executor)
-            Thread(target=_load, args=(self._model_path(), loading), daemon=True).start()
-            # Samples go on being answered with the old model until the new one is complete.
-            self._use_model(await loading)
+            self._kept_tare.keep(tare)
         except WristError as error:
-            self.warn(error)
-            response.success, response.message = False, str(error)
-        else:
-            response.success, response.message = True, self.facts_of_model()["model"]
-        return response
+            self.on_fault(error)
 
-    def _on_tare(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _take_up_tare(self) -> None:
+        longest_s = self.get_parameter("tare_age_limit_s").value
+        frames = self.get_parameter("frames").value
         try:
-            load = self.stream.tare()
+            tare = self._kept_tare.read(time.time(), longest_s, frames)
         except WristError as error:
-            self.warn(error)
-            response.success, response.message = False, str(error)
-        else:
-            response.success = True
-            response.message = f"new zero of the load [N, N m]: {load.wrench.tolist()}"
-        return response
+            self.on_fault(error)
+            return
+        if tare is not None:
+            self._tare = tare
+            self.stream.use_zero(tare.zero)
+            age_s = time.time() - tare.time_s
+            self.get_logger().info(
+                f"tare of {age_s:.0f} s ago taken up from {self._kept_tare.path}"
+            )
 
     # Parameters and model
+
+    def require_configured(self) -> None:
+        """Refuse what needs a model (raises InputError)."""
+        if self.stream.model is None:
+            reason = f" ({self._fault})" if self._fault else ""
+            raise InputError(f"refused: the node is {self.state}{reason}; configure it first")
 
     def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         values = {**values_of(self, self._entries), **{p.name: p.value for p in changes}}
         try:
             self.apply_values(values)
-        except WristError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+        except Exception as error:
+            reason = str(error) if isinstance(error, WristError) else repr(error)
+            return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
     def _use_parameters(self, changes: list[Parameter]) -> None:
         self.stream.settings = self.apply_values(values_of(self, self._entries))
 
-    def _model_path(self) -> Path:
-        return model_path(self.get_parameter("model_file").value)
+    def _loading(self) -> Loading:
+        path = model_path(self.get_parameter("model_file").value)
+        allowed = self.get_parameter("allow_python_laws").value
+        return Loading(path, self.get_parameter("model_load_limit_s").value, allowed)
 
-    def _use_model(self, model: ErrorModel) -> None:
+    async def _model_change(self) -> Change:
+        self.require_configured()
+        loading = self._loading()
+        # Samples go on being answered with the old model until the new one is complete.
+        await until(lambda: loading.done, loading.limit_s)
+        model = loading.result()
         running = self.stream.model
         if running is not None and running.table.geometry.sha256 != model.table.geometry.sha256:
             raise InputError(
                 f"model {model.name}: geometry {model.table.geometry.name} is not that of the "
                 f"running model {running.name}; restart the node for another wrist"
             )
-        self.stream.model = model
-        self._model_fault = ""
 
-    # Diagnostics
+        def use(model: ErrorModel | None) -> None:
+            self.stream.model = model
 
-    def facts_of_model(self) -> dict[str, str]:
-        """Return which model is in use."""
-        model = self.stream.model
-        if model is None:
-            return {"model": "none"}
-        return {"model": f"{model.name}, table {model.table.checksum[:12]}, {model.evaluation}"}
+        def make() -> Callable[[], None]:
+            before = self.stream.model
+            use(model)
+            return partial(use, before)
 
-    def _report(self) -> None:
-        facts = {
-            **self.facts_of_model(),
-            "loads that came late": str(self.stream.loads.history.late),
-            **self.facts(),
-        }
-        restrictions = filter(
-            None, (self.restriction(), *self.left_out, *self.stream.dropped_signals)
-        )
-        message = DiagnosticArray(
-            status=[self.health.report(facts, self._model_fault, "; ".join(restrictions))]
-        )
+        return Change(model_text(model), make)
+
+    # Status
+
+    def after_service(self) -> None:
+        """Tell at once what a service changed."""
+        self.report()
+
+    def report(self) -> None:
+        """Publish the status."""
+        status = self.health.report(self._facts(), *self._judgement())
+        self._status.publish(status)
+        message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
+    def _facts(self) -> dict[str, str]:
+        newest_ns = self.stream.loads.history.newest_ns
+        age_ns = None if newest_ns is None else self.get_clock().now().nanoseconds - newest_ns
+        tare = self._tare
+        return {
+            "state": self.state,
+            "model": "none" if self.stream.model is None else model_text(self.stream.model),
+            "tared": "no" if tare is None else f"{time.time() - tare.time_s:.0f} s ago",
+            "tare [N, N m]": "" if tare is None else str(tare.zero.load.wrench.round(4).tolist()),
+            "age of the load [s]": "" if age_ns is None else f"{age_ns / NANOSECONDS:.3f}",
+            "loads that came late": str(self.stream.loads.history.late),
+            **self.facts(),
+        }
 
-def loaded(path: Path) -> ErrorModel:
-    """Return a model after a first prediction, which fills what it computes once.
-
-    Raises
-    ------
-    WristError
-        If it cannot be loaded, whatever the reason: a model file may name a law of the user's own,
-        which is code, and no file may end a node.
-    """
-    try:
-        model = load_model(path)
-        model.predict(np.zeros(2), Load(np.zeros(6)))
-    except WristError:
-        raise
-    except Exception as error:
-        raise InputError(f"{path}: {type(error).__name__}: {error}") from error
-    return model
+    def _judgement(self) -> tuple[str, str]:
+        """Return what is missing, an error, and what restricts the work, a warning."""
+        if self.state == UNCONFIGURED:
+            return self._fault or "unconfigured", ""
+        untared = self._tare is None and self.get_parameter("tare_needed").value
+        restrictions = (
+            "" if self.state == ACTIVE else self.state,
+            "not tared" if untared else "",
+            self.restriction(),
+            *self.left_out,
+            *self.stream.dropped_signals,
+        )
+        return "", "; ".join(filter(None, restrictions))
 
 
-def _load(path: Path, loading: Future) -> None:
-    try:
-        loading.set_result(loaded(path))
-    except WristError as error:
-        loading.set_exception(error)
+def model_text(model: ErrorModel) -> str:
+    """Return which model it is, in one line."""
+    return f"{model.name}, table {model.table.checksum[:12]}, {model.evaluation}"

@@ -19,6 +19,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.workflows.node_list import (
+    CELL_PARAMETERS,
     LARGEST_SEED,
     PARENT_PID,
     RATES_HZ,
@@ -37,11 +38,6 @@ PATIENCE_S = 60.0
 
 END_PATIENCE_S = 15.0
 """How long a node may take to end once it is told to."""
-
-CELL_PARAMETERS: dict[str, dict[str, ParameterValue]] = {
-    "angle_corrector": {"load_policy": "follow"}
-}
-"""The virtual cell's loads are weights: they do not depend on the motion, so there is no loop."""
 
 SPOKEN = (
     topics.POSE_ERROR_PREDICTED,
@@ -115,7 +111,7 @@ def run_cell(
     if model is not None:
         load_model(model)
         chosen["model_file"] = str(Path(model).resolve())
-    nodes = [node.having({**chosen, **CELL_PARAMETERS.get(node.name, {})}) for node in WRIST_NODES]
+    nodes = [node.having({**CELL_PARAMETERS, **chosen}) for node in WRIST_NODES]
     if record is not None:
         RecordingWriter(record, keep_partial=True).check_target()
         output = {"output": str(Path(record).resolve()), "begin_with": " ".join(SPOKEN)}

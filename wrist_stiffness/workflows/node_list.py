@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+
+from wrist_stiffness.errors import InputError
 
 RATES_HZ = (1.0, 2000.0)
 """Slowest and fastest samples of the virtual cell."""
@@ -51,11 +54,53 @@ class NodeEntry:
         arguments = [sys.executable, "-m", f"wrist_stiffness.ros.{self.executable}", "--ros-args"]
         arguments += ["-r", f"__node:={self.name}"]
         for parameter, value in self.parameters.items():
-            text = str(value).lower() if isinstance(value, bool) else str(value)
+            text = str(value).lower() if isinstance(value, bool) else str(value) or "''"
             arguments += ["-p", f"{parameter}:={text}"]
         for standard, actual in self.remappings:
             arguments += ["-r", f"{standard}:={actual}"]
         return arguments
+
+
+LAUNCH_ARGUMENTS = {
+    "model_file": ("", "model of all nodes; empty for that of the parameters, or the shipped one"),
+    "params_file": ("", "ROS 2 parameter file for all nodes"),
+    "namespace": ("", "of the nodes and their topics, so that wrists live side by side"),
+    "use_sim_time": ("false", "take the time from /clock"),
+    "respawn": ("false", "start a node again that ended"),
+    "cell": ("false", "start the virtual wrist as well"),
+}
+"""Of the launch file: default and meaning by name."""
+
+CELL_PARAMETERS: dict[str, ParameterValue] = {
+    "load_policy": "follow",
+    "tare_needed": False,
+    "state_folder": "",
+    "command_age_limit_s": 0.0,
+}
+"""The virtual cell's loads are weights: they do not depend on the motion, so there is no loop; and
+they come tared.  Its time is that of its samples, which falls behind on a busy machine."""
+
+
+def truth(name: str, text: str) -> bool:
+    """Return what a launch argument says that is true or false (InputError if neither)."""
+    values = {"true": True, "1": True, "false": False, "0": False}
+    if text.lower() not in values:
+        raise InputError(f"{name}: {text!r} is neither true nor false")
+    return values[text.lower()]
+
+
+def unknown_arguments(given: Iterable[str]) -> list[str]:
+    """Return a warning for each launch argument that the launch file does not know.
+
+    It may be one of a launch file that includes it: so it is no error.
+    """
+    warnings = []
+    for name in given:
+        if name not in LAUNCH_ARGUMENTS:
+            near = get_close_matches(name, LAUNCH_ARGUMENTS, 1)
+            meant = f"; is {near[0]} meant?" if near else ""
+            warnings.append(f"WARNING: wrist.launch.py has no argument {name}{meant}")
+    return warnings
 
 
 WRIST_NODES = tuple(

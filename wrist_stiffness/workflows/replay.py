@@ -254,17 +254,10 @@ def _correct(
         ),
     )
     yield MOTOR_POSITIONS_CORRECTED, Float64MultiArray(data=tuple(corrected.theta.tolist()))
-    if corrected.correction is not None:
-        header = Header(state.header.stamp_ns, BASE_FRAME)
-        yield (
-            POSE_ERROR_RESIDUAL,
-            pose_message(
-                header, corrected.correction.after, corrected.correction.prediction.covariance
-            ),
-        )
-        at_task_point = correcting.residual_at_task_point(corrected.correction)
-        if at_task_point is not None:
-            yield POSE_ERROR_RESIDUAL_TASK, pose_message(header, *at_task_point)
+    header = Header(state.header.stamp_ns, BASE_FRAME)
+    topics = (POSE_ERROR_RESIDUAL, POSE_ERROR_RESIDUAL_TASK)
+    for topic, residual in zip(topics, correcting.residuals(corrected), strict=False):
+        yield topic, pose_message(header, *residual)
 
 
 def _plan(
