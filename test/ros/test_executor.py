@@ -5,7 +5,9 @@ from threading import Event, Thread
 
 import pytest
 import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
@@ -161,6 +163,23 @@ def test_a_service_that_waits_for_a_thread_answers_while_data_go_on(rig):
     release.set()
     beside.spin_until_future_complete(answer, DEADLINE_S)
     assert answer.result().message == "done"
+
+
+def test_a_publisher_of_another_quality_is_warned_of_as_by_rclpy(rig):
+    """The event of the middleware reaches the handler of a data subscription."""
+    warned = []
+    rig.node.create_subscription(
+        Int64,
+        "asked",
+        lambda message: None,
+        10,
+        callback_group=DataGroup(),
+        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=warned.append),
+    )
+    rig.thread.start()
+    offered = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    rig.asker.create_publisher(Int64, "asked", offered)
+    rig.until(lambda: warned)
 
 
 def test_what_a_data_callback_raises_ends_the_spin(rig):

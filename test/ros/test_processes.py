@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 
 from wrist_stiffness.cli import main as command_line
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording
 from wrist_stiffness.ros.conversions import nanoseconds
 from wrist_stiffness.workflows import cell
@@ -59,6 +60,57 @@ def test_an_impatient_user_sees_no_traceback(graph):
             process.kill()
     assert process.returncode in (0, -signal.SIGINT)  # the latter once Python itself is gone
     assert "Traceback" not in errors
+
+
+HANGING_LAW = """
+import time
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.parameters import Parameter
+{at_once}
+class Hanging(Law):
+    id, stage, places, sentence, check, excited_by = "own", "geometry", ("platform",), "x", "x", "x"
+    def parameters(self, place): return (Parameter("x_um", lower=0.0, upper=1.0, scale=1.0),)
+    def advance(self, at, place, values, state):
+        if at.block.theta[0, 0] > 0.3:
+            time.sleep(3600.0)
+        return at.screw(place, [0.0] * 6), state
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", ["pipe", "loading", "predicting"])
+def test_a_node_ends_wherever_it_hangs(graph, model, tmp_path, where):
+    """A callback that never returns never sees that it is told to end."""
+    path, ready = tmp_path / "model.yaml", tmp_path / "ready"
+    if where == "pipe":
+        os.mkfifo(path)
+    else:
+        hang = f"open({str(ready)!r}, 'w').close()\ntime.sleep(3600.0)"
+        text = HANGING_LAW.format(at_once=hang if where == "loading" else "")
+        (tmp_path / "own.py").write_text(text)
+        save_table(model.table, tmp_path / "table.npz")
+        effect = "{effect: python, class: 'own.py:Hanging', component: platform}"
+        path.write_text(f"schema: 1\nname: x\ntable: {{path: table.npz}}\neffects: [{effect}]\n")
+    options = {"model_file": str(path), "allow_python_laws": True, "model_load_limit_s": 3600.0}
+    node = NODES["pose_error_predictor"].having(options | {"state_folder": "", "frames": ""})
+    with subprocess.Popen(node.command(), stderr=subprocess.PIPE, text=True) as process:
+        try:
+            if where == "pipe":
+                status, _ = graph.status(node.name, lambda status, values: True)
+                assert "is no regular file" in status.message
+            elif where == "loading":
+                graph.until(ready.exists, "law")
+            else:
+                graph.status(node.name, lambda status, values: values["state"] == "active")
+                graph.load(10**9)
+                graph.joints("/joint_states", 10**9, (0.4, 0.0))
+                graph.heard["/diagnostics"].clear()
+            process.send_signal(signal.SIGTERM)
+            _, errors = process.communicate(timeout=DEADLINE_S)
+        finally:
+            process.kill()
+    assert process.returncode == (where == "predicting")
+    assert ("in advance" in errors) is (where == "predicting")
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 
@@ -11,6 +13,8 @@ from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.python_laws import python_laws
+
+LOOK_EVERY_S = 0.1
 
 
 class Loading:
@@ -40,9 +44,11 @@ class Loading:
         """Whether the model is there, or why it is not."""
         return not self._thread.is_alive()
 
-    def wait(self) -> None:
-        """Wait until it is done, or for as long as it may take."""
-        self._thread.join(self.limit_s)
+    def wait(self, go_on: Callable[[], bool]) -> None:
+        """Wait until it is done, or for as long as it may take and the node is to go on."""
+        end = time.monotonic() + self.limit_s
+        while not self.done and go_on() and time.monotonic() < end:
+            self._thread.join(LOOK_EVERY_S)
 
     def result(self) -> ErrorModel:
         """Return the model.

@@ -152,7 +152,7 @@ class WristNode(GuardedNode, ABC):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load the model; without one the node stays unconfigured and says why."""
         loading = self._loading()
-        loading.wait()
+        loading.wait(self.context.ok)
         try:
             self.stream.model = loading.result()
         except WristError as error:
