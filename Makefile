@@ -13,12 +13,13 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 ROS_DOMAIN_ID ?= $(shell echo $$(( $$$$ % 90 + 1 )))
 export ROS_DOMAIN_ID
 
-.PHONY: help demo test lint tables clean
+.PHONY: help demo test lint bench tables clean
 
 help:
 	@echo "make demo    start the nodes with a virtual cell, record, replay, compare; see demo/"
 	@echo "make test    run all tests"
 	@echo "make lint    ruff and mypy"
+	@echo "make bench   measure speed, some twenty minutes; see bench-results/speed.md"
 	@echo "make tables  compute the shipped tables again from their geometry"
 	@echo "make clean   remove what make made, the virtual environment included"
 	@echo "Each sets itself up in VENV=$(VENV) with PYTHON=$(PYTHON) (3.11 or 3.12)."
@@ -34,6 +35,9 @@ lint: $(READY)
 	$(RUN) ruff check .
 	$(RUN) ruff format --check .
 	$(RUN) mypy
+
+bench: $(READY)
+	$(VENV)/bin/python bench/page.py $(BENCH_ARGS)
 
 tables: $(READY)
 	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015.npz

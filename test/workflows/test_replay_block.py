@@ -26,7 +26,7 @@ from wrist_stiffness.ros.stream_messages import (
     angles_payload,
     error_payload,
     joint_payload,
-    number_payload,
+    vector_payload,
 )
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows.parameter_file import node_settings
@@ -109,9 +109,9 @@ def wanted(settings):
             found = predicting.on_joint_state(stamp_ns, MOTORS, angles).prediction
             payload = error_payload(stamp_ns, found.twist, found.covariance)
             sent["/pose_error_predicted"].append(payload)
-            sent["/pose_error/s_um"].append(number_payload(1e6 * found.shift_norm))
-            degrees = 1e3 * float(np.degrees(1.0))
-            sent["/pose_error/phi_mdeg"].append(number_payload(found.phi * degrees))
+            s_um, mdeg = 1e6 * found.twist[:3], 1e3 * float(np.degrees(1.0)) * found.twist[3:]
+            sent["/pose_error/s_um"].append(vector_payload(stamp_ns, s_um))
+            sent["/pose_error/phi_mdeg"].append(vector_payload(stamp_ns, mdeg))
         except WristError:
             refused += 1
         names, first = ("other", *MOTORS), np.nan if i == EMPTY else 0.5
@@ -126,10 +126,8 @@ def wanted(settings):
         sent["/motor_commands_corrected"].append(joint_payload(sample))
         sent["/motor_positions_corrected"].append(angles_payload(command.theta))
         refused += command.fault is not None
-        if command.correction is not None:
-            covariance = command.correction.prediction.covariance
-            payload = error_payload(stamp_ns, command.correction.after, covariance)
-            sent["/pose_error_residual"].append(payload)
+        residuals = correcting.residuals(command)
+        sent["/pose_error_residual"] += [error_payload(stamp_ns, *each) for each in residuals]
     return sent, refused
 
 

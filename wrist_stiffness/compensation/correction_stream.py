@@ -117,6 +117,8 @@ class CorrectedBlock:
         Why a command has none.
     platform : (n, 3, 3) float
         U -> F of the rigid platform at the corrected angles.
+    valid : (n,) bool
+        As `CorrectedCommand.valid`.
     """
 
     theta: Array
@@ -125,6 +127,7 @@ class CorrectedBlock:
     covariance: Array
     faults: dict[int, WristError]
     platform: Array
+    valid: Flags
 
 
 class CorrectionStream(Stream):
@@ -305,11 +308,6 @@ class CorrectionStream(Stream):
         inside = (limits.joint_lower - step <= theta) & (theta <= limits.joint_upper + step)
         return bool(inside.all())
 
-    def task_points(self, platform: Array) -> Array | None:
-        """Return the tool point in F (n, 3) [m] at platform rotations (n, 3, 3); None at O."""
-        tool_point = self.running_model().model.table.geometry.platform.tool_point
-        return np.array([each @ tool_point for each in platform]) if tool_point.any() else None
-
     def on_commands(self, stamps: NDArray[np.int64], theta: Array) -> CorrectedBlock:
         """Correct many commands, to the bit as `on_command` would one by one.
 
@@ -339,6 +337,7 @@ class CorrectionStream(Stream):
         commands = CompiledCommands(stamps, theta, wrench, on_platform, known.copy())
         block = Correcting(self._corrector, running, compiled, settings, commands)
         angles, platforms, begin = theta.tolist(), at.platform, 0
+        valid = np.zeros(n, dtype=bool)
         for i, stamp_ns in enumerate(stamps.tolist()):
             try:
                 found = measured[i]
@@ -365,6 +364,7 @@ class CorrectionStream(Stream):
                 block.correct(begin, i)
                 block.correct(i, i + 1, supervisor.share)
                 begin = i + 1
+            valid[i] = supervisor.valid
         block.correct(begin, n)
         corrected = commands.wanted.copy()
         corrected[list(block.faults)] = False
@@ -379,6 +379,7 @@ class CorrectionStream(Stream):
             covariance,
             block.faults,
             there.platform,
+            valid,
         )
 
     def on_trajectory(
@@ -494,12 +495,41 @@ class CorrectionStream(Stream):
         if command.correction is None:
             return []
         twist, prediction = command.correction.after, command.correction.prediction
-        doubt = 0.0 if command.valid else NOT_MEASURED * np.eye(6)
-        found = [(twist, prediction.covariance + doubt)]
+        platform = prediction.configuration.platform
+        return self._left(twist, prediction.covariance, platform, command.valid)
+
+    def block_residuals(self, block: CorrectedBlock) -> list[tuple[Array, Array]]:
+        """Return the same of the commands of a block that have a correction, k of them.
+
+        Returns
+        -------
+        list of ((k, 6) float, (k, 6, 6) float)
+            As `residuals`.
+        """
+        own = np.flatnonzero(block.corrected)
+        rows = block.after[own], block.covariance[own], block.platform[own], block.valid[own]
+        if not self.running_model().model.table.geometry.platform.tool_point.any():
+            doubt = np.where(rows[3], 0.0, NOT_MEASURED)[:, None, None] * np.eye(6)
+            return [(rows[0], rows[1] + doubt)]
+        # One by one: a stack of products may round otherwise.
+        each = [self._left(*row) for row in zip(*rows, strict=True)]
+        return [
+            (
+                np.array([residuals[place][0] for residuals in each]).reshape(-1, 6),
+                np.array([residuals[place][1] for residuals in each]).reshape(-1, 6, 6),
+            )
+            for place in range(2)
+        ]
+
+    def _left(
+        self, twist: Array, covariance: Array, platform: Array, valid: bool
+    ) -> list[tuple[Array, Array]]:
+        doubt = (0.0 if valid else NOT_MEASURED) * np.eye(6)
+        found = [(twist, covariance + doubt)]
         tool_point = self.running_model().model.table.geometry.platform.tool_point
         if tool_point.any():
-            there = seen_from(prediction.configuration.platform @ tool_point)
-            found.append((there @ twist, there @ prediction.covariance @ there.T + doubt))
+            there = seen_from(platform @ tool_point)
+            found.append((there @ twist, there @ covariance @ there.T + doubt))
         return found
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:

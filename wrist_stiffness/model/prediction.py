@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -83,18 +82,12 @@ class Prediction:
     @property
     def shift_norm(self) -> float:
         """Length of s [m]."""
-        return _length(self.motion[1])
+        return float(np.linalg.norm(self.motion[1]))
 
     @property
     def phi(self) -> float:
         """Angle of R_err [rad]."""
-        return _length(self.twist[3:])
-
-
-def _length(vector: Array) -> float:
-    # In the same order of sums as a block of them.
-    x, y, z = vector.tolist()
-    return sqrt(x * x + y * y + z * z)
+        return float(np.linalg.norm(self.twist[3:]))
 
 
 @dataclass(frozen=True)

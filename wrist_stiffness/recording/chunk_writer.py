@@ -281,7 +281,7 @@ class ChunkWriter:
             )
         )
         length, index_place, offsets = self._place - place, self._place, {}
-        for number in np.unique(channels).tolist():
+        for number in np.flatnonzero(np.bincount(channels)).tolist():
             own = channels == number
             entries = np.stack([times[own], begins[own]], axis=1).astype("<u8").tobytes()
             self.counts[number] += int(own.sum())

@@ -67,7 +67,7 @@ class RawBlock:
         """Return which messages each topic has."""
         names = [channel.topic for channel in self.channels]
         found: dict[str, list[Integers]] = {}
-        for place in np.unique(self.channel).tolist():
+        for place in np.flatnonzero(np.bincount(self.channel)).tolist():
             found.setdefault(names[place], []).append(np.flatnonzero(self.channel == place))
         return {name: np.sort(np.concatenate(rows)) for name, rows in found.items()}
 

@@ -32,6 +32,8 @@ from wrist_stiffness.recording.messages import (
     Quaternion,
     Temperature,
     TFMessage,
+    Vector3,
+    Vector3Stamped,
     WrenchStamped,
 )
 from wrist_stiffness.recording.raw_block import RawMessage
@@ -227,13 +229,15 @@ def _predict(
     prediction = sample.prediction
     summary.predictions += 1
     summary.warnings.update((*prediction.warnings, *predicting.dropped_signals))
-    s_um, phi_mdeg = prediction.shift_norm * MICROMETRES, prediction.phi * MILLIDEGREES
-    summary.shift_um.add(np.array([s_um]))
-    summary.phi_mdeg.add(np.array([phi_mdeg]))
+    summary.shift_um.add(np.array([prediction.shift_norm * MICROMETRES]))
+    summary.phi_mdeg.add(np.array([prediction.phi * MILLIDEGREES]))
     header = Header(state.header.stamp_ns, BASE_FRAME)
     yield POSE_ERROR_PREDICTED, pose_message(header, prediction.twist, prediction.covariance)
-    yield POSE_ERROR_S_UM, Float64(s_um)
-    yield POSE_ERROR_PHI_MDEG, Float64(phi_mdeg)
+    for topic, vector in (
+        (POSE_ERROR_S_UM, MICROMETRES * prediction.twist[:3]),
+        (POSE_ERROR_PHI_MDEG, MILLIDEGREES * prediction.twist[3:]),
+    ):
+        yield topic, Vector3Stamped(header, Vector3(*vector.tolist()))
 
 
 def _correct(

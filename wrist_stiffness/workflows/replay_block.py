@@ -14,21 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.pose import pose_of_twist, seen_from
+from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.recording.batch import Batch, decode_batches
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.chunk_writer import Messages
 from wrist_stiffness.recording.fixed_layout import FixedLayout
 from wrist_stiffness.recording.messages import (
-    Float64,
     Float64MultiArray,
     Header,
     JointState,
     Message,
     PoseWithCovarianceStamped,
+    Vector3Stamped,
 )
 from wrist_stiffness.recording.raw_block import Integers, RawBlock
 from wrist_stiffness.recording.writer import RecordingWriter
@@ -58,7 +59,7 @@ ROOM = 8
 
 POSE_ERROR = FixedLayout.of(PoseWithCovarianceStamped(Header(frame_id=BASE_FRAME)))
 TWO_NUMBERS = FixedLayout.of(Float64MultiArray(data=(0.0, 0.0)))
-NUMBER = FixedLayout.of(Float64())
+VECTOR = FixedLayout.of(Vector3Stamped(Header(frame_id=BASE_FRAME)))
 
 
 @dataclass
@@ -201,15 +202,17 @@ class BlockReplay:
         known = np.flatnonzero(predicted.known)
         summary.predictions += len(known)
         twist = predicted.twist[known]
-        shift = pose_of_twist(twist)[0]
-        s_um, phi_mdeg = _lengths(shift) * MICROMETRES, _lengths(twist[:, 3:]) * MILLIDEGREES
-        summary.shift_um.add(s_um)
-        summary.phi_mdeg.add(phi_mdeg)
+        summary.shift_um.add(_lengths(pose_of_twist(twist)[0]) * MICROMETRES)
+        summary.phi_mdeg.add(_lengths(twist[:, 3:]) * MILLIDEGREES)
         answers = joints.rows[known], joints.time_ns[known]
         rows = _pose_rows(joints.stamps[known], twist, predicted.covariance[known])
         self._add(out, POSE_ERROR_PREDICTED, PoseWithCovarianceStamped, 1, *answers, rows)
-        self._add(out, POSE_ERROR_S_UM, Float64, 2, *answers, NUMBER.rows(s_um))
-        self._add(out, POSE_ERROR_PHI_MDEG, Float64, 3, *answers, NUMBER.rows(phi_mdeg))
+        for rank, topic, vectors in (
+            (2, POSE_ERROR_S_UM, MICROMETRES * twist[:, :3]),
+            (3, POSE_ERROR_PHI_MDEG, MILLIDEGREES * twist[:, 3:]),
+        ):
+            rows = VECTOR.rows(joints.stamps[known], *vectors.T)
+            self._add(out, topic, Vector3Stamped, rank, *answers, rows)
 
     def _correct(self, joints: _Joints, out: Messages) -> None:
         summary, correcting = self._summary, self._correcting
@@ -238,18 +241,11 @@ class BlockReplay:
         self._add(out, MOTOR_POSITIONS_CORRECTED, Float64MultiArray, 2, *answers, rows)
         own = np.flatnonzero(block.corrected)
         answers = joints.rows[own], joints.time_ns[own]
-        after, covariance = block.after[own], block.covariance[own]
-        rows = _pose_rows(joints.stamps[own], after, covariance)
-        kind = PoseWithCovarianceStamped
-        self._add(out, POSE_ERROR_RESIDUAL, kind, 3, *answers, rows)
-        points = correcting.task_points(block.platform[own])
-        if points is not None:
-            there = np.array([seen_from(point) for point in points]).reshape(-1, 6, 6)
-            # One by one, as a node does: a stack of products may round otherwise.
-            after = np.array([m @ twist for m, twist in zip(there, after, strict=True)])
-            turned = [m @ own @ m.T for m, own in zip(there, covariance, strict=True)]
-            rows = _pose_rows(joints.stamps[own], after.reshape(-1, 6), np.array(turned))
-            self._add(out, POSE_ERROR_RESIDUAL_TASK, kind, 4, *answers, rows)
+        topics = (POSE_ERROR_RESIDUAL, POSE_ERROR_RESIDUAL_TASK)
+        residuals = correcting.block_residuals(block)
+        for rank, (topic, residual) in enumerate(zip(topics, residuals, strict=False), start=3):
+            rows = _pose_rows(joints.stamps[own], *residual)
+            self._add(out, topic, PoseWithCovarianceStamped, rank, *answers, rows)
 
     def _add(
         self,
@@ -270,9 +266,8 @@ class BlockReplay:
 
 
 def _lengths(vectors: Array) -> Array:
-    """Return the lengths of vectors (n, 3), summed in the order of `Prediction.shift_norm`."""
-    x, y, z = vectors.T
-    return np.asarray(np.sqrt(x * x + y * y + z * z))
+    """Return the lengths of vectors (n, 3)."""
+    return np.asarray(np.sqrt(dot(vectors, vectors)))
 
 
 def _pose_rows(stamps: Integers, twist: Array, covariance: Array) -> NDArray[np.uint8]:
