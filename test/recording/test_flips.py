@@ -67,7 +67,8 @@ def read(path):
     topics = recording.topics
     rows = recording.payloads([info.name for info in topics])
     columns = [(name, times.tolist(), [bytes(row) for row in part]) for name, times, part in rows]
-    return (topics, raw, columns), recording.damage
+    blocks = [message for block in recording.blocks() for message in block.messages()]
+    return (topics, raw, columns, blocks), recording.damage
 
 
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)

@@ -98,7 +98,10 @@ class McapIndex:
 
     def disagreement(self, contents: Contents, position: int) -> str:
         """Return how the content of a chunk differs from what the file says of it, or nothing."""
-        place, stated = self.chunks[position].place, self.chunk_spans[position]
+        chunk, stated = self.chunks[position], self.chunk_spans[position]
+        place = chunk.place
+        if (last_ns := max((s.last_ns for s in contents.spans.values()), default=0)) > chunk.end_ns:
+            return f"{place} is stated to end at {chunk.end_ns} ns, it ends at {last_ns} ns"
         if stated != contents.spans:
             return f"{place} lists {self.told(stated)}; it holds {self.told(contents.spans)}"
         if orphans := contents.spans.keys() - self.channels.keys():
