@@ -1,11 +1,15 @@
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from wrist_stiffness.model.error_model import Load
-from wrist_stiffness.ros.markers import wrist_markers
+from wrist_stiffness.ros.markers import body_transforms, wrist_markers
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
+from wrist_stiffness.ros.qos import STATE_QOS
 
 SECOND = 1_000_000_000
 DOWN = Load(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
@@ -70,3 +74,19 @@ def test_the_predictor_draws_at_its_rate(graph, model_path):
     marker = graph.heard["/wrist_markers"][0].markers[0]
     assert marker.header.frame_id == "wrist_base"
     assert marker.action == Marker.ADD
+
+
+def test_transforms_and_description_name_the_same_bodies(graph, model, model_path):
+    """A viewer draws each link of the URDF where its transform says."""
+    heard = []
+    graph.probe.create_subscription(String, "/robot_description", heard.append, STATE_QOS)
+    graph.add(PoseErrorPredictor, model_file=str(model_path))
+    graph.until(lambda: heard, "description")
+    links = {link.get("name") for link in ElementTree.fromstring(heard[0].data).iter("link")}
+    configuration = model.predict(np.array([0.2, -0.4]), Load(np.zeros(6))).configuration
+    transforms = body_transforms(7, configuration)
+    assert {each.child_frame_id for each in transforms} | {"wrist_base"} == links
+    (platform,) = (each for each in transforms if each.child_frame_id == "wrist_platform")
+    turn = platform.transform.rotation
+    found = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+    assert found == pytest.approx(configuration.platform, abs=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import radians
@@ -20,6 +21,8 @@ from wrist_stiffness.compensation.supervisor import SupervisorSettings
 from wrist_stiffness.errors import InputError
 
 ParameterValue = bool | int | float | str
+
+COVARIATE = re.compile("[A-Za-z][A-Za-z0-9_]*")
 
 
 @dataclass(frozen=True)
@@ -321,6 +324,12 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     """
     if values["motor_1_joint"] == values["motor_2_joint"]:
         raise InputError(f"motor_1_joint, motor_2_joint: both are {values['motor_1_joint']!r}")
+    for name in values["covariates"].split():
+        if not COVARIATE.fullmatch(name):
+            raise InputError(
+                f"covariates: {name!r} cannot be the name of a topic: a letter, then letters, "
+                "digits and _"
+            )
     return StreamSettings(
         motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
         frames=frames_from_yaml(values["frames"]),

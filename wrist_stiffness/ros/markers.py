@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from geometry_msgs.msg import Point, Vector3
+from geometry_msgs.msg import Point, TransformStamped, Vector3
 from scipy.spatial.transform import Rotation, Slerp
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import LINKS, Array
-from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.mechanism.urdf import FRAMES
 from wrist_stiffness.mechanism.vectors import triad
 from wrist_stiffness.model.error_model import Prediction
 from wrist_stiffness.ros.conversions import pose_message, time_message
@@ -62,6 +63,24 @@ def wrist_markers(
         marker.header.frame_id = BASE_FRAME
         marker.header.stamp = time_message(stamp_ns)
     return MarkerArray(markers=markers)
+
+
+def body_transforms(stamp_ns: int, configuration: Configuration) -> list[TransformStamped]:
+    """Return where the rigid wrist's bodies are in `wrist_base`, by the names of its URDF.
+
+    The platform's frame is the nominal one: the error is `/pose_error_predicted`, in `wrist_base`.
+    """
+    found = []
+    for body, rotation in zip(BODIES, configuration.bodies, strict=True):
+        if FRAMES[body] == BASE_FRAME:
+            continue
+        message = TransformStamped(child_frame_id=FRAMES[body])
+        message.header.frame_id = BASE_FRAME
+        message.header.stamp = time_message(stamp_ns)
+        quaternion = Rotation.from_matrix(rotation).as_quat(canonical=True)
+        message.transform.rotation = pose_message(np.zeros(3), quaternion).orientation
+        found.append(message)
+    return found
 
 
 def _link(geometry: Geometry, configuration: Configuration, link: str) -> Marker:

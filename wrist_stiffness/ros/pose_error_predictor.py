@@ -10,6 +10,7 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped, Vector3Stamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
@@ -17,10 +18,12 @@ from wrist_stiffness.compensation.parameters import PREDICTION, prediction_setti
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
+from wrist_stiffness.mechanism.urdf import urdf
 from wrist_stiffness.model.error_model import Prediction
+from wrist_stiffness.ros import static_transforms
 from wrist_stiffness.ros.load_wait import LoadWait
-from wrist_stiffness.ros.markers import wrist_markers
-from wrist_stiffness.ros.qos import SENSOR_QOS
+from wrist_stiffness.ros.markers import body_transforms, wrist_markers
+from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
@@ -34,6 +37,8 @@ from wrist_stiffness.topics import (
     POSE_ERROR_PHI_MDEG,
     POSE_ERROR_PREDICTED,
     POSE_ERROR_S_UM,
+    ROBOT_DESCRIPTION,
+    TF,
     WRIST_MARKERS,
 )
 
@@ -56,6 +61,10 @@ class PoseErrorPredictor(WristNode):
         self._s_um = self.say(Vector3Stamped, POSE_ERROR_S_UM)
         self._phi_mdeg = self.say(Vector3Stamped, POSE_ERROR_PHI_MDEG)
         self._markers = self.say(MarkerArray, WRIST_MARKERS)
+        self._description = self.say(String, ROBOT_DESCRIPTION, STATE_QOS)
+        self._transforms_type = static_transforms.message_type()
+        if self._transforms_type is not None:
+            self._transforms = self.say(self._transforms_type, TF)
         wait_s = self.get_parameter("load_wait_s").value
         self.waiting = LoadWait(wait_s, time.monotonic_ns)
         if wait_s > 0.0:
@@ -74,6 +83,16 @@ class PoseErrorPredictor(WristNode):
         """Listen to the motors."""
         joints = joint_reader()
         self.hear(JointState, JOINT_STATES, self._on_joint_state, SENSOR_QOS, read=joints)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Load the model, and tell viewers what its wrist looks like."""
+        configured = super().on_configure(state)
+        if self.stream.model is not None:
+            motors = self.stream.settings.motors
+            geometry = self.stream.model.table.geometry
+            description = urdf(geometry, (motors.motor_1, motors.motor_2))
+            self._description.publish(String(data=description))
+        return configured
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Drop the joint states that wait."""
@@ -112,9 +131,12 @@ class PoseErrorPredictor(WristNode):
         since_s = (stamp_ns - self._drawn_ns) / NANOSECONDS
         if rate_hz == 0.0 or 0.0 <= since_s < 1.0 / rate_hz:
             return
+        self._drawn_ns = stamp_ns
+        if self._transforms_type is not None:
+            poses = body_transforms(stamp_ns, prediction.configuration)
+            self._transforms.publish(self._transforms_type(transforms=poses))
         if not self._markers.get_subscription_count():
             return
-        self._drawn_ns = stamp_ns
         exaggeration = self.get_parameter("marker_exaggeration").value
         table = self.stream.running_model().model.table
         self._markers.publish(wrist_markers(stamp_ns, table, prediction, exaggeration))
