@@ -45,6 +45,7 @@ def test_what_pyyaml_writes_is_read_as_it_was(value):
         ("a: 1\n---\nb: 1", "line 2: a second document is not read"),
         ("a: 1\nb:\n  a: 1\n  a: 2", "line 4: key 'a' is given twice"),
         ("a: \x00", "not a YAML file: unacceptable character"),
+        ("a: \ud800", "not a YAML file: 'utf-8' codec can't encode"),
     ],
 )
 def test_yaml_that_only_a_program_needs_is_refused_with_its_line(text, why):

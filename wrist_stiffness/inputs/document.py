@@ -122,7 +122,7 @@ def yaml_node(text: str, file: str, error: type[WristError]) -> Node:
     """Read a YAML text; as `read_yaml`, `file` is what error messages call it."""
     try:
         return _Builder(file, error).build(yaml.parse(text, Loader=_Loader))
-    except yaml.YAMLError as cause:
+    except (yaml.YAMLError, UnicodeError) as cause:
         raise error(f"{file}: not a YAML file: {' '.join(str(cause).split())}") from cause
 
 
