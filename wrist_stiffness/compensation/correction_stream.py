@@ -14,14 +14,14 @@ from wrist_stiffness.compensation.corrector import Correcting, Corrector, faded,
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
 from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
-from wrist_stiffness.compensation.payload import Payload, Thresholds
+from wrist_stiffness.compensation.payload import Held, Payload, Thresholds
 from wrist_stiffness.compensation.perishable import require_within_limits
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import within_joint_limits
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream, as_rows
-from wrist_stiffness.compensation.supervisor import Held, Supervision, Supervisor
+from wrist_stiffness.compensation.supervisor import Supervision, Supervisor
 from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point, neighbours
 from wrist_stiffness.errors import (
     InputError,

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.vectors import triad
 from wrist_stiffness.model.error_model import Load
@@ -213,7 +214,7 @@ class Scales:
     def __init__(self, geometry: Geometry) -> None:
         self.geometry = geometry
         self._g = float(np.linalg.norm(geometry.gravity))
-        down = geometry.gravity / self._g
+        down = geometry.gravity / self._g if self._g else np.array([0.0, 0.0, -1.0])
         frame = triad(down, np.eye(3)[np.argmin(np.abs(down))])
         self._axes: list[list[float]] = [*frame[:, 1:].T.tolist(), down.tolist()]
 
@@ -221,6 +222,9 @@ class Scales:
         """Return a load (6,) at O in F [N, N m] on the platform that is turned by (3, 3)."""
         force_u, force_v, weight = self.along(wrench[:3])
         side = hypot(force_u, force_v)
+        if not self._g:
+            # Nothing weighs: whatever acts is a contact.
+            side, weight = hypot(side, weight), 0.0
         return Reading(side, weight, self.along(wrench[3:]), self.rows(rotation))
 
     def rows(self, rotation: list[list[float]]) -> tuple[Row, Row]:
@@ -268,3 +272,34 @@ class Scales:
         """Return an estimate as a payload."""
         x, y, z = (moment / estimate.weight for moment in estimate.moments)
         return Payload(estimate.weight / self._g, (x, y, z))
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a plan is corrected for, from `Supervisor.held`.
+
+    Parameters
+    ----------
+    scales, payload : Scales, PayloadEstimate or None
+        None where there is no payload.
+    followed : Load or None
+        Where every load is followed.
+    share : float
+        Part of the correction that is applied [-].
+    valid : bool
+        Whether the load was known and corrected for in full, as `Supervision.valid`.
+    """
+
+    scales: Scales | None
+    payload: PayloadEstimate | None
+    followed: Load | None
+    share: float
+    valid: bool
+
+    def load(self, rotation: Array) -> Load:
+        """Return the load on the platform that is turned by (3, 3), U -> F."""
+        if self.followed is not None:
+            return self.followed
+        if self.scales is None or self.payload is None:
+            return Load(np.zeros(6))
+        return self.scales.load(self.payload, self.scales.rows(rotation.tolist()), 1.0)

@@ -5,10 +5,11 @@ compliance + 1/K_env).  So no measured load is followed.  What is corrected for 
 weight at a fixed point of the platform (`payload.py`), recognised or told, and nothing else:
 it does not change with the motion, so there is no loop.
 
-    unsure      no load yet, or a weight that is still being judged: corrected for no load
+    unsure      no load yet, or a weight that is still being judged: the correction fades out
     free        no load: corrected for the wrist itself
     holding     the load is that of the payload: corrected for it
-    in contact  a force or couple besides, that is no weight: corrected for the payload alone
+    in contact  a force or couple besides, that is no weight: corrected for the payload alone;
+                where that is not known any more the correction fades out
     released    the payload's load is gone: corrected for no load
 
 A weight that stays the same for `SETTLE_S` becomes the payload, and its correction comes in over
@@ -35,6 +36,7 @@ import numpy as np
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.payload import (
+    Held,
     Payload,
     PayloadEstimate,
     Reading,
@@ -53,7 +55,7 @@ SETTLE_S = 0.5
 """... and what allows more correction after this: no part swings or is being lifted then [s]."""
 
 RAMP_S = 1.0
-"""A correction that is allowed again comes in over this time [s]."""
+"""A correction comes in over this time, and goes where nobody knows what is carried [s]."""
 
 LATE_S = 0.2
 """So late a load may be, and the motors behind their command: as much as the platform turns in this
@@ -77,7 +79,7 @@ NO_LOAD = "no load is known"
 NO_WEIGHT = "the load is no weight: a contact, or the sensor is not tared"
 CHANGES = "the load changes with the correction: a contact"
 NEW_WEIGHT = "a weight that was not there before is being judged"
-COMING_IN = "the correction for the payload is coming in"
+COMING_IN = "the correction is coming in"
 YIELDED = "the correction yielded to a contact, and comes back when the command leaves this place"
 
 
@@ -145,37 +147,6 @@ class Supervision:
     since_ns: int
 
 
-@dataclass(frozen=True)
-class Held:
-    """What a plan is corrected for, from `Supervisor.held`.
-
-    Parameters
-    ----------
-    scales, payload : Scales, PayloadEstimate or None
-        None where there is no payload.
-    followed : Load or None
-        Where every load is followed.
-    share : float
-        Part of the correction that is applied [-].
-    valid : bool
-        As `Supervision.valid`.
-    """
-
-    scales: Scales | None
-    payload: PayloadEstimate | None
-    followed: Load | None
-    share: float
-    valid: bool
-
-    def load(self, rotation: Array) -> Load:
-        """Return the load on the platform that is turned by (3, 3), U -> F."""
-        if self.followed is not None:
-            return self.followed
-        if self.scales is None or self.payload is None:
-            return Load(np.zeros(6))
-        return self.scales.load(self.payload, self.scales.rows(rotation.tolist()), 1.0)
-
-
 class Supervisor:
     """The state machine of one corrector.
 
@@ -201,6 +172,7 @@ class Supervisor:
         self._payload: PayloadEstimate | None = None
         self._candidate: PayloadEstimate | None = None
         self._weight = self._share = 1.0
+        self._sure = False
         self._touched: list[float] | None = None
         self._behind: list[float] | None = None
         self._against: Row | None = None
@@ -234,13 +206,12 @@ class Supervisor:
     @property
     def supervision(self) -> Supervision:
         """What is believed at present."""
-        payload = None
+        payload, text = None, self._text
         if self._payload is not None and self._scales is not None:
             payload = self._scales.payload(self._payload)
-        known = self._state not in (State.UNSURE, State.IN_CONTACT)
-        text = self._text
-        if known:
-            text = YIELDED if self._share < 1.0 else COMING_IN if self._weight < 1.0 else ""
+        if self._known:
+            coming = self._weight < 1.0 or self._share < 1.0
+            text = YIELDED if self._touched else COMING_IN if coming else ""
         return Supervision(
             self._state,
             text,
@@ -260,8 +231,11 @@ class Supervisor:
     @property
     def valid(self) -> bool:
         """Whether the load is known and corrected for in full."""
-        known = self._state is not State.UNSURE and self._state is not State.IN_CONTACT
-        return known and self._share == 1.0 and self._weight == 1.0
+        return self._known and self._share == 1.0 and self._weight == 1.0
+
+    @property
+    def _known(self) -> bool:
+        return self._state is not State.UNSURE and self._state is not State.IN_CONTACT
 
     def judge(
         self,
@@ -302,7 +276,7 @@ class Supervisor:
         self._step_s = min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)
         self._followed = measured if settings.follow else None
         if self._followed is not None:
-            self._state, self._against = State.FREE, None
+            self._state, self._against, self._sure = State.FREE, None, True
             return self._followed
         scales = self._scales
         if scales is None or scales.geometry is not geometry:
@@ -339,7 +313,9 @@ class Supervisor:
         return self._against is None and self._share == 1.0
 
     def share(self, turn: Array) -> float:
-        """Return the part of a correction to apply, less where a contact works against it.
+        """Return the part of a correction to apply.
+
+        Less where a contact works against it, and where it is not known what the platform carries.
 
         Parameters
         ----------
@@ -349,6 +325,8 @@ class Supervisor:
         if self._against is not None and self._scales is not None:
             if sum(map(mul, self._against, self._scales.along(turn.tolist()))) < 0.0:
                 self._share = max(0.0, self._share - self._step_s / YIELD_S)
+        elif not self._sure:
+            self._share = max(0.0, self._share - self._step_s / RAMP_S)
         elif self._touched is None:
             self._share = min(1.0, self._share + self._step_s / RAMP_S)
         return self._share
@@ -390,6 +368,8 @@ class Supervisor:
             self._payload, self._weight = None, 1.0
         if state is State.RELEASED:
             self._expected = None
+        if state is not State.IN_CONTACT:
+            self._sure = state is not State.UNSURE
         self._candidate = None
         self._state, self._since_ns = state, self._stamp_ns
         self._text = TEXTS.get(state, "")
@@ -403,6 +383,7 @@ class Supervisor:
                 self._payload, self._weight, self._text = None, 1.0, CHANGES
             elif not self._stands(self._payload, reading, limit):
                 self._payload = None
+            self._sure = self._payload is not None
 
     @staticmethod
     def _stands(payload: PayloadEstimate, reading: Reading, limit: Thresholds) -> bool:
