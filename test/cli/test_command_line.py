@@ -270,7 +270,8 @@ def test_an_existing_recording_is_named_before_the_work(secret, refused, tmp_pat
 
 @pytest.mark.parametrize("secret", [["--reveal", "7"], ["--effect", "backlash@motor_1"]])
 def test_the_search_for_a_size_says_that_it_is_at_work(secret, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("wrist_stiffness.cli.progress.SHOWN_AFTER_S", 0.0)
+    for name in ("SHOWN_AFTER_S", "LINE_EVERY_S"):
+        monkeypatch.setattr(f"wrist_stiffness.cli.progress.{name}", 0.0)
     monkeypatch.chdir(tmp_path)
     output = ["-o", "a.mcap"] if "--effect" in secret else []
     assert main(["simulate", "--seconds", "3", *output, *secret]) == 0

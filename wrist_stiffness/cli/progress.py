@@ -20,7 +20,8 @@ def _bar(stream: TextIO | None, **options: Any) -> Any:
         stream = stream or sys.stderr
         if not stream.isatty():
             options |= {"file": _Lines(stream), "mininterval": LINE_EVERY_S, "ncols": 80}
-        return tqdm(**{"file": stream, "miniters": 1, "ascii": True, **options})
+        shared = {"file": stream, "delay": SHOWN_AFTER_S, "miniters": 1, "ascii": True}
+        return tqdm(**(shared | options))
     return None
 
 
@@ -40,10 +41,8 @@ class _Lines:
 class Progress:
     """Shows how far a computation with a known end is: called with steps done and all steps."""
 
-    def __init__(
-        self, label: str, stream: TextIO | None = None, delay_s: float = SHOWN_AFTER_S
-    ) -> None:
-        self._bar = _bar(stream, desc=label, delay=delay_s)
+    def __init__(self, label: str, stream: TextIO | None = None) -> None:
+        self._bar = _bar(stream, desc=label)
 
     def __call__(self, done: int, total: int) -> None:
         """Take notice that `done` of `total` steps are behind us."""
@@ -57,9 +56,8 @@ class Progress:
 class Status:
     """Context manager that shows what is being done; its line is wiped at the end."""
 
-    def __init__(self, stream: TextIO | None = None, delay_s: float = SHOWN_AFTER_S) -> None:
-        form = "{elapsed}  {desc}"
-        self._bar = _bar(stream, delay=delay_s, bar_format=form, leave=False)
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._bar = _bar(stream, bar_format="{elapsed}  {desc}", leave=False)
 
     def __call__(self, text: str) -> None:
         """Take notice of what begins now."""
