@@ -16,6 +16,8 @@ from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 
 FIELDS = ("theta", "b", "c", "d", "singularity", "dual", "bodies")
@@ -162,3 +164,18 @@ def test_arrays_that_are_too_small_are_refused(shipped, size):
         native.forward(
             np.zeros(size), np.zeros(2), np.zeros(native.CONFIGURATION), np.zeros(1, np.uint8)
         )
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int64, bool])
+def test_arrays_of_another_type_are_refused(kind):
+    """Nor any type: integers are not read as if they were floats."""
+    row, status = np.zeros(native.CONFIGURATION), np.zeros(1, np.uint8)
+    with pytest.raises(TypeError, match="another type"):
+        native.forward(np.zeros(native.MECHANISM), np.zeros(20, dtype=kind), row, status)
+
+
+def test_a_load_of_whole_numbers_is_a_load():
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    whole = np.array([0, 0, -1, 0, 0, 0])
+    found = [model.predict(np.array([0.1, 0.2]), Load(each)) for each in (whole, 1.0 * whole)]
+    assert np.array_equal(found[0].twist, found[1].twist)

@@ -91,7 +91,8 @@ class Corrector:
         """
         if load is not None and running.compiled is not None:
             flags = IN_U if load.on_platform else IN_F
-            own = CompiledCommands(np.array([stamp_ns]), theta, load.wrench, flags, WANTED)
+            wrench = np.ascontiguousarray(load.wrench, float)
+            own = CompiledCommands(np.array([stamp_ns]), theta, wrench, flags, WANTED)
             block = Correcting(self, running, running.compiled, settings, own)
             if block.search(0, 1) == 1:
                 block.share[0] = share(block.turn(0))

@@ -27,7 +27,7 @@ def pose_of_twist(twist: Array) -> tuple[Array, Array]:
     """
     if native is not None:
         pose = np.empty((*twist.shape[:-1], 7))
-        native.pose_of_twist(np.ascontiguousarray(twist), pose)
+        native.pose_of_twist(np.ascontiguousarray(twist, float), pose)
         return pose[..., :3], pose[..., 3:]
     half = 0.5 * np.sqrt(dot(twist[..., 3:], twist[..., 3:]))[..., None]
     # sin(x) / x, with numpy's pi in it.

@@ -294,9 +294,11 @@ class CompiledWrist:
         """
         twist, force = np.empty(6), np.empty(self.sectors)
         closed = np.zeros(self.sectors, dtype=bool) if active is None else active.copy()
-        extras = (None if e is None else np.ascontiguousarray(e) for e in (limb_1, limb_2, opening))
+        extras = (
+            None if e is None else np.ascontiguousarray(e, float) for e in (limb_1, limb_2, opening)
+        )
         row = configuration.row
-        wrench = np.ascontiguousarray(wrench)
+        wrench = np.ascontiguousarray(wrench, float)
         if native.respond(self._parts, row, wrench, *extras, closed, twist, force, self.sectors):
             raise InputError(NOT_DEFINITE)
         return twist, force, closed

@@ -40,7 +40,7 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
     """
     if twist.ndim == 1 and native is not None:
         rotation, shift = np.empty((3, 3)), np.empty(3)
-        native.exp_twist(np.ascontiguousarray(twist), rotation, shift)
+        native.exp_twist(np.ascontiguousarray(twist, float), rotation, shift)
         return rotation, shift
     v, w = twist[..., :3], twist[..., 3:]
     angle = np.sqrt(dot(w, w))[..., None]
@@ -98,7 +98,7 @@ def log_motion(rotation: Array, shift: Array) -> Array:
     """
     if shift.ndim == 1 and native is not None:
         twist = np.empty(6)
-        one = np.ascontiguousarray(rotation), np.ascontiguousarray(shift)
+        one = np.ascontiguousarray(rotation, float), np.ascontiguousarray(shift, float)
         if not native.log_motion(*one, twist):
             return twist
     w = rotation_vector(rotation)

@@ -204,7 +204,9 @@ class ErrorModel:
         if compiled is not None:
             closed = np.zeros(compiled.sectors, dtype=bool) if active is None else active.copy()
             in_u = IN_U if load.on_platform else IN_F
-            rows = compiled.predict(theta, load.wrench, in_u, closed, None)
+            rows = compiled.predict(
+                theta, np.ascontiguousarray(load.wrench, float), in_u, closed, None
+            )
             if not rows.status[0]:
                 return self.prediction_of(rows, 0, load)
         # The formulas for blocks say what is wrong.

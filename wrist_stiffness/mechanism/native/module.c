@@ -1,6 +1,7 @@
 /* What Python sees: arrays of 64-bit floats in, arrays filled, a status or a place back. */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
+#include <string.h>
 
 #include "wrist.h"
 
@@ -19,18 +20,33 @@ static void release(Buffers *all) {
     }
 }
 
-/* Take arrays; `sizes` says how many bytes each must have at least, those filled are marked in
- * `filled` by their place. */
-static int take(Buffers *all, PyObject *const *args, const Py_ssize_t *sizes, int count,
+/* Whether a buffer holds doubles 'd', 64-bit integers 'q' or bytes 'b'. */
+static int holds(const Py_buffer *view, char kind) {
+    const char *format = view->format ? view->format : "B";
+    if (kind == 'b') return view->itemsize == 1;
+    return view->itemsize == 8 && !format[1] &&
+           (kind == 'd' ? *format == 'd' : *format == 'q' || *format == 'l');
+}
+
+/* Take arrays, one for each letter of `kinds`; `sizes` says how many bytes each must have at least,
+ * those filled are marked in `filled` by their place. */
+static int take(Buffers *all, PyObject *const *args, const Py_ssize_t *sizes, const char *kinds,
                 unsigned filled) {
+    const int count = (int)strlen(kinds);
     for (all->count = 0; all->count < count; all->count++) {
         Py_buffer *view = all->view + all->count;
         view->obj = 0;
         view->buf = 0;
         if (args[all->count] == Py_None) continue;
-        const int flags = PyBUF_C_CONTIGUOUS | (filled >> all->count & 1 ? PyBUF_WRITABLE : 0);
+        const int writable = filled >> all->count & 1 ? PyBUF_WRITABLE : 0;
+        const int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | writable;
         if (PyObject_GetBuffer(args[all->count], view, flags)) {
             view->obj = 0;
+            release(all);
+            return -1;
+        }
+        if (!holds(view, kinds[all->count])) {
+            PyErr_Format(PyExc_TypeError, "array %d holds another type", all->count++);
             release(all);
             return -1;
         }
@@ -71,7 +87,7 @@ static PyObject *forward_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     const Py_ssize_t sizes[] = {sizeof(Mechanism), 2 * n * sizeof(double),
                                 n * sizeof(Configuration), n};
     Buffers b;
-    if (take(&b, args, sizes, 4, 3u << 2)) return 0;
+    if (take(&b, args, sizes, "dddb", 3u << 2)) return 0;
     const double *theta = b.view[1].buf;
     Configuration *at = b.view[2].buf;
     unsigned char *statuses = b.view[3].buf;
@@ -94,7 +110,7 @@ static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     const Py_ssize_t sizes[] = {parts_size(m), sizeof(Configuration), six, six, six, row,
                                 m, six, row};
     Buffers b;
-    if (take(&b, args, sizes, 9, 7u << 6)) return 0;
+    if (take(&b, args, sizes, "ddddddbdd", 7u << 6)) return 0;
     const int status = respond(b.view[0].buf, (int)m, b.view[1].buf, b.view[2].buf, b.view[3].buf,
                                b.view[4].buf, b.view[5].buf, b.view[6].buf, b.view[7].buf,
                                b.view[8].buf);
@@ -113,7 +129,7 @@ static PyObject *predict_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), 2 * n * real, 6 * n * real, n, m,
                                 n, 6 * n * real, n * sizeof(Configuration), n * m, n};
     Buffers b;
-    if (take(&b, args, sizes, 11, 1u << 5 | 15u << 7)) return 0;
+    if (take(&b, args, sizes, "ddddbbbddbb", 1u << 5 | 15u << 7)) return 0;
     const double *theta = b.view[2].buf, *load = b.view[3].buf;
     const unsigned char *in_u = b.view[4].buf, *wanted = b.view[6].buf;
     unsigned char *closed = b.view[5].buf, *states = b.view[9].buf, *statuses = b.view[10].buf;
@@ -144,7 +160,7 @@ static PyObject *correct_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), sizeof(Task), 2 * n * real,
                                 6 * n * real, n, n, 2 * real, m, n * sizeof(Corrected), n * m};
     Buffers b;
-    if (take(&b, args, sizes, 11, 15u << 7)) return 0;
+    if (take(&b, args, sizes, "dddddbbdbdb", 15u << 7)) return 0;
     const double *command = b.view[3].buf, *load = b.view[4].buf;
     const unsigned char *in_u = b.view[5].buf, *wanted = b.view[6].buf;
     double *held = b.view[7].buf;
@@ -177,7 +193,7 @@ static PyObject *apply_of(PyObject *self, PyObject *const *args, Py_ssize_t coun
     const Py_ssize_t sizes[] = {sizeof(Mechanism), sizeof(Safety), 2 * n * real, 8 * n, n * real, n,
                                 2 * real, 8, n * sizeof(Corrected), 2 * n * real};
     Buffers b;
-    if (take(&b, args, sizes, 10, 15u << 6)) return 0;
+    if (take(&b, args, sizes, "dddqdbdqdd", 15u << 6)) return 0;
     const double *command = b.view[2].buf, *share = b.view[4].buf;
     const int64_t *stamp = b.view[3].buf;
     const unsigned char *has = b.view[5].buf;
@@ -196,7 +212,7 @@ static PyObject *apply_of(PyObject *self, PyObject *const *args, Py_ssize_t coun
 static PyObject *pose_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
     const Py_ssize_t sizes[] = {0, 0};
     Buffers b;
-    if (counted(count, 2) || take(&b, args, sizes, 2, 2u)) return 0;
+    if (counted(count, 2) || take(&b, args, sizes, "dd", 2u)) return 0;
     const Py_ssize_t n = b.view[0].len / (Py_ssize_t)(6 * sizeof(double));
     const double *twist = b.view[0].buf;
     double *pose = b.view[1].buf;
@@ -217,7 +233,7 @@ static PyObject *covariance_of(PyObject *self, PyObject *const *args, Py_ssize_t
     const double of_size = PyFloat_AsDouble(args[4]), of_step = PyFloat_AsDouble(args[5]);
     if (PyErr_Occurred()) return 0;
     Py_ssize_t sizes[] = {sizeof(Mechanism), 0, 0, 0};
-    if (take(&b, args, sizes, 4, 1u << 3)) return 0;
+    if (take(&b, args, sizes, "dddd", 1u << 3)) return 0;
     const Py_ssize_t n = b.view[1].len / (Py_ssize_t)sizeof(Configuration);
     const Py_ssize_t six = 6 * sizeof(double);
     if (b.view[2].len < n * six || b.view[3].len < 6 * n * six) {
@@ -237,7 +253,7 @@ static PyObject *covariance_of(PyObject *self, PyObject *const *args, Py_ssize_t
 static PyObject *exp_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
     const Py_ssize_t sizes[] = {6 * sizeof(double), 9 * sizeof(double), 3 * sizeof(double)};
     Buffers b;
-    if (counted(count, 3) || take(&b, args, sizes, 3, 6u)) return 0;
+    if (counted(count, 3) || take(&b, args, sizes, "ddd", 6u)) return 0;
     exp_twist(b.view[0].buf, b.view[1].buf, b.view[2].buf);
     release(&b);
     Py_RETURN_NONE;
@@ -246,7 +262,7 @@ static PyObject *exp_of(PyObject *self, PyObject *const *args, Py_ssize_t count)
 static PyObject *log_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
     const Py_ssize_t sizes[] = {9 * sizeof(double), 3 * sizeof(double), 6 * sizeof(double)};
     Buffers b;
-    if (counted(count, 3) || take(&b, args, sizes, 3, 4u)) return 0;
+    if (counted(count, 3) || take(&b, args, sizes, "ddd", 4u)) return 0;
     const int status = log_motion(b.view[0].buf, b.view[1].buf, b.view[2].buf);
     release(&b);
     return PyLong_FromLong(status);
