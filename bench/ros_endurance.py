@@ -115,6 +115,7 @@ def main() -> None:
     options = parser.parse_args()
     module = "wrist_stiffness.ros."
     corrects = ("--ros-args", "-p", "enabled_on_start:=true", "-p", "load_policy:=follow")
+    corrects += ("-p", "command_age_limit_s:=0.0")
     with (
         process("-m", module + "pose_error_predictor") as predictor,
         process("-m", module + "angle_corrector", *corrects) as corrector,

@@ -72,6 +72,7 @@ class Hanging(Law):
     def parameters(self, place): return (Parameter("x_um", lower=0.0, upper=1.0, scale=1.0),)
     def advance(self, at, place, values, state):
         if at.block.theta[0, 0] > 0.3:
+            open({ready!r}, "w").close()
             time.sleep(3600.0)
         return at.screw(place, [0.0] * 6), state
 """
@@ -86,7 +87,8 @@ def test_a_node_ends_wherever_it_hangs(graph, model, tmp_path, where):
         os.mkfifo(path)
     else:
         hang = f"open({str(ready)!r}, 'w').close()\ntime.sleep(3600.0)"
-        text = HANGING_LAW.format(at_once=hang if where == "loading" else "")
+        at_once = hang if where == "loading" else ""
+        text = HANGING_LAW.format(at_once=at_once, ready=str(ready))
         (tmp_path / "own.py").write_text(text)
         save_table(model.table, tmp_path / "table.npz")
         effect = "{effect: python, class: 'own.py:Hanging', component: platform}"
@@ -103,8 +105,12 @@ def test_a_node_ends_wherever_it_hangs(graph, model, tmp_path, where):
             else:
                 graph.status(node.name, lambda status, values: values["state"] == "active")
                 graph.load(10**9)
-                graph.joints("/joint_states", 10**9, (0.4, 0.0))
-                graph.heard["/diagnostics"].clear()
+
+                def is_stuck():
+                    graph.joints("/joint_states", 10**9, (0.4, 0.0))
+                    return ready.exists()
+
+                graph.until(is_stuck, "law that hangs")
             process.send_signal(signal.SIGTERM)
             _, errors = process.communicate(timeout=DEADLINE_S)
         finally:
