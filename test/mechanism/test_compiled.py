@@ -166,7 +166,17 @@ def test_arrays_that_are_too_small_are_refused(shipped, size):
         )
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.int64, bool])
+def test_floats_may_say_their_byte_order():
+    """As those decoded from a recording do."""
+    theta, row, status = np.zeros((1, 2)), np.zeros(native.CONFIGURATION), np.ones(1, np.uint8)
+    decoded = np.zeros(16, np.uint8).view(np.dtype("d").newbyteorder("<")).reshape(1, 2)
+    mechanism = Mechanism(*np.eye(3)[[0, 1, 0, 2, 1, 2]])
+    constants = mechanism_constants(mechanism, ANYWHERE, limits_of())
+    for angles in (theta, decoded):
+        assert native.forward(constants, angles, row, status) == 0
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int64, ">f8", bool])
 def test_arrays_of_another_type_are_refused(kind):
     """Nor any type: integers are not read as if they were floats."""
     row, status = np.zeros(native.CONFIGURATION), np.zeros(1, np.uint8)

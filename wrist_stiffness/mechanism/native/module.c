@@ -23,7 +23,10 @@ static void release(Buffers *all) {
 /* Whether a buffer holds doubles 'd', 64-bit integers 'q' or bytes 'b'. */
 static int holds(const Py_buffer *view, char kind) {
     const char *format = view->format ? view->format : "B";
+    const int one = 1;
+    const char own_order = *(const char *)&one ? '<' : '>';
     if (kind == 'b') return view->itemsize == 1;
+    if (*format == '=' || *format == '@' || *format == own_order) format++;
     return view->itemsize == 8 && !format[1] &&
            (kind == 'd' ? *format == 'd' : *format == 'q' || *format == 'l');
 }
