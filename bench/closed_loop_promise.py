@@ -164,9 +164,7 @@ def judged(
     step = each.stream.model.table.geometry.limits.encoder_step  # type: ignore[union-attr]
     # Mean length of two rounding errors, each uniform within half a step.
     floor = 0.765 * step / 2.0 * (1.0 if script.objective == "pointing" else TOOL_M)
-    harder = np.max((steady[0] - unseen) / np.maximum(steady[1], 1e-9))
-    # Below what is seen in either run nothing is pressed harder.
-    harder = float(harder) if np.any(steady[0] > unseen) else 0.0
+    harder = float(np.max(steady[0] / (HARDER * steady[1] + unseen)))
     changes = switches(each.states, script.quiet)
     moved = np.array(each.applied)[script.quiet]
     return {
@@ -201,12 +199,12 @@ def switches(states: list[str], quiet: np.typing.NDArray[np.bool_]) -> int:
 
 def broken(line: dict[str, object]) -> bool:
     """Tell whether an episode breaks the promise."""
-    return line["worse"] > WORSE or line["harder"] > HARDER or line["hunts"] > MOST_CHANGES  # type: ignore[operator]
+    return line["worse"] > WORSE or line["harder"] > 1.0 or line["hunts"] > MOST_CHANGES  # type: ignore[operator]
 
 
 def report(lines: list[dict[str, object]]) -> None:
     """Print the table and the worst episodes."""
-    print("kind      episodes  broken  error/without: mean   worst  push/without: worst  hunts")
+    print("kind      episodes  broken  error/without: mean   worst  push/allowed: worst  hunts")
     for kind in (*KINDS, "all"):
         some = [each for each in lines if kind in ("all", each["kind"])]
         if not some:
@@ -214,7 +212,10 @@ def report(lines: list[dict[str, object]]) -> None:
         worse = np.array([each["worse"] for each in some])
         harder = max(each["harder"] for each in some)
         hunts = sum(each["hunts"] > MOST_CHANGES for each in some)  # type: ignore[operator]
-        total = sum(each["with"] for each in some) / sum(each["without"] for each in some)  # type: ignore
+        # Errors of the tool point as angles, so that they add up.
+        arm = np.array([1.0 if each["objective"] == "pointing" else TOOL_M for each in some])
+        both = [np.array([each[name] for each in some]) / arm for name in ("with", "without")]
+        total = both[0].sum() / both[1].sum()
         print(
             f"{kind:8}  {len(some):8d}  {sum(map(broken, some)):6d}  {total:19.2f}  "
             f"{worse.max():6.2f}  {harder:19.2f}  {hunts:5d}"
@@ -233,7 +234,7 @@ def report(lines: list[dict[str, object]]) -> None:
             print(
                 f"  seed {each['seed']:5d} {each['kind']:8} ratio {each['ratio']:5.3f} "
                 f"{each['objective']:10} error/without {each['worse']:.3f} "
-                f"push/without {each['harder']:.2f} switches {each['switches']} "
+                f"push/allowed {each['harder']:.2f} switches {each['switches']} "
                 f"in quiet {each['hunts']}"
             )
 
