@@ -238,8 +238,7 @@ class Loop:
 
     def diagnosed(self, told: Row) -> Row:
         """Return what a diagnosis makes of it."""
-        chance = np.random.default_rng(SEED)
-        result = diagnose_sessions(self.known, [self.session], chance).diagnosis
+        result = diagnose_sessions(self.known, [self.session]).diagnosis
         findings = [list(finding.names) for finding in result.findings]
         names = [each[0] for each in findings]
         if names == told["added"]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.diagnosis import (
+from wrist_stiffness.inference import (
     Candidate,
     Nuisance,
     Observations,

@@ -15,7 +15,7 @@ import numpy as np
 from diagnosis_arm import base, campaign, catalogue, hide, outsiders
 from scipy.stats import binomtest
 
-from wrist_stiffness.diagnosis import Diagnosis, diagnose
+from wrist_stiffness.inference import Diagnosis, diagnose
 
 SIZES = (0.3, 0.5, 1.0, 3.0, 30.0, 100.0)
 LAW_ERRORS = (0.0, 0.05)
@@ -81,7 +81,7 @@ def run(case: Case) -> Diagnosis:
     rng = np.random.default_rng(case.seed)
     table = campaign(rng, rich=case.kind != "poor")
     effects = [(known.get(name) or outsiders()[name], size) for name, size in case.effects]
-    return diagnose(hide(table, effects, rng, case.law_error), tuple(known.values()), base(), rng)
+    return diagnose(hide(table, effects, rng, case.law_error), tuple(known.values()), base())
 
 
 def scores(case: Case, result: Diagnosis) -> dict[str, float]:
@@ -104,7 +104,7 @@ def scores(case: Case, result: Diagnosis) -> dict[str, float]:
         score["both"] = all(any(truth in members for members in named) for truth in truths)
     quantity = next(iter(result.after))
     if case.kind in ("single", "pair"):
-        score["at floor"] = result.after[quantity] <= 1.1 * result.noise_floor[quantity]
+        score["at floor"] = result.after[quantity] <= 1.1 * result.noise[quantity]
     return score
 
 

@@ -15,12 +15,9 @@ import time
 # The matrices are small: on a busy machine further threads wait for each other, and waiting counts.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import numpy as np
-
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.campaign.searching.fitter import Fitter
-from wrist_stiffness.campaign.searching.seeking import Search
+from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
@@ -42,9 +39,10 @@ def main(path: str) -> None:
     mark(f"read {len(session)} measurements")
     units = as_units(model, session)
     mark(f"cut into {len(units.cut.dwell)} units, {len(units.cut.kept)} moments kept")
-    Search(Fitter(model), (units,)).quick()
-    mark("base fitted, catalogue evaluated, leaders fitted")
-    diagnose_sessions(model, [session], np.random.default_rng(0))
+    problem = WristProblem(model, (units,))
+    problem.trials(problem.begin())
+    mark("base fitted, catalogue evaluated")
+    diagnose_sessions(model, [session])
     mark("the whole diagnosis, from measurements")
     whole = marks[-1][2]
     print(f"{'':60}{'wall s':>9}{'CPU s':>9}{'share':>8}")

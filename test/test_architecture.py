@@ -8,15 +8,15 @@ PACKAGE = "wrist_stiffness"
 SOURCE = Path(__file__).parents[1] / PACKAGE
 
 ONLINE = {"mechanism", "lookup", "model"}
-CORE = ONLINE | {"fem", "campaign", "compensation", "diagnosis", "recording", "simulation"}
+CORE = ONLINE | {"fem", "campaign", "compensation", "inference", "recording", "simulation"}
 ROOMS_USED = {
     "mechanism": set(),
     "lookup": {"mechanism"},
     "fem": {"mechanism", "lookup"},
     "model": {"mechanism", "lookup"},
     "compensation": ONLINE,
-    "diagnosis": set(),
-    "campaign": ONLINE | {"compensation", "diagnosis", "recording"},
+    "inference": set(),
+    "campaign": ONLINE | {"compensation", "inference", "recording"},
     "recording": set(),
     "simulation": {"mechanism", "lookup", "recording"},
     "workflows": CORE | {"shipped"},

@@ -23,6 +23,7 @@ import pytest
 from wrist_stiffness.campaign.planning.loads_file import read_loads
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.workflows.node_list import LAUNCH_ARGUMENTS
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = ("README.md", "docs/commands.md", "docs/find-the-missing-effect.md")
@@ -160,18 +161,17 @@ def missing_of_ros(arguments):
     verb, *named = arguments
     if verb == "launch":
         _, file, *settings = named
-        path = ROOT / "launch" / file
-        text = path.read_text() if path.is_file() else ""
-        wanted = [f'DeclareLaunchArgument(\n                "{s.split(":=")[0]}"' for s in settings]
-        return [] if text and all(part in text for part in wanted) else [f"launch {named}"]
+        known = (ROOT / "launch" / file).is_file()
+        unknown = {each.split(":=")[0] for each in settings} - LAUNCH_ARGUMENTS.keys()
+        return [] if known and not unknown else [f"launch {named}"]
     if verb == "run":
         scripts = importlib.metadata.entry_points(group="console_scripts")
         return [] if named[1] in scripts.names else [f"executable {named[1]}"]
     _, what, *_ = named
     node, _, service = what.strip("/").rpartition("/")
     sources = "".join(path.read_text() for path in (ROOT / "wrist_stiffness/ros").glob("*.py"))
-    found = f'"~/{service}"' in sources and f'"{node}"' in sources
-    return [] if found or f'"{what}"' in sources else [f"{verb} {what}"]
+    named = [service.removesuffix("_all"), *([node] if node else [])]
+    return [] if all(f'"{each}"' in sources for each in named) else [f"{verb} {what}"]
 
 
 LOOKED_UP = {

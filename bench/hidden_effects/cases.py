@@ -109,8 +109,6 @@ class Case:
         """Whether a solver that is not asked everything is asked this case."""
         if solver == "knows_the_laws":
             return self.main and self.kind in ("single", "double")
-        if solver == "usual_sizes":
-            return self.ordinary
         return crc32(f"sample {self.key}".encode()) % SAMPLED_ONE_IN == 0
 
     @property

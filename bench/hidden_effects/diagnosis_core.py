@@ -1,4 +1,4 @@
-"""The project's statistics with the simulation's words: `wrist_stiffness.diagnosis` alone.
+"""The project's statistics with the simulation's words: `wrist_stiffness.inference` alone.
 
 This judges the search, the colour of the noise, the classes and the abstentions.  It does not judge
 the laws of the error model; `own_diagnosis` does.
@@ -16,10 +16,10 @@ from observe import Riddle
 from solvers import Answer, explained, nothing
 from whitened import whitened
 
-from wrist_stiffness.diagnosis.candidates import Candidate, Parameter
-from wrist_stiffness.diagnosis.diagnose import diagnose
-from wrist_stiffness.diagnosis.nuisance import Nuisance
-from wrist_stiffness.diagnosis.observations import Observations, Quantity
+from wrist_stiffness.inference.candidates import Candidate, Parameter
+from wrist_stiffness.inference.diagnose import diagnose
+from wrist_stiffness.inference.nuisance import Nuisance
+from wrist_stiffness.inference.observations import Observations, Quantity
 
 CONDITIONS = (
     *("theta_1", "theta_2", "speed_1", "speed_2", "sense_1", "sense_2"),
@@ -57,12 +57,7 @@ def diagnosis_core(riddle: Riddle, words: Dictionary) -> Answer:
         effect, component = word.name.split("@")
         free = tuple(Parameter(f"direction_{i}") for i in range(word.train.shape[2]))
         candidates.append(Candidate(effect, component, free, _rows(word.train[rows])))
-    result = diagnose(
-        observations,
-        tuple(candidates),
-        tuple(nuisances),
-        np.random.default_rng(riddle.case.seed),
-    )
+    result = diagnose(observations, tuple(candidates), tuple(nuisances))
     names = tuple(finding.names for finding in result.findings)
     chosen = [word for word in words.searched if word.name in {members[0] for members in names}]
     unseen = tuple(f"{each.effect}@{each.component}" for each in result.not_excited)

@@ -58,7 +58,7 @@ def ask(case: Case) -> list[dict[str, Any]]:
         longer = LongCase(**vars(case), minutes=minutes)
         session = observe(longer, hidden, 0).read
         model = ErrorModel("benchmark", wrist(), "closed_form")
-        found = diagnose_sessions(model, [session], np.random.default_rng(case.seed)).diagnosis
+        found = diagnose_sessions(model, [session]).diagnosis
         classes = [finding.names for finding in found.findings]
         lines.append(
             {

@@ -58,23 +58,33 @@ def diagnosed_sessions(
 ) -> Answer:
     """Return the answer of the project to some days; without a riddle it explains no other."""
     model = ErrorModel("benchmark", wrist(), "closed_form")
-    found = diagnose_sessions(model, sessions, np.random.default_rng(seed))
+    found = diagnose_sessions(model, sessions)
     result = found.diagnosis
+    classes = tuple(finding.names for finding in result.findings)
+    details = {
+        "probability": result.probability,
+        "probabilities": [finding.probability for finding in result.findings],
+        "suspects": [[list(f.names), f.probability, f.log_gain] for f in result.suspects],
+        "classes": [[c.name, c.probability, c.rest, c.left] for c in found.classes],
+        "unexplained": result.unexplained,
+        "depends_on": dict(result.depends_on),
+        "held_out": [dict(result.before), dict(result.after)],
+        "noise": dict(result.noise),
+        "discrepancy": dict(result.discrepancy),
+        "fits": len(found.search.states),
+    }
     if riddle is None:
-        classes = tuple(finding.names for finding in result.findings)
         nothing = np.zeros((0, 6))
-        return Answer(result.verdict, classes, (nothing, nothing))
-    extended = model.with_effects(*refitted(found.base, found.effects), *found.effects)
+        return Answer(result.verdict, classes, (nothing, nothing), details=details)
+    extended = model.with_effects(*refitted(found.fitted, found.effects), *found.effects)
     one, two = (predicted(extended, day) for day in riddle.days)
-    suspected = [e for e in found.suspected.effects(0) if e.law.id not in REGISTRATIONS]
-    with_suspects = model.with_effects(*suspected)
     return Answer(
         result.verdict,
-        tuple(finding.names for finding in result.findings),
+        classes,
         (one, two),
         tuple(f"{each.effect}@{each.component}" for each in result.not_excited),
-        {each.name: each.signal for each in found.contributions},
-        tuple(predicted(with_suspects, day) for day in riddle.days),
+        {each.name: each.probability for each in result.standings},
+        details=details,
     )
 
 

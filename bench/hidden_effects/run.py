@@ -51,7 +51,6 @@ from solvers import (
     told_the_answer,
 )
 from told_the_name import told_the_name
-from usual_sizes import usual_sizes
 
 from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
@@ -68,13 +67,9 @@ SOLVERS: dict[str, Solver] = {
     "own_diagnosis": own_diagnosis,
     "own_diagnosis_mcap": own_diagnosis_mcap,
     "told_the_name": told_the_name,
-    "usual_sizes": usual_sizes,
     "knows_the_laws": knows_the_laws,
 }
-SAMPLED = (
-    *("own_diagnosis_mcap", "diagnosis_core", "spans_of_the_laws", "knows_the_laws"),
-    "usual_sizes",
-)
+SAMPLED = (*("own_diagnosis_mcap", "diagnosis_core", "spans_of_the_laws", "knows_the_laws"),)
 """Are slow, or made for some cases, and asked those only."""
 
 TRUTH_FILES = (
@@ -87,7 +82,6 @@ FILES = {
     "own_diagnosis": ("own_diagnosis.py",),
     "own_diagnosis_mcap": ("own_diagnosis.py",),
     "told_the_name": ("solvers.py", "told_the_name.py"),
-    "usual_sizes": ("solvers.py", "usual_sizes.py"),
     "knows_the_laws": ("solvers.py", "ceiling.py"),
 }
 
@@ -104,7 +98,7 @@ RESTARTS = 5
 def version_of(solver: str) -> str:
     """Return the digest of all code that an answer and its score depend on."""
     modules = {
-        "diagnosis_core": ("wrist_stiffness.diagnosis",),
+        "diagnosis_core": ("wrist_stiffness.inference",),
         "own_diagnosis": OWN,
         "own_diagnosis_mcap": (
             *OWN,
@@ -115,7 +109,6 @@ def version_of(solver: str) -> str:
             "wrist_stiffness.campaign.fitting.calibrate",
             "wrist_stiffness.campaign.fitting.extend",
         ),
-        "usual_sizes": OWN,
     }.get(solver, ())
     # The project's calibration of what is read is in the floor of every score.
     modules = (*modules, "wrist_stiffness.campaign.searching.base_fit", READING)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.inference import Observations
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model

@@ -8,7 +8,7 @@ from wrist_stiffness.campaign.comparing.headroom import held_out_process
 from wrist_stiffness.campaign.comparing.sentences import tell
 from wrist_stiffness.campaign.noise_floor import noise_floor
 from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.inference import Observations
 
 N = 400
 SIGMA = np.repeat([1e-6, 1e-4], 3)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.comparing.dependence import dependences
-from wrist_stiffness.diagnosis.resampling import time_blocks
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.blocks import time_blocks
 
 N, M = 240, 6
 

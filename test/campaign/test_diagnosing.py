@@ -12,57 +12,145 @@ from wrist_stiffness.simulation.cell import CellSettings
 
 SECONDS = 120.0
 
+BACKLASH = HiddenEffect("backlash", "motor_1", "single", 1e-3, 5)
 
-def measured(in_the_cell, model, hidden=(), base="wrong", seed=3):
+
+def measured(in_the_cell, model, hidden=(), base="wrong", seed=3, session=0):
     """One session of a wrist with a wrong base, ten measurements a second."""
     settings = CellSettings(
         rate_hz=10.0,
         program_seconds=SECONDS,
-        program_seed=41,
+        program_seed=41 + session,
         hidden=hidden,
         base=base,
         base_seed=seed,
+        session=session,
     )
-    return in_the_cell(model.table, settings, seed)
+    return in_the_cell(model.table, settings, seed + session)
 
 
-def answer(model, session, seed=0):
-    return diagnose_sessions(model, [session], np.random.default_rng(seed))
+@pytest.fixture(scope="module")
+def worn(model, in_the_cell):
+    """A day of a wrist with backlash, and what is found in it."""
+    session = measured(in_the_cell, model, (BACKLASH,))
+    return session, diagnose_sessions(model, [session])
 
 
 @pytest.mark.slow
 def test_a_wrong_base_alone_is_no_missing_effect(model, in_the_cell):
-    found = answer(model, measured(in_the_cell, model))
+    found = diagnose_sessions(model, [measured(in_the_cell, model)])
     assert found.diagnosis.verdict == "none"
+    assert found.diagnosis.probability > 0.9
     assert found.effects == ()
+    assert max(found.diagnosis.discrepancy.values()) == 0.0
     # The millimetre and the fifth of a degree of the registrations are told instead.
     taken = next(line for line in found.diagnosis.absorbed if "measurement_frame" in line)
     assert float(taken.split(": ")[1].split(" um")[0]) > 100.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("blank", ["nothing", "position"])
-def test_backlash_behind_a_wrong_base_is_named_with_its_width(model, in_the_cell, blank):
-    width = 1e-3
-    session = measured(
-        in_the_cell, model, (HiddenEffect("backlash", "motor_1", "single", width, 5),)
-    )
-    if blank == "position":
-        session = replace(session, shift=np.full_like(session.shift, np.nan))
-    found = answer(model, session)
-    assert [finding.name for finding in found.diagnosis.findings] == ["backlash@motor_1"]
-    value, error = found.diagnosis.findings[0].parameters["width_mdeg"]
-    fitted = found.effects[0].estimates["width_mdeg"].value
-    assert abs(value - 1e3 * np.degrees(width)) < 3.0 * error
-    assert abs(fitted - 1e3 * np.degrees(width)) < 3.0 * error
+def test_backlash_behind_a_wrong_base_is_named_with_its_width(worn):
+    _, found = worn
+    (finding,) = found.diagnosis.findings
+    assert finding.names == ("backlash@motor_1",)
+    assert finding.probability > 0.99
+    value, error = finding.parameters["width_mdeg"]
+    assert abs(value - 1e3 * np.degrees(BACKLASH.magnitude)) < 3.0 * error
     # A hidden encoder count is 4 mdeg, and two minutes have some ten dwells for each side.
     assert error < 5.0
+    assert found.effects[0].estimates["width_mdeg"].value == value
     assert found.diagnosis.after["phi_mdeg"] < 0.5 * found.diagnosis.before["phi_mdeg"]
+
+
+@pytest.mark.slow
+def test_every_candidate_stands_somewhere_and_says_why(worn):
+    _, found = worn
+    standings = {each.name: each for each in found.diagnosis.standings}
+    assert standings["backlash@motor_1"].why_not == ""
+    others = [each for name, each in standings.items() if name != "backlash@motor_1"]
+    assert len(others) > 50
+    assert all(each.why_not for each in others)
+    assert all(each.probability < 0.01 for each in others)
+
+
+@pytest.mark.slow
+def test_what_a_rival_changes_is_told_unit_by_unit(worn):
+    _, found = worn
+    change = found.change_by("backlash@motor_1")
+    assert change.shape == found.nominal.residual.shape
+    left = np.nansum((found.nominal.residual - change)[:, 3:] ** 2)
+    assert left < 0.2 * np.nansum(found.nominal.residual[:, 3:] ** 2)
+    with pytest.raises(InputError, match="gravity@link_1: was not fitted"):
+        found.change_by("gravity@link_1")
+
+
+@pytest.mark.slow
+def test_without_measured_positions_turns_alone_name_it(model, worn):
+    session = replace(worn[0], shift=np.full_like(worn[0].shift, np.nan))
+    found = diagnose_sessions(model, [session])
+    assert [finding.name for finding in found.diagnosis.findings] == ["backlash@motor_1"]
+
+
+@pytest.mark.slow
+def test_an_instrument_that_states_no_scatter_mutes_nothing_and_names_no_drift(
+    model, in_the_cell, worn
+):
+    unstated = replace(worn[0], covariance=None)
+    assert diagnose_sessions(model, [unstated]).diagnosis.findings[0].name == "backlash@motor_1"
+    sound = replace(measured(in_the_cell, model), covariance=None)
+    assert diagnose_sessions(model, [sound]).diagnosis.verdict == "none"
+
+
+@pytest.mark.slow
+def test_another_day_judges_what_the_first_one_shows(model, in_the_cell, worn):
+    other = measured(in_the_cell, model, (BACKLASH,), session=1)
+    found = diagnose_sessions(model, [worn[0], other]).diagnosis
+    assert found.scope == "another session"
+    assert [each.name for each in found.findings] == ["backlash@motor_1"]
+    fall, error = found.findings[0].buys["phi_mdeg"]
+    assert fall > 3.0 * error > 0.0
+
+
+@pytest.mark.slow
+def test_what_makes_another_day_worse_is_not_handed_over(model, in_the_cell, worn):
+    """The motor was repaired before the second day."""
+    repaired = measured(in_the_cell, model, session=1)
+    found = diagnose_sessions(model, [worn[0], repaired])
+    assert found.effects == ()
+    assert found.diagnosis.findings == ()
+    assert found.diagnosis.verdict == "unknown"
+
+
+@pytest.mark.slow
+def test_an_effect_outside_the_catalogue_is_unknown_and_says_on_what_it_depends(model, in_the_cell):
+    loose = HiddenEffect("loose_seat", "platform", "plain", 2e-5, 5)
+    found = diagnose_sessions(model, [measured(in_the_cell, model, (loose,))]).diagnosis
+    assert found.verdict == "unknown"
+    assert found.findings == ()
+    assert found.depends_on
+    assert found.discrepancy["s_um"] > found.noise["s_um"]
+
+
+@pytest.mark.slow
+def test_a_time_that_is_over_is_said(model, worn):
+    found = diagnose_sessions(model, [worn[0]], seconds=1e-3).diagnosis
+    assert found.findings == ()
+    assert found.notes == ("the time was over before every candidate was fitted",)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [({"naming": 90.0}, "probability 90 is not between 0 and 1"), ({"seconds": 0.0}, "0 seconds")],
+)
+def test_settings_that_cannot_be_are_refused(model, in_the_cell, setting, words):
+    session = measured(in_the_cell, model, base="exact")
+    with pytest.raises(InputError, match=words):
+        diagnose_sessions(model, [session], **setting)
 
 
 def test_no_session_is_refused(model):
     with pytest.raises(InputError, match="no session to diagnose"):
-        diagnose_sessions(model, [], np.random.default_rng(0))
+        diagnose_sessions(model, [])
 
 
 def test_a_session_without_a_measured_pose_is_named(model, in_the_cell):
@@ -71,4 +159,4 @@ def test_a_session_without_a_measured_pose_is_named(model, in_the_cell):
     blank = replace(session, name="tuesday", shift=nothing[0], rotation=nothing[1])
     for sessions in ([session, blank], [blank, session]):
         with pytest.raises(InputError, match="tuesday: no measured pose"):
-            diagnose_sessions(model, sessions, np.random.default_rng(0))
+            diagnose_sessions(model, sessions)

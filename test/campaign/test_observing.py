@@ -8,8 +8,8 @@ from wrist_stiffness.campaign.hidden_counts import counts_known
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import observe
 from wrist_stiffness.campaign.unit_session import as_units
-from wrist_stiffness.diagnosis.shared import own_covariance
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.shared import own_covariance
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect

@@ -24,8 +24,8 @@ FLOOR = {"s_um": 1.0, "phi_mdeg": 5.0}
 
 def explained(base, absorbed, findings=()):
     """Return an answer that leaves no more than noise."""
-    result = SimpleNamespace(noise_floor=FLOOR, after=FLOOR, findings=findings)
-    return SimpleNamespace(diagnosis=result, base=base, absorbed=absorbed)
+    result = SimpleNamespace(noise=FLOOR, after=FLOOR, findings=findings)
+    return SimpleNamespace(diagnosis=result, fitted=base, absorbed=absorbed)
 
 
 def of_a_wrong_base(in_the_cell, table, hidden=()):
@@ -106,8 +106,8 @@ def test_what_no_whole_fit_bears_out_is_not_told(model, in_the_cell, monkeypatch
         ("link_stiffness@link_1", 3.1, (), 1),
         ("link_stiffness@link_1", 2.9, (), 0),
         ("axis_misalignment@joint_1", 9.0, (), 0),
-        ("link_stiffness@link_1", 0.1, (("load_scale", "load_sensor"),), 1),
-        ("link_stiffness@link_1", 0.1, (("backlash", "motor_1"),), 0),
+        ("link_stiffness@link_1", 0.1, (("load_scale", "load_sensor", 1.0),), 1),
+        ("link_stiffness@link_1", 0.1, (("backlash", "motor_1", 1.0),), 0),
     ],
 )
 def test_a_usual_answer_asks_for_no_wrong_load(

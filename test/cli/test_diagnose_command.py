@@ -13,19 +13,31 @@ RECORDING = Path(__file__).parents[1] / "data" / "wrist_b.mcap"
 @pytest.mark.slow
 def test_the_verdict_comes_first_and_the_file_says_the_same(capsys, tmp_path):
     result, page = tmp_path / "why.json", tmp_path / "why.html"
-    command = ["diagnose", str(RECORDING), "--json", str(result), "--report", str(page)]
+    command = [
+        "diagnose",
+        str(RECORDING),
+        "--json",
+        str(result),
+        "--ranking",
+        "--report",
+        str(page),
+    ]
     assert main(command) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "Missing in the model: backlash@motor_2."
+    assert lines[0].startswith("Missing in the model: backlash@motor_2, ")
     assert any("measurement_frame@pose_sensor" in line for line in lines)
     assert lines[-2:] == [f"written: {page}", f"written: {result}"]
     values = json.loads(result.read_text())
-    assert values["schema"] == 1
+    assert values["schema"] == 2
     assert values["verdict"] == "effect"
     (finding,) = values["findings"]
-    assert finding["class"] == [{"effect": "backlash", "component": "motor_2"}]
-    assert finding["buys_mdeg"][0] > 5 * finding["buys_mdeg"][1] > 0
-    assert values["after"]["rmse_phi_mdeg"] < 1.3 * values["noise_floor"]["phi_mdeg"]
+    (member,) = finding["class"]
+    assert (member["effect"], member["component"]) == ("backlash", "motor_2")
+    assert finding["probability"] > 0.99
+    assert finding["buys"]["phi_mdeg"][0] > 5 * finding["buys"]["phi_mdeg"][1] > 0
+    assert values["after"]["rms_phi_mdeg"] < 2.0 * values["noise"]["phi_mdeg"]
+    assert values["ranking"][0]["candidate"] == "backlash@motor_2"
+    assert len(values["change_by_unit_m_rad"]["backlash@motor_2"][0]) == 6
     assert values["provenance"]["recordings"]
     assert "backlash@motor_2" in page.read_text()
 

@@ -11,6 +11,7 @@ import pytest
 
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import has_unit
+from wrist_stiffness.model.python_laws import python_laws
 from wrist_stiffness.model.registry import catalogue
 from wrist_stiffness.shipped import shipped_file
 
@@ -115,7 +116,8 @@ def test_files_on_the_page_are_models(tmp_path):
     table = str(shipped_file("precomputed/palmieri2015.npz"))
     text = whole.replace("../precomputed/palmieri2015.npz", table) + formula + python
     (tmp_path / "m.yaml").write_text(text)
-    model = load_model(tmp_path / "m.yaml")
+    with python_laws(True):
+        model = load_model(tmp_path / "m.yaml")
     assert [e.law.id for e in model.effects] == [
         "joint_clearance", "thermal_expansion", "soft_hinge", "twist",
     ]  # fmt: skip

@@ -161,7 +161,7 @@ def test_record_diagnose_extend_reload_and_the_true_error_falls(graph, model, tm
     recording = tmp_path / "recorded.mcap"
     recorded(graph, wrist, model.table, recording)
     session = read_session(recording, model.table)
-    answer = diagnose_sessions(load_model(path), [session], np.random.default_rng(0))
+    answer = diagnose_sessions(load_model(path), [session])
     assert [finding.name for finding in answer.diagnosis.findings] == ["backlash@motor_1"]
     found = CatalogueEffect(answer.diagnosis.findings[0].name)
     extend_model(path, found, Recordings([recording], {}), extended, Run("test", "2026-01-01"))

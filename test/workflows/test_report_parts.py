@@ -4,7 +4,7 @@ import pytest
 from wrist_stiffness.campaign.comparing.conditions import Condition
 from wrist_stiffness.campaign.comparing.sentences import Change, Statement
 from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.inference import Observations
 from wrist_stiffness.workflows.report import comparison_report
 from wrist_stiffness.workflows.report.parts import against
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.noise import FEWEST_REPLICATE_DOF, replicate_variance
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.noise import FEWEST_REPLICATE_DOF, replicate_variance
 from wrist_stiffness.mechanism.components import Array
 
 FEWEST_REPEATS = 6

@@ -11,8 +11,8 @@ from wrist_stiffness.campaign.hidden_counts import hidden_counts, stands_of
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.campaign.units import Labels
-from wrist_stiffness.diagnosis import Observations, Quantity
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 

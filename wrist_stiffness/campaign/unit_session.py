@@ -14,8 +14,8 @@ from wrist_stiffness.campaign.in_pieces import in_pieces
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.table_range import beyond_range
 from wrist_stiffness.campaign.units import Cut, Labels, Mask, cut
-from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block

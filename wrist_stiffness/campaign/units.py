@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
+from wrist_stiffness.inference.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 

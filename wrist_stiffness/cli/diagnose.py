@@ -11,13 +11,11 @@ from wrist_stiffness.cli.recording_options import add_recording_options, recordi
 DESCRIPTION = """\
 Say which physical effect a model misses, from recordings with a measured pose of the platform.
 Registrations, encoder zeros, load tare and the wrist's tolerances are fitted first; then every
-effect of the catalogue is tried at every place.  Effects that the recordings cannot tell apart are
-named together.  The answer may be 'nothing' or 'none of these'.
-A finding is proven one by one.  Where a little of everything is wrong, suspects that explain more
-than chance but are not proven stand below, by how much each adds to the error, and what else is
-likeliest where something is left that nothing explains.
+effect of the catalogue is tried at every place.  Every finding has a probability; effects that
+the recordings cannot tell apart are named together.  The answer may be 'nothing' or 'none of
+these', and then it says on what the error depends.
 Several recordings are sessions of one wrist: the last one judges what the others show, so record
-on two days.  Of a single recording the end is put aside."""
+on two days.  Of a single recording the end judges."""
 
 EPILOG = """\
 examples:
@@ -43,6 +41,24 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     parser.add_argument("--model", metavar="FILE", help="model file (default: the shipped wrist's)")
     parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
+    parser.add_argument(
+        "--probability",
+        type=float,
+        default=90.0,
+        metavar="PERCENT",
+        help="name an effect from this probability on (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=float("inf"),
+        help="begin no further fit after this time; the answer says what was not tried",
+    )
+    parser.add_argument(
+        "--ranking",
+        action="store_true",
+        help="with --json: every candidate, and what each rival changes in every unit",
+    )
     add_fleet_options(parser)
     add_recording_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result here as well")
@@ -67,8 +83,16 @@ def _run(arguments: argparse.Namespace) -> int:
         lines, values = fleet.lines(), fleet.as_values()
     else:
         with Status() as status:
-            found = diagnose_recordings(model, recordings, this_run(), Progress, status)
-        lines, values = found.lines(), found.as_values()
+            found = diagnose_recordings(
+                model,
+                recordings,
+                this_run(),
+                Progress,
+                status,
+                arguments.probability / 100.0,
+                arguments.seconds,
+            )
+        lines, values = found.lines(), found.as_values(arguments.ranking)
     print("\n".join(lines))
     if arguments.report:
         from wrist_stiffness.workflows.report.page import write_page

@@ -15,10 +15,10 @@ from wrist_stiffness.campaign.comparing.wrong_load import wrong_load
 from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import ANSWERS_LOAD
-from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
-from wrist_stiffness.diagnosis import Diagnosis, Finding
+from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
@@ -31,14 +31,7 @@ from wrist_stiffness.workflows.read_sessions import (
     sha256_by_name,
     was_fitted_to,
 )
-from wrist_stiffness.workflows.verdict import (
-    PROVEN,
-    class_of,
-    conditions_in_words,
-    correction_of,
-    unexplained_share,
-    verdict_lines,
-)
+from wrist_stiffness.workflows.verdict import class_of, correction_of, percent, verdict_lines
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.report.page import Page
@@ -89,37 +82,38 @@ class Diagnosed:
         out = [*([self.mistake, ""] if self.mistake else []), *verdict_lines(result), ""]
         out += _table(result)
         for place, finding in enumerate(result.findings, 1):
-            out += ["", *_finding_lines(place, finding)]
-        unknown = result.verdict == "unknown"
-        out += adding_lines(worth_hearing(self.answer.contributions, unknown, result.after))
-        if result.unexplained.evidence:
-            out += ["", f"not explained: {unexplained_share(result)}"]
-            out.append(f"  {result.unexplained.evidence}")
-            if result.unexplained.depends_on:
-                out.append(f"  it depends on {conditions_in_words(result.unexplained.depends_on)}")
+            out += ["", *_finding_lines(f"{place}. ", finding)]
+        if result.suspects:
+            out += ["", "not sure enough to be named:"]
+            out += [f"  {class_of(e)}: {percent(e.probability)} sure" for e in result.suspects]
         if result.not_excited:
             out += ["", "these recordings cannot show:"]
             out += [f"  {names}: {needs}" for needs, names in _needs(result).items()]
-        out += ["", "taken up first, by the refit of the set-up and the wrist's tolerances:"]
+        out += ["", "absorbed by calibration, largest first:"]
         out += taken_up_lines(self.answer.absorbed)
-        out.append(f"held-out errors are valid for {result.scope}")
-        if result.lost_units:
-            out.append(f"note: units left out as lost beams: {result.lost_units}")
-        return [*out, *(f"note: {remark}" for remark in self.remarks)]
+        out.append(f"held out was {result.scope}")
+        return [*out, *(f"note: {remark}" for remark in (*result.notes, *self.remarks))]
 
-    def as_values(self) -> dict[str, Any]:
-        """Return what programs read, with units in the names."""
-        return {
-            **self.result.as_json(),
-            "contributions": [
-                {"effect": c.effect, "component": c.component, "kind": c.kind}
-                | {key: list(size) for key, size in c.sizes.items()}
-                for c in self.answer.contributions
-            ],
+    def as_values(self, ranking: bool = False) -> dict[str, Any]:
+        """Return what programs read, with units in the names.
+
+        Parameters
+        ----------
+        ranking : bool
+            Whether every candidate is told, and what each fitted rival changes in every unit.
+        """
+        found = {
+            **self.result.as_json(ranking),
             "set_up_mistake": self.mistake,
-            "notes": list(self.remarks),
+            "notes": [*self.result.notes, *self.remarks],
             "provenance": self.provenance.as_values(),
         }
+        if ranking:
+            fitted = [each.name for each in self.result.standings if each.fitted]
+            found["change_by_unit_m_rad"] = {
+                name: self.answer.change_by(name).tolist() for name in fitted
+            }
+        return found
 
     def report(self) -> Page:
         """Return the report with pictures."""
@@ -128,17 +122,10 @@ class Diagnosed:
             shown_by,
         )
 
-        observed, result = self.answer.observed.observations, self.result
-        explained = self.answer.base.residual if result.findings else None
-        shown = shown_by(observed, np.random.default_rng(SEED), explained)
+        explained = self.answer.fitted.residual if self.result.findings else None
+        shown = shown_by(self.answer.observations, np.random.default_rng(SEED), explained)
         return report_of_diagnosis(
-            result,
-            self.answer.contributions,
-            shown,
-            self.recordings,
-            self.mistake,
-            self.remarks,
-            self.provenance,
+            self.result, shown, self.recordings, self.mistake, self.remarks, self.provenance
         )
 
 
@@ -148,6 +135,8 @@ def diagnose_recordings(
     run: Run,
     progress: Callable[[str], Progress] = lambda label: silent,
     tell: Callable[[str], None] = lambda text: None,
+    naming: float = NAMING,
+    seconds: float = np.inf,
 ) -> Diagnosed:
     """Find the effects that a model misses in recordings of one wrist.
 
@@ -163,6 +152,10 @@ def diagnose_recordings(
         From a label to a function that is told steps done and in all.
     tell : callable
         Told what is being done.
+    naming : float
+        Probability from which an effect is named.
+    seconds : float
+        Time after which no further fit is begun.
 
     Returns
     -------
@@ -178,7 +171,7 @@ def diagnose_recordings(
     sessions = read_sessions(recordings, [loaded], progress("reading"))
     known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
     rng = np.random.default_rng(SEED)
-    answer = diagnose_sessions(known, list(sessions.values()), rng, tell=tell)
+    answer = diagnose_sessions(known, list(sessions.values()), naming, seconds, tell)
     mistake = mistake_beside(known, answer, list(sessions.values()), rng, tell)
     hashes = sha256_by_name(sessions)
     return Diagnosed(
@@ -220,20 +213,20 @@ def mistake_beside(
         # Axes that are off their drawing hide a wrong load, and so do parts that it made as stiff
         # as they can be: so it is asked with the axes as fitted and the stiffness of before.
         tell("asking for a wrong load")
-        fitted = known.with_effects(*answer.base.effects(0))
+        fitted = known.with_effects(*answer.fitted.effects(0))
         mistake = wrong_load(known, fitted, sessions, rng)
     return mistake
 
 
 def _leaves_much(result: Diagnosis) -> bool:
     """Tell whether so much is left that a mistake of the set-up is looked for."""
-    floor = result.noise_floor
-    return any(error > WORTH_ASKING * floor[key] for key, error in result.after.items())
+    noise = result.noise
+    return any(error > WORTH_ASKING * noise[key] for key, error in result.after.items())
 
 
 def _doubts_load(answer: WristDiagnosis) -> bool:
     """Tell whether the wrist answers loads so unusually that these may be wrong."""
-    named = {law for finding in answer.diagnosis.findings for law, _ in finding.members}
+    named = {law for finding in answer.diagnosis.findings for law, _, _ in finding.members}
     far = {
         each.name.partition("@")[0] for each in answer.absorbed if each.deviations > FAR_FROM_DRAWN
     }
@@ -242,42 +235,30 @@ def _doubts_load(answer: WristDiagnosis) -> bool:
 
 def _table(result: Diagnosis) -> list[str]:
     rows = (
-        ("set-up refitted", result.before),
+        ("calibrated model", result.before),
         ("with the findings", result.after),
-        ("noise floor", result.noise_floor),
+        ("instrument noise", result.noise),
+        ("left above the noise", result.discrepancy),
     )
-    out = [f"{'RMS on the part put aside':28}" + "".join(f"{TITLES[k]:>12}" for k in result.before)]
+    out = [
+        f"{'RMS, the first two held out':28}" + "".join(f"{TITLES[k]:>12}" for k in result.before)
+    ]
     return out + [f"  {name:26}" + "".join(f"{row[k]:12.3g}" for k in row) for name, row in rows]
 
 
-def _finding_lines(place: int, finding: Finding) -> list[str]:
-    out = [f"{place}. {class_of(finding)}", f"   {finding.evidence}"]
+def _finding_lines(place: str, finding: Finding) -> list[str]:
+    out = [f"{place}{class_of(finding)}", f"   {finding.evidence}"]
     out += [
         f"   {name} = {plus_minus(value, error)}"
         for name, (value, error) in finding.parameters.items()
     ]
     if finding.check:
         out.append(f"   to be sure: {finding.check}")
-    out.append(f"   brings {_sizes(finding.buys)}; {correction_of(finding)}")
+    out.append(f"   reduces the held-out error by {_sizes(finding.buys)}; {correction_of(finding)}")
     out.append(
-        f"   p = {finding.p_value:.2g}, {100.0 * finding.stability:.0f} % of resamples agree, "
-        f"evidence (2 ln Bayes factor) {finding.delta_bic:.3g}"
+        f"   {percent(finding.probability)} sure; log evidence {finding.log_gain:+.0f} "
+        "against the model without it"
     )
-    return out
-
-
-def adding_lines(parts: Sequence[Contribution]) -> list[str]:
-    """Return how much parts of a wrist add to its error, a line each; nothing without any.
-
-    Parameters
-    ----------
-    parts : sequence of Contribution
-        Findings, suspects and what is possible, largest first.
-    """
-    if not parts:
-        return []
-    out = ["", "what adds most to the error, RMS beyond what a new set-up would take up:"]
-    out += [f"  {each.name}: {_sizes(each.sizes)} ({PROVEN[each.kind]})" for each in parts]
     return out
 
 

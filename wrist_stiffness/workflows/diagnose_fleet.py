@@ -30,9 +30,9 @@ class FleetDiagnosis:
 
     def lines(self) -> list[str]:
         """Return one table for a terminal."""
-        titles = "".join(f"{title:>22}{'floor':>8}" for title in TITLES.values()) + "  missing"
+        titles = "".join(f"{title:>22}{'noise':>8}" for title in TITLES.values()) + "  missing"
         return [
-            "RMS on the part put aside, before and after what is missing is added",
+            "held-out RMS, before and after what is missing is added, and instrument noise",
             *table_lines(
                 self.rows,
                 titles,
@@ -50,11 +50,11 @@ class FleetDiagnosis:
 def _cells(values: dict[str, Any]) -> str:
     out = ""
     for key in TITLES:
-        before, after = (values[when].get(f"rmse_{key}") for when in ("before", "after"))
-        floor = values["noise_floor"].get(key)
+        before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
+        noise = values["noise"].get(key)
         # A recording may lack a quantity.
         fall = "-" if before is None else f"{before:.3g} -> {after:.3g}"
-        out += f"{fall:>22}{'-' if floor is None else f'{floor:.3g}':>8}"
+        out += f"{fall:>22}{'-' if noise is None else f'{noise:.3g}':>8}"
     return f"{out}  {_missing(values)}"
 
 
@@ -65,8 +65,7 @@ def _missing(values: dict[str, Any]) -> str:
         best, *others = (f"{each['effect']}@{each['component']}" for each in finding["class"])
         named.append(f"{best} (or {len(others)} more)" if others else best)
     if values["verdict"] == "unknown":
-        doubtful = values["unexplained"]["energy_share"] == 0.0
-        named.append("perhaps something" if doubtful else "something unknown")
+        named.append("something unknown")
     return ", ".join(named) or "nothing"
 
 

@@ -22,9 +22,9 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
 from wrist_stiffness.campaign.observing import Observed
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
-from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.sentences import Told
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, against_floor, over_floor
-from wrist_stiffness.diagnosis import Observations, Quantity
-from wrist_stiffness.diagnosis.resampling import time_blocks
+from wrist_stiffness.inference import Observations, Quantity
+from wrist_stiffness.inference.blocks import time_blocks
 from wrist_stiffness.mechanism.components import Array
 
 JUDGES = 12

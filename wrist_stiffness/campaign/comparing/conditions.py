@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.observations import Labels
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.observations import Labels
 from wrist_stiffness.mechanism.components import Array
 
 FEWEST = 4

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.observations import Labels
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.observations import Labels
 from wrist_stiffness.mechanism.components import Array
 
 CHANCE = 0.01

@@ -11,11 +11,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.conditions import FORCES, MOMENTS, OWN
-from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.discrepancy import features
-from wrist_stiffness.diagnosis.observations import Labels, Mask
-from wrist_stiffness.diagnosis.outliers import robust_scale
-from wrist_stiffness.diagnosis.resampling import time_blocks
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.inference.features import features
+from wrist_stiffness.inference.observations import Labels, Mask
+from wrist_stiffness.inference.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
 
 BLOCKS = 10

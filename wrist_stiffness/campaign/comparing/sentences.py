@@ -17,9 +17,9 @@ from wrist_stiffness.campaign.comparing.dependence import (
     noise_energy,
 )
 from wrist_stiffness.campaign.noise_floor import NoiseFloor
-from wrist_stiffness.diagnosis import Observations
-from wrist_stiffness.diagnosis.observations import Labels, Mask
-from wrist_stiffness.diagnosis.resampling import time_blocks
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.inference.observations import Labels, Mask
 from wrist_stiffness.mechanism.components import Array
 
 SURE = 3.0

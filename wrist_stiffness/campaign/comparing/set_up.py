@@ -14,8 +14,8 @@ import numpy as np
 
 from wrist_stiffness.campaign.observing import Observed, predict_units, tabulate
 from wrist_stiffness.campaign.unit_session import UnitSession
-from wrist_stiffness.diagnosis.observations import Mask, Observations
-from wrist_stiffness.diagnosis.outliers import robust_scale
+from wrist_stiffness.inference.observations import Mask, Observations
+from wrist_stiffness.inference.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector

@@ -18,7 +18,7 @@ from wrist_stiffness.campaign.comparing.set_up import without_set_up
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.observing import Observed
 from wrist_stiffness.campaign.unit_session import UnitSession
-from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.inference import Observations
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 

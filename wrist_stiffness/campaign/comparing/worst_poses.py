@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import lengths
 from wrist_stiffness.campaign.comparing.conditions import FORCES, MOMENTS
-from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.inference import Observations
 from wrist_stiffness.mechanism.components import Array
 
 APART_S = 2.0

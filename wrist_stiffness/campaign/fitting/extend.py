@@ -23,8 +23,8 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.noise_floor import NoiseFloor, noise_floor
 from wrist_stiffness.campaign.refitted import AXES, TOLERATED
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
-from wrist_stiffness.diagnosis.sealed import bought, refuted
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.held_out import bought, refuted
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

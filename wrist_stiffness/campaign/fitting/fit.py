@@ -16,12 +16,12 @@ from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
 from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.campaign.fitting.wander import found_wander, with_wander
-from wrist_stiffness.diagnosis.noise import estimate_noise
-from wrist_stiffness.diagnosis.observations import Mask, Observations
-from wrist_stiffness.diagnosis.outliers import lost_units
-from wrist_stiffness.diagnosis.settings import Settings
-from wrist_stiffness.diagnosis.whitening import NoiseModel
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.noise import estimate_noise
+from wrist_stiffness.inference.observations import Mask, Observations
+from wrist_stiffness.inference.outliers import lost_units
+from wrist_stiffness.inference.settings import OUTLIER_LIMIT
+from wrist_stiffness.inference.whitening import NoiseModel
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.progress import Progress, silent
 
@@ -108,7 +108,7 @@ def _settled(
     noise: NoiseModel | None = None
     for step in range(MOST_STEPS + 1):
         columns = problem.columns(z)
-        lost = lost_units(table.with_values(residual), columns, Settings().outlier_limit)
+        lost = lost_units(table.with_values(residual), columns, OUTLIER_LIMIT)
         seen = table.with_values(np.where((lost | unseen)[:, None], np.nan, residual))
         if rounds and rounds < noise_rounds:
             wander = found_wander(seen, columns, weight, z)

@@ -14,9 +14,9 @@ from wrist_stiffness.campaign.fitting.fit import fit, start_of
 from wrist_stiffness.campaign.fitting.problem import FitProblem, require_units
 from wrist_stiffness.campaign.fitting.result import Fit
 from wrist_stiffness.campaign.fitting.wander import with_wander
-from wrist_stiffness.diagnosis.observations import Labels, Observations
-from wrist_stiffness.diagnosis.sealed import HeldOut, sealed_units
-from wrist_stiffness.diagnosis.settings import Settings
+from wrist_stiffness.inference.held_out import HeldOut, sealed_units
+from wrist_stiffness.inference.observations import Labels, Observations
+from wrist_stiffness.inference.settings import HELD_OUT
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.progress import Progress, silent
 
@@ -76,7 +76,7 @@ def judged(
         Told steps done and steps at most.
     """
     table = problem.table
-    aside = sealed_units(table, Settings().sealed_share)
+    aside = sealed_units(table, HELD_OUT)
     if len(problem.sessions) == 1:
         require_units(problem, int(np.count_nonzero(aside)))
         found = fit(problem, _begin(problem, start), aside, progress)

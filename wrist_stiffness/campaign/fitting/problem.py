@@ -13,9 +13,9 @@ from wrist_stiffness.campaign.fitting.free_effects import FreeEffect
 from wrist_stiffness.campaign.fitting.shims import GAP, Shims
 from wrist_stiffness.campaign.observing import Observed, tabulate
 from wrist_stiffness.campaign.unit_session import UnitSession
-from wrist_stiffness.diagnosis.observations import Observations
-from wrist_stiffness.diagnosis.settings import FEWEST_UNITS
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

@@ -8,8 +8,8 @@ import numpy as np
 
 from wrist_stiffness.campaign.fitting.problem import NO_PRIOR, FitProblem
 from wrist_stiffness.campaign.fitting.wander import with_wander
-from wrist_stiffness.diagnosis.observations import Mask, Observations
-from wrist_stiffness.diagnosis.whitening import NoiseModel
+from wrist_stiffness.inference.observations import Mask, Observations
+from wrist_stiffness.inference.whitening import NoiseModel
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

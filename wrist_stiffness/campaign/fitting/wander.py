@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.observations import Mask, Observations
-from wrist_stiffness.diagnosis.whitening import component_factors
+from wrist_stiffness.inference.observations import Mask, Observations
+from wrist_stiffness.inference.whitening import component_factors
 from wrist_stiffness.mechanism.components import Array
 
 HALVES = (slice(0, 3), slice(3, 6))

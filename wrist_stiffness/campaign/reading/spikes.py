@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from wrist_stiffness.diagnosis.outliers import MAD_TO_SIGMA
+from wrist_stiffness.inference.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
 
 WINDOW = 5

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import lstsq
-from scipy.special import chdtrc, chdtri
+from scipy.special import chdtri
 
 from wrist_stiffness.campaign.columns import SessionModel
 from wrist_stiffness.campaign.fitting.free_effects import (
@@ -21,7 +21,6 @@ from wrist_stiffness.campaign.fitting.free_effects import (
     commissioning,
     within_tolerances,
 )
-from wrist_stiffness.campaign.observing import Observed, tabulate
 from wrist_stiffness.campaign.searching.base_problem import BaseProblem
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
@@ -43,10 +42,6 @@ ROUNDED_N = (1.0, 0.3, 0.1, 0.03)
 """Forces within which a pin goes from wall to wall, before the fit with the law as it is: from one
 wall to the other the sum of squares has a minimum for every pin that turns over, and steps end in
 the next one (graduated non-convexity, Blake and Zisserman 1987)."""
-
-LOOSE = frozenset(("joint_clearance",))
-"""Laws with gaps of their own: slopes about no play say next to nothing, and beside play each slope
-of the base is a search for where the pins rest."""
 
 Walls = Literal["sharp", "rounded first", "rounded"]
 
@@ -99,13 +94,6 @@ class BaseFit:
         usual = len(self._usual)
         return np.array([unknown.free < usual for unknown in self.problem.unknowns])
 
-    @property
-    def on_base(self) -> Mask:
-        """Which unknowns are extras on top of a tolerance of the base, (p,) bool."""
-        free = self.problem.free
-        names = np.array([free[u.free].effect.name in self._usual for u in self.problem.unknowns])
-        return names & ~self.of_base
-
     @cached_property
     def _usual(self) -> dict[str, FreeEffect]:
         return {each.effect.name: each for each in free_base(self.problem.whole)[0]}
@@ -124,48 +112,10 @@ class BaseFit:
         return found
 
     @property
-    def tolerances(self) -> Mask:
-        """Which unknowns are tolerances of the wrist, (p,) bool; the rest is set up anew."""
-        of_wrist = np.array([unknown.session is None for unknown in self.problem.unknowns])
-        return self.of_base & of_wrist & (self.problem.weights == 1.0)
-
-    @property
-    def strain(self) -> float:
-        """Sum of squares of the tolerances, in their standard deviations."""
-        return float(np.sum(self.z[self.tolerances] ** 2))
-
-    @property
-    def unit_price(self) -> float:
-        """Sum of squares that each further parameter must explain (BIC, Schwarz 1978)."""
-        return float(np.log(self.problem.table.measured.sum()))
-
-    @property
-    def strained(self) -> bool:
-        """Whether the wrist's tolerances went further than chance lets them go in one of 20."""
-        return bool(chdtrc(np.count_nonzero(self.tolerances), self.strain) < 0.05)
-
-    @property
     def variance(self) -> float:
         """Mean square of what is left, in units of the noise."""
         white = self.whiten(self.residual)
         return float(white @ white) / np.count_nonzero(self.problem.table.measured)
-
-    def covariance(self) -> Array:
-        """Return the covariance of all unknowns in steps, to first order, (p, p)."""
-        white = self.whiten(self.columns)
-        known = white.T @ white + np.diag(self.problem.weights**2)
-        return np.asarray(np.linalg.pinv(known, hermitian=True))
-
-    def values_on_top(self, name: str) -> dict[str, tuple[float, float]]:
-        """Return the parameters of an extra and their standard uncertainties, in their units."""
-        sigma, free = np.sqrt(np.diag(self.covariance())), self.problem.free
-        return {
-            u.key: (u.mean + float(z) * u.step, float(s) * u.step)
-            for u, z, s, of_base in zip(
-                self.problem.unknowns, self.z, sigma, self.of_base, strict=True
-            )
-            if not of_base and free[u.free].effect.name == name
-        }
 
     def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
         """Return the fitted effects of one session, also those that were held."""
@@ -182,12 +132,6 @@ class BaseFit:
     def whiten(self, values: Array) -> Array:
         """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
         return self.problem.whiten(values)
-
-    def left(self, with_extras: bool) -> Observed:
-        """Return the table of what the fit leaves, or only the base where it was fitted."""
-        models = [self.model(n, with_extras) for n in range(len(self.problem.sessions))]
-        predicted = np.concatenate([each.along([each.effects])[0] for each in models])
-        return tabulate(self.problem.model, self.problem.sessions, predicted)
 
 
 def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
@@ -255,6 +199,15 @@ def fit_base(
     z, residual = _descended(problem, bare, z)
     cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
     return BaseFit(problem, z, residual, tuple(added), cost, alone, bare)
+
+
+def has_walls(effect: Effect) -> bool:
+    """Tell whether the law of an effect goes from wall to wall, so that it can be rounded.
+
+    Slopes about its absence say next to nothing, and beside it each slope of the base is a search
+    for where the pins rest.
+    """
+    return effect.law.rounded(ROUNDED_N[0]) is not effect.law.rounded(None)
 
 
 def _rounded(effect: Effect, force: float | None) -> Effect:

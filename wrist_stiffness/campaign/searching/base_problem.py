@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.campaign.fitting.problem import FitProblem
-from wrist_stiffness.diagnosis.shared import Apart, own_covariance
+from wrist_stiffness.inference.shared import Apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 

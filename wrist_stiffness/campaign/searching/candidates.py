@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import dataclass
 
 import numpy as np
 
 from wrist_stiffness.campaign.columns import Effects, SessionModel
-from wrist_stiffness.campaign.refitted import SET_UP, TOLERATED
+from wrist_stiffness.campaign.refitted import SET_UP
 from wrist_stiffness.campaign.units import Mask
-from wrist_stiffness.diagnosis import Candidate, Observations, ShapeParameter
-from wrist_stiffness.diagnosis import Parameter as Factor
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.columns import Carried, Recipe, Shape, Values
-from wrist_stiffness.model.columns import Factor as ColumnFactor
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.registry import catalogue, find_law
-
-LARGE = 5.0
-"""An effect so many times its usual size would still surprise nobody who looks for a fault."""
-
-BEYOND_BOUNDS = 10.0
-"""What an estimate may be against the bounds of its law; at zero they stay."""
 
 LEVER, SHIFTS_ALONE = 0.03, 0.01
 """A change shifts the platform alone if turns of its normal, at the distance of the bearings [m],
@@ -35,10 +25,6 @@ SET_UP_ANEW = {law for law, _ in SET_UP}
 """Laws refitted in every session before any search; there is nothing to find."""
 
 Trial = tuple[Law, str, Values]
-
-
-SHARE = "share"
-"""Name of the one number of a candidate that stands for a whole fit: how much of it is kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +43,6 @@ class WristCandidate:
         Columns on the grid [m, rad].
     exact : callable, optional
         shape -> columns, where they are known between the points of the grid.
-    seen : bool
-        Whether a fit has found it before, whatever its size.
-    change : (u, 6) float, optional
-        What a whole fit with the effect changes, residual before less residual after [m, rad]; it
-        then stands in place of the columns.
-    strain : float
-        By how much that fit puts the tolerances of the base further from the drawing: sum of
-        squares, in their standard deviations.
-    points : bool
-        Whether it turns the platform's normal, which is all that two motors can turn back.
     """
 
     law: Law
@@ -74,10 +50,6 @@ class WristCandidate:
     recipe: Recipe
     known: Mapping[Shape, Array]
     exact: Callable[[Shape], Array] | None = None
-    seen: bool = False
-    change: Array | None = None
-    strain: float = 0.0
-    points: bool = True
 
     @property
     def name(self) -> str:
@@ -105,73 +77,15 @@ class WristCandidate:
         """Return the effect with these values, each brought within its bounds."""
         return effect_at(self.law, self.place, values)
 
-    def columns(self, units: Observations, shape: Shape) -> Array:
-        """Return the columns at a shape, linear between the points of the grid, (u, 6, k)."""
-        return self.at(shape)[units.rows]
-
     def at(self, shape: Shape) -> Array:
-        """Return the columns of all units at a shape, (u, 6, k)."""
-        if self.exact:
-            return self.exact(shape)
-        if shape in self.known:
-            return self.known[shape]
-        corners, weights = [], []
-        for value, parameter in zip(shape, self.recipe.shape, strict=True):
-            grid = np.array(parameter.grid)
-            above = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))
-            share = float((value - grid[above - 1]) / (grid[above] - grid[above - 1]))
-            corners.append((parameter.grid[above - 1], parameter.grid[above]))
-            weights.append((1.0 - share, share))
-        total = np.zeros_like(next(iter(self.known.values())))
-        for corner, weight in zip(product(*corners), product(*weights), strict=True):
-            total = total + float(np.prod(weight)) * self.known[corner]
-        return total
+        """Return the columns of all units at a point of the grid, (u, 6, k)."""
+        return self.exact(shape) if self.exact else self.known[shape]
 
     @property
     def usual(self) -> Array:
         """Usual size of the factor of each column, (k,)."""
         first = self.recipe.columns(self.shapes[0])
         return np.array([column.factor.plausible for column in first])
-
-    def changed_by(self, change: Array, strain: float) -> WristCandidate:
-        """Return it with what a whole fit changes, (u, 6), in place of its columns."""
-        return replace(self, change=change, strain=strain)
-
-    def candidate(self) -> Candidate:
-        """Return it as the statistics take it."""
-        if self.change is None:
-            return self._by_columns()
-        change, columns = self.change[:, :, None], self._by_columns()
-        return replace(
-            columns,
-            parameters=(Factor(SHARE, 0.0),),
-            columns=lambda units, shape: change[units.rows],
-            shape=(),
-            fitted=columns.freedom - 1,
-            strain=self.strain,
-        )
-
-    def _by_columns(self) -> Candidate:
-        law = self.law
-        factors = [column.factor for column in self.recipe.columns(self.shapes[0])]
-        return Candidate(
-            law.id,
-            self.place,
-            tuple(self._testable(f) for f in factors),
-            self.columns,
-            tuple(ShapeParameter(each.name, each.grid) for each in self.recipe.shape),
-            needs=law.excited_by,
-            evidence=law.sentence.format(place=self.place),
-            check=law.check,
-            compensable=compensable(law, self.place, self.points),
-        )
-
-    def _testable(self, factor: ColumnFactor) -> Factor:
-        """Return a factor with the size at which it must show to be tested, and its far bounds."""
-        tested = not (self.seen or self.law.id in TOLERATED)
-        far = (BEYOND_BOUNDS * factor.lower, BEYOND_BOUNDS * factor.upper)
-        size = LARGE * factor.plausible if tested else None
-        return Factor(factor.name, *far, size, factor.plausible)
 
 
 def compensable(law: Law, place: str, points: bool = True) -> str:
@@ -243,15 +157,6 @@ class Point:
             blocks.append(np.nan_to_num(found[:, rows]))
         return np.concatenate(blocks, axis=1)
 
-    @property
-    def normal(self) -> Array:
-        """Normals of the platform, (u, 3) unit vectors in F."""
-        mechanism = self.models[0].model.table.mechanism
-        theta = [
-            m.session.still.theta[rows] for m, rows in zip(self.models, self.used, strict=True)
-        ]
-        return mechanism.normal(mechanism.forward(np.concatenate(theta)))
-
     def mean(self, signal: Callable[[SessionModel], Array]) -> Array:
         """Return a signal of each unit of the table, (u, ...)."""
         return np.concatenate(
@@ -262,8 +167,6 @@ class Point:
 def wrist_candidates(
     point: Point,
     absent: Collection[str],
-    seen: Collection[str] = (),
-    laws: Collection[str] | None = None,
 ) -> tuple[WristCandidate, ...]:
     """Evaluate the catalogue about a point.
 
@@ -273,10 +176,6 @@ def wrist_candidates(
         The base.
     absent : collection of str
         Effects that cannot be candidates: the model has them, and they are no part of the base.
-    seen : collection of str
-        Effects that a fit has found before.
-    laws : collection of str, optional
-        Which of the catalogue; if None, all.
 
     Raises
     ------
@@ -287,7 +186,7 @@ def wrist_candidates(
     plans = [
         (law, place, law.linearised(place, signals))
         for law in catalogue().values()
-        if law.id not in SET_UP_ANEW and (laws is None or law.id in laws)
+        if law.id not in SET_UP_ANEW
         for place in law.places
         if f"{law.id}@{place}" not in absent
     ]
@@ -311,15 +210,13 @@ def wrist_candidates(
             index(law, place, column.trial)
             if column.origin:
                 index(law, place, column.origin)
-    changes, normal = point.changes(listed), point.normal
+    changes = point.changes(listed)
     found = []
     for law, place, own in plans:
-        already = f"{law.id}@{place}" in seen
         if own.carried:
             carrier = changes[index(find_law(own.carried.law), place, own.carried.values)]
             exact = _times_signals(point, carrier, own.carried)
-            points = turns_normal(carrier[:, :, None], normal)
-            found.append(WristCandidate(law, place, own, {}, exact, already, points=points))
+            found.append(WristCandidate(law, place, own, {}, exact))
             continue
         known = {}
         for shape in own.shapes:
@@ -330,8 +227,7 @@ def wrist_candidates(
                     change = change - changes[index(law, place, column.origin)]
                 stack.append(change / column.size)
             known[shape] = np.stack(stack, axis=-1)
-        points = any(turns_normal(columns, normal) for columns in known.values())
-        found.append(WristCandidate(law, place, own, known, seen=already, points=points))
+        found.append(WristCandidate(law, place, own, known))
     return tuple(found)
 
 

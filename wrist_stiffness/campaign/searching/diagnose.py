@@ -1,8 +1,4 @@
-"""Find the physical effects that are missing in a model of this wrist.
-
-The statistics are linear, the wrist is not: so the point about which its effects become columns is
-sought first, by fits of the leading candidates with their own laws, the base along with them.
-"""
+"""Find the physical effects that are missing in a model of this wrist."""
 
 from __future__ import annotations
 
@@ -11,41 +7,46 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wrist_stiffness.campaign.fitting.problem import require_units
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import Observed
-from wrist_stiffness.campaign.searching.asking import asked
-from wrist_stiffness.campaign.searching.base_fit import BaseFit
-from wrist_stiffness.campaign.searching.candidates import WristCandidate
-from wrist_stiffness.campaign.searching.contributions import (
-    Contribution,
-    contributions,
-    ranked,
-)
-from wrist_stiffness.campaign.searching.fitter import Fitter, Tell, silent
-from wrist_stiffness.campaign.searching.place import INEXACT, Place
-from wrist_stiffness.campaign.searching.possible import possible
-from wrist_stiffness.campaign.searching.refit import Refitted, foretold, refit
-from wrist_stiffness.campaign.searching.seeking import PRESSING, Search
-from wrist_stiffness.campaign.searching.stepwise import MOST_EXTRAS
+from wrist_stiffness.campaign.refitted import TOLERATED
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.candidates import compensable, turns_normal
+from wrist_stiffness.campaign.searching.held_out import parted, unseen
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
-from wrist_stiffness.campaign.searching.telling import (
-    buys_anything,
-    explained,
-    rejudged,
-    sized,
-    valued,
-    withdrawn,
-)
-from wrist_stiffness.campaign.unit_session import as_units
-from wrist_stiffness.diagnosis import Diagnosis, Settings
+from wrist_stiffness.campaign.searching.wrist_problem import WristFit, WristProblem, WristTable
+from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.answer import (
+    NAMING,
+    Class,
+    Diagnosis,
+    Finding,
+    NotExcited,
+    Reading,
+    read,
+    standings,
+)
+from wrist_stiffness.inference.evidence import Evidence
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted, sealed_units
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.search import Search, State
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.registry import catalogue, find_law
 
-MUCH = 0.25
-"""Share of the excess over the noise that is much to be left beside what was named."""
+HELD_OUT = 0.2
+"""Part of a single session that is held out, at its end."""
 
-Ask = Callable[[Place], Diagnosis]
+DETECTABLE = 3.0
+"""Standard deviations that an effect of typical size must leave beyond the base to be seen."""
+
+Tell = Callable[[str], None]
+
+
+def silent(text: str) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,35 +56,54 @@ class WristDiagnosis:
     Parameters
     ----------
     diagnosis : Diagnosis
-        What the statistics say.
-    observed : Observed
-        Table of what the refitted base leaves.
+        What is missing, and how sure that is.
     effects : tuple of Effect
-        Best member of each finding, fitted with its own law.
-    base : BaseFit
-        Fitted along with these.
-    suspected : BaseFit
-        Fitted along with these and with all that explains more than its freedom costs.
-    contributions : tuple of Contribution
-        What each effect of that fit adds to the error, largest first.
+        Most probable member of each finding, fitted with its own law.
+    nominal, fitted : BaseFit
+        The model with its tolerances as fitted without any effect, and with those.
     absorbed : tuple of TakenUp
-        What that base took up: the set-up first, then tolerances, furthest from its prior first.
+        What calibration took up: the set-up first, then tolerances, furthest from its prior first.
+    search : Search
+        With every set that was fitted, for what each rival would explain.
+    classes : tuple of Class
+        Of the most probable set.
     """
 
     diagnosis: Diagnosis
-    observed: Observed
     effects: tuple[Effect, ...]
-    base: BaseFit
-    suspected: BaseFit
-    contributions: tuple[Contribution, ...]
+    nominal: BaseFit
+    fitted: BaseFit
     absorbed: tuple[TakenUp, ...]
+    search: Search
+    classes: tuple[Class, ...]
+
+    @property
+    def observations(self) -> Observations:
+        """What the nominal model leaves of each unit."""
+        return self.nominal.problem.table.with_values(self.nominal.residual)
+
+    def change_by(self, name: str) -> Array:
+        """Return what the best set with a rival explains of each unit, (u, 6) [m, rad].
+
+        Raises
+        ------
+        InputError
+            If no set with it was fitted.
+        """
+        states = [each for each in self.search.states.values() if name in each.names]
+        if not states:
+            raise InputError(
+                f"{name}: was not fitted; slopes alone told that it explains too little"
+            )
+        best = max(states, key=lambda each: each.log)
+        return np.asarray(self.nominal.residual - best.fit.base.residual)
 
 
 def diagnose_sessions(
     model: ErrorModel,
     sessions: Sequence[MeasuredSession],
-    rng: np.random.Generator,
-    settings: Settings | None = None,
+    naming: float = NAMING,
+    seconds: float = np.inf,
     tell: Tell = silent,
 ) -> WristDiagnosis:
     """Find the effects of the catalogue that a model misses.
@@ -93,64 +113,76 @@ def diagnose_sessions(
     model : ErrorModel
         What is known of the wrist.
     sessions : sequence of MeasuredSession
-        In the order of time; the last one judges what the others found, the end of the only one
-        where there is one.
-    rng : numpy.random.Generator
-        Source of chance.
-    settings : Settings, optional
-        Thresholds.
+        In the order of time.  Of several the last one judges what the others show; of one its end
+        judges the values, and the whole of it chooses the effects.
+    naming : float, optional
+        Probability from which an effect is named.
+    seconds : float, optional
+        Time after which no further fit is begun.
     tell : callable, optional
-        Told what is being done, every few seconds.
+        Told what is being done.
 
     Returns
     -------
     WristDiagnosis
-        What the statistics say, and the fits that this rests on.
+        The answer, and the fits that it rests on.
 
     Raises
     ------
     InputError
-        If there is no session, or one without any measured pose.
+        If there is no session, or one without any measured pose, or a setting is out of range.
     """
     _require_poses(sessions)
-    chosen = settings or Settings()
+    if not 0.0 < naming < 1.0:
+        raise InputError(f"naming probability {naming:g} is not between 0 and 1 (0 to 100 %)")
+    if not seconds > 0.0:
+        raise InputError(f"{seconds:g} seconds for a diagnosis: must be above 0")
     units = tuple(as_units(model, session) for session in sessions)
-    fitter = Fitter(model, tell)
-    search = Search(fitter, units)
-
-    def ask(place: Place) -> Diagnosis:
-        tell("asking chance and resamples")
-        return asked(place, rng, chosen)
-
-    def judge(place: Place, result: Diagnosis) -> Refitted:
-        base, named = _begun(place, result)
-        saw_all = bool(place.fits)
-        return refit(fitter, base, named, chosen.sealed_share, search.first_cost, saw_all)
-
-    place, result, judged = _judged(search, ask, judge)
-    base, named = _begun(place, result)
-    final = judged.base
-    effects = {each.name: each for each in final.effects(0) if each.name in final.extras}
-    result = rejudged(withdrawn(result, effects), judged.stages)
-    result = withdrawn(result, [each.name for each in result.findings if buys_anything(each)])
-    kept = tuple(effects[each.name] for each in result.findings)
-    absorbed = taken_up(final, [session.name for session in sessions])
-    result = replace(result, absorbed=tuple(each.sentence for each in absorbed))
-    suspected = _with_all(fitter, base, named, final)
-    parts = contributions(suspected, {each.name for each in kept})
-    parts = ranked([*parts, *possible(suspected, search.catalogue)])
-    observed = base.left(with_extras=False)
-    if kept and result.verdict == "unknown":
-
-        def by_laws(found: Diagnosis) -> Diagnosis:
-            if judged.stages:
-                return found
-            stages = foretold(fitter, final, kept, chosen.sealed_share)
-            return explained(rejudged(found, stages), kept)
-
-        result = _settled(result, search, final, ask, chosen.unexplained_share, by_laws)
-    result = sized(valued(result, final, place.fits.keys() & place.base.extras), kept)
-    return WristDiagnosis(result, observed, kept, final, suspected, parts, absorbed)
+    chosen = units[:-1] if len(units) > 1 else units
+    problem = WristProblem(model, chosen)
+    require_units(problem.begin().base.problem)
+    search = Search(problem, seconds, tell)
+    search.run()
+    reading = read(search, naming)
+    tell("judging by what was held out")
+    judge = _Judge(model, units, reading)
+    reading = judge.kept(search, reading)
+    state = reading.state
+    absorbed = taken_up(state.fit.base, [session.name for session in sessions])
+    findings = [_finding(search, each, reading, judge) for each in reading.named]
+    suspects = [
+        _finding(search, e, reading, None) for e in reading.classes if e not in reading.named
+    ]
+    table = state.fit.table
+    held = judge.stages
+    diagnosis = Diagnosis(
+        reading.verdict,
+        reading.probability,
+        table.table.rms(_noise(state.evidence, table.variance)),
+        table.table.rms(_discrepancy(state, table)),
+        _errors(table.table, held[0]),
+        _errors(table.table, held[-1]),
+        tuple(findings),
+        tuple(suspects),
+        reading.depends_on,
+        reading.unexplained,
+        standings(search, reading),
+        _not_excited(problem, search),
+        tuple(each.sentence for each in absorbed),
+        "another session" if len(units) > 1 else "the end of this session",
+        () if search.in_time else ("the time was over before every candidate was fitted",),
+    )
+    beyond = state.fit.base.beyond()
+    effects = tuple(beyond[each.name] for each in reading.named)
+    return WristDiagnosis(
+        diagnosis,
+        effects,
+        search.base.fit.base,
+        state.fit.base,
+        absorbed,
+        search,
+        reading.classes,
+    )
 
 
 def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
@@ -161,204 +193,117 @@ def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
             raise InputError(f"{session.name}: no measured pose in the whole session")
 
 
-def _judged(
-    search: Search, ask: Ask, judge: Callable[[Place, Diagnosis], Refitted]
-) -> tuple[Place, Diagnosis, Refitted]:
-    """Return the answer of a search, where it was found, and what of it holds with its own laws.
+class _Judge:
+    """Fits to what was seen, judged by what was not."""
 
-    Slopes that mislead name what does not hold: then whole fits are asked, where the rest of what
-    they named leaves more than noise.
-    """
-    place, result = _answered(search, ask)
-    judged = judge(place, result)
-    if not place.fits and judged.base.variance >= INEXACT:
-        other = _by_law(search, ask, result)
-        if other is not None:
-            again = judge(*other)
-            if again.base.cost < judged.base.cost:
-                return *other, again
-    held = judged.base.extras
-    explains = bool(held) and judged.base.variance < INEXACT
-    if len(held) == len(result.findings) or explains or place.fits:
-        return place, result, judged
-    other = _whole(search.thorough(), search, ask)
-    if other is None or not _says_more(other[1], withdrawn(result, held)):
-        return place, result, judged
-    return *other, judge(*other)
+    def __init__(self, model: ErrorModel, units: tuple[UnitSession, ...], reading: Reading) -> None:
+        self._model = model
+        table = fit_base(model, units).problem.table if len(units) > 1 else None
+        observed = table or reading.state.fit.table.table
+        self._parts = parted(units, sealed_units(observed, HELD_OUT))
+        self._alone = fit_base(model, units)
+        self.stages = self._stages(reading.state.fit.base)
 
+    def _stages(self, fitted: BaseFit) -> list[HeldOut]:
+        """Return what is left by the nominal model, and with one effect more each time."""
+        effects = list(fitted.beyond().values())
+        return [self._left(effects[:count]) for count in range(len(effects) + 1)]
 
-def _answered(search: Search, ask: Ask) -> tuple[Place, Diagnosis]:
-    """Return the answer of a search, the quick one as a rule, and where it was found."""
-    place = search.quick()
-    result = ask(place)
-    strained = search.doubtful if result.findings else search.strained
-    # Fits found something else than slopes name, and these do not explain everything.
-    others = search.found != {each.name for each in result.findings}
-    otherwise = others and result.verdict != "effect"
-    doubted = _leaves_much(result) or strained or otherwise
-    if doubted and search.explained and not (strained or others):
-        # Slopes leave much of what its own law explains: its fit stands for it, no other is needed.
-        return replace(place, fits=dict.fromkeys(search.found, place.base)), result
-    if search.rough:
-        # So much is left that what no slope shows stands beside what was named, not in its place.
-        place, further = _furthered(search, ask, place, result)
-        little = MUCH * search.first_cost
-        if further is not result or any(fit.cost < little for fit in place.fits.values()):
-            return place, further
-    if doubted or result.verdict == "none":
-        # What presses the base takes up whole, within its tolerances: then nothing seems missing.
-        whole = search.thorough() if doubted else search.thorough(PRESSING)
-        other = _whole(whole, search, ask)
-        if other is not None and _says_more(other[1], result):
-            return other
-    return (place, result) if search.rough else _furthered(search, ask, place, result)
+    def _left(self, effects: Sequence[Effect]) -> HeldOut:
+        fitted = fit_base(self._model, self._parts.seen, effects, self._alone)
+        return unseen(fitted, self._parts, self._alone)
+
+    def kept(self, search: Search, reading: Reading) -> Reading:
+        """Return a reading without what makes the held-out part worse: it is not handed over."""
+        if not reading.named or not refuted(self.stages[0], self.stages[-1]):
+            return reading
+        self.stages = self.stages[:1]
+        return replace(
+            reading,
+            state=search.base,
+            named=(),
+            verdict="unknown",
+            unexplained=1.0,
+        )
+
+    def without(self, fitted: BaseFit, name: str) -> HeldOut:
+        """Return what is left without one of the effects."""
+        others = [each for own, each in fitted.beyond().items() if own != name]
+        return self._left(others) if others else self.stages[0]
 
 
-def _by_law(search: Search, ask: Ask, result: Diagnosis) -> tuple[Place, Diagnosis] | None:
-    """Return an answer in which whole fits tell apart what slopes did not.
-
-    None without a class, or where fits had led to its first member already.
-    """
-    unsure_at = [
-        n
-        for n, each in enumerate(result.findings)
-        if len(each.members) > 1 and each.name not in search.found
-    ]
-    if not unsure_at:
-        return None
-    before, unsure = result.findings[: unsure_at[0]], result.findings[unsure_at[0]]
-    place = search.by_law([each.name for each in before], unsure.names)
-    if place is None:
-        return None
-    more = _with_the_first(search, place, ask)
-    if not more.findings or more.findings[0].name not in unsure.names:
-        return None
-    first, *others = more.findings
-    left = [each for each in unsure.members if each not in first.members]
-    first = replace(first, members=(*first.members, *left))
-    more = replace(more, findings=(first, *others))
-    return place, _together(replace(result, findings=before), more)
-
-
-def _furthered(
-    search: Search, ask: Ask, place: Place, result: Diagnosis
-) -> tuple[Place, Diagnosis]:
-    """Return an answer with what whole fits find beside it, one after the other."""
-    fits: dict[str, BaseFit] = {}
-    while len(result.findings) < MOST_EXTRAS:
-        beside = search.further([each.name for each in result.findings], fits)
-        if beside is None:
-            break
-        more = _with_the_first(search, beside, ask)
-        found = [each.name for each in more.findings if each.name in beside.fits]
-        if not found:
-            break
-        fitted = [each for each in result.findings if each.name in beside.base.extras]
-        place, result = beside, _together(replace(result, findings=tuple(fitted)), more)
-        fits = {name: beside.fits[name] for name in found}
-    names = [each.name for each in result.findings]
-    end = search.ended(names)
-    return place if end is None else replace(place, fits=dict.fromkeys(names, end)), result
-
-
-def _whole(place: Place | None, search: Search, ask: Ask) -> tuple[Place, Diagnosis] | None:
-    """Return a place of whole fits and what it says; None without one."""
-    return None if place is None else (place, _with_the_first(search, place, ask))
-
-
-def _with_the_first(search: Search, place: Place, ask: Ask) -> Diagnosis:
-    """Return what a place of whole fits says, asked again beside the first that it names."""
-    found = ask(place)
-    whole = [each.name for each in found.findings if each.name in place.fits]
-    if not whole:
-        return found
-    return _confirmed(found, whole[0], ask(search.beside(place.fits[whole[0]])))
-
-
-def _confirmed(found: Diagnosis, name: str, beside: Diagnosis) -> Diagnosis:
-    """Return an answer with one finding, and of the others what is found beside it as well.
-
-    Slopes about the base alone say little of a second effect: flanges stand otherwise there.
-    """
-    (first,) = (each for each in found.findings if each.name == name)
-    if not beside.findings and len(found.findings) == 1:
-        return found
-    return _together(replace(found, findings=(first,)), beside)
-
-
-def _settled(
-    result: Diagnosis,
-    search: Search,
-    final: BaseFit,
-    ask: Ask,
-    limit: float,
-    by_laws: Callable[[Diagnosis], Diagnosis],
-) -> Diagnosis:
-    """Return an answer that says what the laws leave, fitted whole, instead of their slopes.
-
-    Then its errors are told `by_laws` too: a bushing that is many times as soft has other slopes.
-    """
-    left = ask(search.after(final))
-    if left.findings:
-        return result
-    share = left.unexplained.energy_share * min(final.cost / search.first_cost, 1.0)
-    verdict = "unknown" if share >= limit else "effect"
-    unexplained = replace(left.unexplained, energy_share=share)
-    return by_laws(replace(result, verdict=verdict, unexplained=unexplained))
-
-
-def _together(found: Diagnosis, beside: Diagnosis) -> Diagnosis:
-    """Return an answer with what was found and what was found beside it."""
-    return replace(
-        found,
-        verdict="unknown" if beside.verdict == "unknown" else "effect",
-        after=beside.after,
-        findings=(*found.findings, *beside.findings),
-        unexplained=beside.unexplained,
+def _finding(search: Search, found: Class, reading: Reading, judge: _Judge | None) -> Finding:
+    state = reading.state if judge is not None else search.best
+    fit: WristFit = state.fit
+    law, place = _law_and_place(found.name)
+    effect = fit.base.beyond()[found.name]
+    quantities = fit.table.table.reported
+    buys = {}
+    if judge is not None:
+        before = judge.without(fit.base, found.name)
+        buys = {q.key: bought(before, judge.stages[-1], q) for q in quantities}
+    normal = fit.base.problem.model.table.mechanism
+    theta = np.concatenate([s.still.theta[s.measured] for s in fit.base.problem.sessions])
+    points = turns_normal(fit.change(found.name)[:, :, None], normal.normal(normal.forward(theta)))
+    explained = 1.0 - found.left
+    return Finding(
+        tuple((*_law_and_place(name), share) for name, share in found.members.items()),
+        found.probability,
+        _values(state, found.name, effect),
+        found.log_gain,
+        explained,
+        buys,
+        compensable(find_law(law), place, points),
+        f"{find_law(law).sentence.format(place=place)}. "
+        f"Explains {100.0 * explained:.3g} % of the error above the noise.",
+        find_law(law).check,
     )
 
 
-def _begun(place: Place, result: Diagnosis) -> tuple[BaseFit, list[Effect]]:
-    """Return the base and the effects from which the fit of what was named begins."""
-    names = [each.name for each in result.findings]
-    whole = [place.fits[name] for name in names if name in place.fits]
-    base = whole[0] if whole else place.base
-    known = {each.name: each for each in place.candidates}
-    found = {name: fit.beyond()[name] for name, fit in place.fits.items()} | base.beyond()
-    return base, [
-        found.get(each.name) or _started(known[each.name], each.parameters)
-        for each in result.findings
-    ]
+def _law_and_place(name: str) -> tuple[str, str]:
+    law, _, place = name.partition("@")
+    return law, place
 
 
-def _leaves_much(result: Diagnosis) -> bool:
-    """Tell whether an answer leaves so much unknown that a thorough search is worth its time."""
-    named_most = result.findings and result.unexplained.energy_share < MUCH
-    return result.verdict == "unknown" and not named_most
+def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, float]]:
+    """Return the parameters of an effect and their standard uncertainties, in their units."""
+    places = state.fit.places[name]
+    known = {each.key: each for each in effect.parameters}
+    sigma = np.sqrt(np.diag(state.evidence.covariance)[places])
+    keys = [state.fit.base.problem.unknowns[place].key for place in places]
+    return {
+        key: (effect.estimates[key].value, float(own * known[key].scale))
+        for key, own in zip(keys, sigma, strict=True)
+    }
 
 
-def _says_more(one: Diagnosis, other: Diagnosis) -> bool:
-    """Tell whether an answer names something and leaves less unexplained than another."""
-    if not one.findings:
-        return False
-    return one.verdict == "effect" or (
-        one.unexplained.energy_share < other.unexplained.energy_share or not other.findings
-    )
+def _noise(found: Evidence, variance: Array) -> Array:
+    """Variance (u, 6) of a unit as its noise is known."""
+    return variance * min(found.excess, 1.0)
 
 
-def _with_all(fitter: Fitter, base: BaseFit, named: Sequence[Effect], final: BaseFit) -> BaseFit:
-    """Return the base fitted along with what the search found and what was named.
-
-    Where that is what was named alone, or where more effects end in a higher minimum, it is the fit
-    of what was named.
-    """
-    more = [each for each in named if each.name not in base.extras]
-    if {*base.extras, *(each.name for each in more)} == set(final.extras):
-        return final
-    whole = fitter(base.problem.sessions, [*base.beyond().values(), *more], base) if more else base
-    return min(final, whole, key=lambda each: each.cost)
+def _discrepancy(state: State, table: WristTable) -> Array:
+    """Variance (u, 6) above that noise."""
+    found, own = state.evidence, np.zeros_like(table.variance)
+    for quantity in table.table.quantities:
+        at = list(quantity.components)
+        count = max(int(table.table.measured[:, at].sum()), 1)
+        own[:, at] = table.variance[:, at] * found.left_of(quantity.name, count)
+    return own
 
 
-def _started(candidate: WristCandidate, parameters: dict[str, tuple[float, float]]) -> Effect:
-    shape = tuple(parameters[each.name][0] for each in candidate.recipe.shape)
-    return candidate.effect({name: value for name, (value, _) in parameters.items()}, shape)
+def _errors(table: Observations, left: HeldOut) -> dict[str, float]:
+    return {quantity.key: left.rmse(quantity) for quantity in table.reported}
+
+
+def _not_excited(problem: WristProblem, search: Search) -> tuple[NotExcited, ...]:
+    """Return the candidates of which a typical size would not show."""
+    silent_ones = []
+    for trial in problem.trials(search.base.fit):
+        if trial.name in {name for names in search.states for name in names}:
+            continue
+        strongest = max(search.base.evidence.strength(columns) for _, columns in trial.blocks)
+        law, place = _law_and_place(trial.name)
+        if strongest < DETECTABLE and law not in TOLERATED:
+            silent_ones.append(NotExcited(law, place, catalogue()[law].excited_by))
+    return tuple(silent_ones)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.diagnosis.observations import Labels
+from wrist_stiffness.inference.observations import Labels
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.figure import new_figure
 from wrist_stiffness.workflows.pictures.palette import FLOOR, colour

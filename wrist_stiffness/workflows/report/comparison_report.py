@@ -6,7 +6,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import ComparedModel, lengths
 from wrist_stiffness.campaign.noise_floor import SOURCES
-from wrist_stiffness.diagnosis import Quantity
+from wrist_stiffness.inference import Quantity
 from wrist_stiffness.workflows.compare import Compared
 from wrist_stiffness.workflows.pictures.dependence import draw_against
 from wrist_stiffness.workflows.pictures.errors import Bars, draw_bars, draw_map, draw_time_line

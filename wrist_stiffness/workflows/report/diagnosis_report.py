@@ -9,8 +9,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.sentences import Statement, Told, tell
 from wrist_stiffness.campaign.noise_floor import noise_floor
-from wrist_stiffness.campaign.searching.contributions import Contribution, worth_hearing
-from wrist_stiffness.diagnosis import Diagnosis, Finding, Observations, Quantity
+from wrist_stiffness.inference import Diagnosis, Finding, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.fit_report import plus_minus
 from wrist_stiffness.workflows.pictures.dependence import draw_against
@@ -33,27 +32,30 @@ from wrist_stiffness.workflows.report.parts import (
     unit_of,
 )
 from wrist_stiffness.workflows.verdict import (
-    PROVEN,
     class_of,
-    conditions_in_words,
     correction_of,
-    unexplained_share,
+    percent,
+    rest_lines,
     verdict_lines,
 )
 
 MOST_PICTURED = 4
 """Conditions that are drawn."""
 
+MOST_RANKED = 12
+"""Candidates that are told."""
+
 
 HOW = (
     "Registrations, encoder zeros, load tare and the tolerances of the wrist were fitted first; an "
     "effect counts only for what it explains beyond them.",
-    "A part of the recordings was put aside before looking: another session where there is one, "
-    "else the end of the only one. Errors and gains are those on that part.",
-    "p is the chance that the best of all effects of the catalogue looks as good without any "
-    "effect. Stability is the share of resamples of the recordings in which the same finding "
-    "comes first.",
-    "Effects in one class cannot be told apart by these recordings; the first is only the best.",
+    "Every set of effects was fitted whole and judged by its evidence: how probable the recordings "
+    "are under it, with all values integrated over their priors. The probabilities follow from it.",
+    "Beside the effects stands a discrepancy without a name, a smooth law of the conditions. What "
+    "it explains is left above the noise.",
+    "Held-out errors are those of another session where there is one, else of the end of the only "
+    "one, by models whose values were fitted to the rest.",
+    "Effects in one class cannot be told apart by these recordings.",
 )
 
 
@@ -96,7 +98,6 @@ def shown_by(
 
 def report_of_diagnosis(
     result: Diagnosis,
-    contributions: Sequence[Contribution],
     shown: Shown,
     recordings: Sequence[str],
     mistake: str,
@@ -109,8 +110,6 @@ def report_of_diagnosis(
     ----------
     result : Diagnosis
         What the statistics say.
-    contributions : sequence of Contribution
-        What each effect adds, largest first.
     shown : Shown
         For the pictures and the sentences.
     recordings : sequence of str
@@ -126,13 +125,11 @@ def report_of_diagnosis(
     sections = [
         Section("Findings", tuple(_findings(result, quantities))),
         Section("How much it brings", _fall(result, quantities)),
-        *_adding(
-            worth_hearing(contributions, result.verdict == "unknown", result.after), quantities
-        ),
+        Section("Every candidate", _ranking(result)),
         Section("Where it shows", _depends(shown)),
         Section("What remains", _remains(result)),
         Section("What these recordings cannot show", _not_excited(result)),
-        Section("What the refit took up first", _absorbed(result, notes)),
+        Section("Absorbed by calibration", _absorbed(result, notes)),
         Section("How it was computed", (Bullets(HOW),)),
         provenance_section(provenance),
     ]
@@ -150,15 +147,11 @@ def _verdict(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, 
     if result.findings:
         falls = [
             f"{q.name} from {number(result.before[q.key])} to {number(result.after[q.key])} "
-            f"{unit_of(q.unit)} (noise floor {number(result.noise_floor[q.key])})"
+            f"{unit_of(q.unit)} (instrument noise {number(result.noise[q.key])})"
             for q in quantities
         ]
-        lines.append(f"Adding it changes {' and '.join(falls)}, RMS on the part put aside.")
-    if result.verdict == "unknown":
-        lines.append(f"Not explained by any known effect: {unexplained_share(result)}.")
-        if result.unexplained.depends_on:
-            lines.append(f"It depends on {conditions_in_words(result.unexplained.depends_on)}.")
-    return tuple(lines)
+        lines.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
+    return tuple(typeset(line) for line in lines)
 
 
 def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]:
@@ -166,7 +159,7 @@ def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]
         return [Text("No effect of the catalogue was found.")]
     parts: list[Part] = []
     for place, finding in enumerate(result.findings, 1):
-        parts.append(Text(f"{place}. {class_of(finding)}. {typeset(finding.evidence)}."))
+        parts.append(Text(f"{place}. {class_of(finding)}. {typeset(finding.evidence)}"))
         if finding.check:
             parts.append(Text(f"To be sure: {finding.check}."))
         parts.append(_numbers(finding, quantities))
@@ -183,15 +176,13 @@ def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
             gain, error = finding.buys[q.key]
             rows.append(
                 (
-                    f"error of {q.name} on the part put aside falls by",
+                    f"held-out error of {q.name} falls by",
                     typeset(f"{plus_minus(gain, error)} {unit_of(q.unit)}"),
                 )
             )
     rows += [
-        ("residual with it over without it", number(finding.heldout_rmse_ratio)),
-        ("evidence (2 ln Bayes factor)", number(finding.delta_bic)),
-        ("p", f"{finding.p_value:.2g}"),
-        ("stability", f"{100.0 * finding.stability:.0f} %"),
+        ("probability", percent(finding.probability)),
+        ("log evidence against the model without it", f"{finding.log_gain:+.0f}"),
         ("correction", correction_of(finding)),
     ]
     return Table(f"Numbers of {finding.name}.", ("", "value"), tuple(rows))
@@ -204,29 +195,24 @@ def _fall(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[Part, ..
             ["before", "with the findings"],
             [result.before[q.key], result.after[q.key]],
             [0.0, 0.0],
-            {"noise floor": result.noise_floor[q.key]},
+            {"instrument noise": result.noise[q.key]},
         )
         for q in quantities
     ]
     caption = (
-        f"Error on the part that was put aside ({result.scope}), before and with the findings in "
-        "the model."
+        f"Error on the held-out part ({result.scope}), before and with the findings in the model."
     )
     return (drawn(draw_bars(bars), caption),)
 
 
-def _adding(parts: Sequence[Contribution], quantities: tuple[Quantity, ...]) -> list[Section]:
-    """Return how much parts of a wrist add to its error; nothing without any."""
-    if not parts:
-        return []
-    rows = []
-    for each in parts:
-        sizes = [each.sizes[q.key] for q in quantities]
-        cells = [typeset(plus_minus(size, error)) for size, error in sizes]
-        rows.append((each.name, *cells, PROVEN[each.kind]))
-    titles = ("effect", *(f"{q.name} [{unit_of(q.unit)}]" for q in quantities), "")
-    caption = "RMS of what each adds, beyond what a new set-up would take up. Look at the first."
-    return [Section("What adds most to the error", (Table(caption, titles, tuple(rows)),))]
+def _ranking(result: Diagnosis) -> tuple[Part, ...]:
+    """Return how the leading candidates stand."""
+    rows = tuple(
+        (each.name, percent(each.probability), f"{each.log_gain:+.0f}", each.why_not or "named")
+        for each in result.standings[:MOST_RANKED]
+    )
+    caption = "How the leading candidates stand; log evidence against the calibrated model."
+    return (Table(caption, ("effect", "probability", "log evidence", ""), rows),)
 
 
 def _depends(shown: Shown) -> tuple[Part, ...]:
@@ -250,15 +236,8 @@ def _depends(shown: Shown) -> tuple[Part, ...]:
 
 
 def _remains(result: Diagnosis) -> tuple[Part, ...]:
-    rest = result.unexplained
-    if not rest.evidence:
-        return (Text("Nothing beyond the noise."),)
-    text = f"{unexplained_share(result)}: {rest.evidence}."
-    parts: list[Part] = [Text(typeset(text[0].upper() + text[1:]))]
-    if rest.depends_on:
-        told = conditions_in_words(rest.depends_on)
-        parts.append(Text(f"Conditions that predict it, strongest first: {told}."))
-    return tuple(parts)
+    lines = rest_lines(result) or ["Nothing beyond the noise."]
+    return tuple(Text(typeset(line)) for line in lines)
 
 
 def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
@@ -273,7 +252,7 @@ def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
 
 def _absorbed(result: Diagnosis, notes: Sequence[str]) -> tuple[Part, ...]:
     parts: list[Part] = [Bullets(tuple(typeset(line) for line in result.absorbed))]
-    lost = [f"units left out as lost beams: {result.lost_units}"] if result.lost_units else []
-    if lost or notes:
-        parts += [Text("To be kept in mind:"), Bullets((*lost, *notes))]
+    told = (*result.notes, *notes)
+    if told:
+        parts += [Text("To be kept in mind:"), Bullets(told)]
     return tuple(parts)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isnan
 
 from wrist_stiffness.campaign.comparing.sentences import Change, Statement
-from wrist_stiffness.diagnosis import Observations
+from wrist_stiffness.inference import Observations
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.dependence import Against
 from wrist_stiffness.workflows.provenance import Provenance

@@ -1,0 +1,116 @@
+"""The evidence of a linear model with Gaussian priors is a multivariate normal density."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import integrate
+from scipy.stats import multivariate_normal, multivariate_t
+
+from wrist_stiffness.inference.evidence import (
+    TAIL,
+    Background,
+    Evidence,
+    Group,
+    Point,
+    evidence,
+    log_size_prior,
+)
+
+ROWS = 14
+
+
+def linear(rng, effects=None, columns=2, z=None):
+    """A point of a linear model with two groups beside it, at any unknowns."""
+    left, j = rng.normal(size=ROWS), rng.normal(size=(ROWS, columns))
+    at = np.zeros(columns) if z is None else np.array(z)
+    point = Point(
+        left + j @ at,
+        j,
+        at,
+        rng.uniform(0.5, 2.0, columns),
+        effects or {},
+        0.3 * rng.normal(size=(ROWS, 1)),
+        linear=True,
+    )
+    groups = (
+        Group("drift", "s", rng.normal(size=(ROWS, 3)), 0.5),
+        Group("the load", "s", rng.normal(size=(ROWS, 2))),
+    )
+    return point, Background(groups, 0.2)
+
+
+def density(point, ground, amplitude, excess):
+    """Logarithm of the density of the data themselves, by the definition."""
+    covariance = excess * np.eye(ROWS) + point.inexact @ point.inexact.T
+    covariance += point.columns @ np.diag(point.weight**-2.0) @ point.columns.T
+    for size, group in zip(amplitude, ground.groups, strict=True):
+        covariance += size**2 * group.columns @ group.columns.T
+    data = point.left - point.columns @ point.z
+    return multivariate_normal(np.zeros(ROWS), covariance).logpdf(data)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.lists(st.floats(0.1, 5.0), min_size=4, max_size=4),
+    st.floats(0.6, 4.0),
+)
+def test_differences_of_evidence_are_those_of_the_multivariate_normal(seed, sizes, excess):
+    point, ground = linear(np.random.default_rng(seed), z=[0.7, -1.1])
+    found, exact = [], []
+    for amplitude in (np.array(sizes[:2]), np.array(sizes[2:])):
+        own = Evidence(point, ground, amplitude, excess)
+        priors = own.log - density(point, ground, amplitude, excess)
+        found.append(priors)
+        # The hyperpriors alone: what the same amplitudes get where there are no data to speak of.
+        mute = replace(point, left=0.0 * point.left, z=0.0 * point.z)
+        exact.append(
+            Evidence(mute, ground, amplitude, excess).log - density(mute, ground, amplitude, excess)
+        )
+    assert found == pytest.approx(exact, abs=1e-6)
+    # And those hyperpriors differ as the amplitudes say, nothing else.
+    drift, load = np.array(sizes[:2]), np.array(sizes[2:])
+    by_hand = [
+        -0.5 * np.log(a[0] / 0.5) ** 2 + np.log(a[1] / (1.0 + a[1] ** 2)) for a in (drift, load)
+    ]
+    assert exact[1] - exact[0] == pytest.approx(by_hand[1] - by_hand[0], abs=1e-6)
+
+
+def test_where_the_fit_ended_does_not_matter_to_a_linear_model(rng):
+    near, ground = linear(rng)
+    far = near.moved(np.array([3.0, -2.0]))
+    logs = [evidence(point, ground).log for point in (near, far)]
+    assert logs[0] == pytest.approx(logs[1], abs=1e-8)
+
+
+def test_the_prior_of_a_size_is_a_multivariate_t():
+    at = np.array([0.3, -1.2, 4.0])
+    expected = multivariate_t(np.zeros(3), np.eye(3), TAIL).logpdf(at)
+    assert log_size_prior(float(at @ at), 3) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("size", [0.0, 3.0, 30.0])
+def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size):
+    column = rng.normal(size=(ROWS, 1))
+    left = size * column[:, 0] + rng.normal(size=ROWS)
+    mute = Background((Group("none", "s", np.zeros((ROWS, 1)), 1.0),), 0.2)
+    empty = np.zeros((ROWS, 0))
+    with_it = Point(left, -column, np.zeros(1), np.ones(1), {"a": np.arange(1)}, empty, linear=True)
+    with_it = with_it.moved(np.array([float(left @ column[:, 0] / (column[:, 0] @ column[:, 0]))]))
+    without = Point(left, empty, np.zeros(0), np.zeros(0), {}, empty)
+
+    def integrand(z):
+        change = np.sum((left - column[:, 0] * z) ** 2) - np.sum(left**2)
+        return np.exp(-0.5 * change - best) * np.exp(log_size_prior(z * z, 1))
+
+    z = float(left @ column[:, 0] / (column[:, 0] @ column[:, 0]))
+    best = 0.5 * float(column[:, 0] @ column[:, 0]) * z * z
+    exact = np.log(integrate.quad(integrand, z - 5.0, z + 5.0, points=[z], limit=200)[0]) + best
+    one = np.array([1.0])
+    gain = Evidence(with_it, mute, one, 1.0).log - Evidence(without, mute, one, 1.0).log
+    assert gain == pytest.approx(exact, abs=0.1)
+    first_order = Evidence(without, mute, one, 1.0).gains([-column])[0][0]
+    assert first_order == pytest.approx(exact, abs=0.1)

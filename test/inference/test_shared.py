@@ -1,0 +1,71 @@
+"""Scatter that units of a stand share: against the dense covariance, and in fits."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.shared import Apart, own_covariance
+from wrist_stiffness.inference.whitening import NoiseModel, component_factors
+
+STAND = np.array([0, 0, -1, 1, 1, 1, -1])
+
+
+@pytest.fixture
+def table():
+    rng = np.random.default_rng(4)
+    shared = rng.normal(size=(7, 3, 2))
+    covariance = shared @ np.swapaxes(shared, 1, 2) + np.diag([0.5, 1.0, 2.0])
+    values = rng.normal(size=(7, 3))
+    values[4, 1] = np.nan
+    return Observations(values, {}, covariance, stand=STAND, shared=shared)
+
+
+def whitened(table, columns):
+    own = own_covariance(table, table.covariance)
+    factors = component_factors(own, table.measured)
+    return Apart(table, factors)(np.where(table.measured[:, :, None], columns, 0.0))
+
+
+def dense(table):
+    """Return the covariance of all numbers of the table, (21, 21)."""
+    total = np.zeros((7, 3, 7, 3))
+    for i in range(7):
+        for j in range(7):
+            alike = STAND[i] == STAND[j] >= 0
+            if i == j:
+                total[i, :, j] = table.covariance[i]
+            elif alike:
+                total[i, :, j] = table.shared[i] @ table.shared[j].T
+    return total.reshape(21, 21)
+
+
+def test_products_of_whitened_columns_are_those_by_the_dense_covariance(table):
+    columns = np.random.default_rng(5).normal(size=(7, 3, 4))
+    white = whitened(table, columns).reshape(21, 4)
+    seen = table.measured.ravel()
+    flat = columns.reshape(21, 4)[seen]
+    exact = flat.T @ np.linalg.solve(dense(table)[np.ix_(seen, seen)], flat)
+    assert white.T @ white == pytest.approx(exact, rel=1e-9)
+
+
+def test_part_of_a_table_shares_what_is_left_of_it(table):
+    rows = np.array([0, 2, 3, 5])
+    part = table.take(rows)
+    columns = np.random.default_rng(6).normal(size=(4, 3, 1))
+    white = whitened(part, columns)
+    seen = np.repeat(3 * rows, 3) + np.tile(np.arange(3), 4)
+    flat = columns.reshape(-1)
+    exact = flat @ np.linalg.solve(dense(table)[np.ix_(seen, seen)], flat)
+    assert float(np.sum(white**2)) == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_noise_model_whitens_by_what_is_shared_and_what_is_beyond(table):
+    beyond, scale = np.diag([0.3, 0.2, 0.1]), 2.5
+    noise = NoiseModel(beyond, 0.0, 1.0, np.inf, "given", scale=scale)
+    columns = np.random.default_rng(7).normal(size=(7, 3, 4))
+    white = noise.whiten(table, columns)
+    seen = table.measured.ravel()
+    total = scale * (dense(table) + np.kron(np.eye(7), beyond))
+    flat = columns.reshape(21, 4)[seen]
+    exact = flat.T @ np.linalg.solve(total[np.ix_(seen, seen)], flat)
+    assert white.T @ white == pytest.approx(exact, rel=1e-9)

@@ -1,0 +1,26 @@
+"""One likelihood, one search: which effects are in the data, and how sure that is.
+
+Knows neither ROS nor this mechanism; `docs/inference.md` explains it.
+"""
+
+from wrist_stiffness.inference.answer import Diagnosis, Finding
+from wrist_stiffness.inference.candidates import Candidate, Parameter, ShapeParameter
+from wrist_stiffness.inference.diagnose import TableDiagnosis, diagnose
+from wrist_stiffness.inference.nuisance import Nuisance
+from wrist_stiffness.inference.observations import Observations, Quantity
+from wrist_stiffness.inference.predictor import Predictor, load_predictor
+
+__all__ = [
+    "Candidate",
+    "Diagnosis",
+    "Finding",
+    "Nuisance",
+    "Observations",
+    "Parameter",
+    "Predictor",
+    "Quantity",
+    "ShapeParameter",
+    "TableDiagnosis",
+    "diagnose",
+    "load_predictor",
+]

@@ -1,0 +1,425 @@
+"""From the sets that a search fitted to probabilities: what is missing, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from wrist_stiffness.inference.search import Names, Search, State
+
+SCHEMA = 2
+
+NAMING = 0.9
+"""Probability from which an effect is named, by default."""
+
+MEMBER = 0.05
+"""Share of the probability of a class from which an effect is one of its members."""
+
+MOST_MEMBERS = 8
+"""A class of more effects names nothing."""
+
+OUTSIDE = 0.2
+"""Prior odds that what is missing is outside the catalogue, against inside it (assumed)."""
+
+SECOND = 0.2
+"""Prior probability that beside an effect something else is missing (assumed)."""
+
+LEAST_REST = 1e-3
+"""Least share of an effect's energy that something else beside it may have: its logarithm is evenly
+spread from there to 1 (assumed)."""
+
+Verdict = Literal["effect", "none", "unknown"]
+
+
+@dataclass(frozen=True)
+class Class:
+    """An effect of the most probable set, and those that these data cannot tell from it.
+
+    Parameters
+    ----------
+    members : dict of str to float
+        Probability of each to be the one, most probable first.
+    probability : float
+        That one of them is missing in the model.
+    rest : float
+        How much of it is left in its own shape: see `Evidence.rest`.
+    left : float
+        Share of what was left without it that is left with it, above the noise.
+    log_gain : float
+        Natural logarithm of the evidence with it over that without it.
+    """
+
+    members: Mapping[str, float]
+    probability: float
+    rest: float
+    left: float
+    log_gain: float
+
+    @property
+    def name(self) -> str:
+        """Most probable member."""
+        return next(iter(self.members))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a candidate stands.
+
+    Parameters
+    ----------
+    name : str
+        `effect@component`.
+    probability : float
+        That it is missing in the model.
+    log_gain : float
+        Gain of log evidence by the best set with it over the nominal model; to first order where no
+        set with it was worth a fit.
+    fitted : bool
+        Whether one was.
+    why_not : str
+        Why it is not named; empty where it is.
+    """
+
+    name: str
+    probability: float
+    log_gain: float
+    fitted: bool
+    why_not: str
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What the sets of a search say.
+
+    Parameters
+    ----------
+    state : State
+        The set of everything that is named, or the nominal model.
+    classes : tuple of Class
+        Of the most probable set, the surest first; those from `naming` on are named.
+    named : tuple of Class
+        These.
+    verdict : str
+        `effect`, `none` or `unknown`.
+    probability : float
+        Of the verdict.
+    depends_on : dict of str to float
+        On what that which is left depends: share of its energy by question, largest first.
+    unexplained : float
+        Share of what the nominal model left above the noise that is left, in [0, 1].
+    """
+
+    state: State
+    classes: tuple[Class, ...]
+    named: tuple[Class, ...]
+    verdict: Verdict
+    probability: float
+    depends_on: Mapping[str, float]
+    unexplained: float
+
+
+def probabilities(search: Search) -> dict[Names, float]:
+    """Return the probability of each set, of single effects that were not fitted to first order.
+
+    A candidate of which the data say nothing keeps its prior probability, whatever is recorded: it
+    does not count.
+    """
+    logs = {names: state.log for names, state in search.states.items()}
+    for name, each in search.first_order.items():
+        if each.gain > 0.0:
+            first = search.base.log + each.gain - search.price
+            logs.setdefault(frozenset((name,)), first)
+    values = np.array(list(logs.values()))
+    weights = np.exp(values - values.max())
+    return dict(zip(logs, (weights / weights.sum()).tolist(), strict=True))
+
+
+def stands_in(rest: float) -> float:
+    """Return the probability that an effect only stands in for one outside the catalogue.
+
+    What is outside leaves any share of itself in the shape of its best imitation; an effect that is
+    there leaves nothing there, or now and then a second one that looks like it, of any size.
+
+    Parameters
+    ----------
+    rest : float
+        Share that is left in its shape, 0 where it is no more than noise.
+    """
+    rest = min(rest, 1.0)
+    if rest <= LEAST_REST:
+        return OUTSIDE * LEAST_REST / (OUTSIDE * LEAST_REST + 1.0)
+    there = SECOND / (rest * -np.log(LEAST_REST))
+    return float(OUTSIDE / (OUTSIDE + there))
+
+
+def read(search: Search, naming: float = NAMING) -> Reading:
+    """Return what the sets of a search say.
+
+    Parameters
+    ----------
+    search : Search
+        That ended.
+    naming : float
+        Probability from which an effect is named.
+    """
+    weights = probabilities(search)
+    best = search.best
+    classes = sorted(
+        (_class_of(search, weights, best, name) for name in best.names),
+        key=lambda each: (-each.probability, -each.log_gain),
+    )
+    named = tuple(
+        each for each in classes if each.probability >= naming and len(each.members) <= MOST_MEMBERS
+    )
+    state = search.states.get(frozenset(each.name for each in named), best)
+    if not named:
+        state = search.base
+    first, left = search.base.evidence.unexplained, state.evidence.unexplained
+    share = min(left / first, 1.0) if first > 0.0 else float(left > 0.0)
+    nothing = weights.get(frozenset(), 0.0) * (not search.base.rough)
+    verdict: Verdict = "none"
+    probability = nothing
+    if named:
+        verdict, probability = "effect", named[0].probability
+    elif search.base.rough or nothing < 1.0 - naming:
+        verdict, probability = "unknown", 1.0 - nothing
+    return Reading(state, tuple(classes), named, verdict, probability, _depends_on(state), share)
+
+
+def _class_of(search: Search, weights: Mapping[Names, float], best: State, name: str) -> Class:
+    others = best.names - {name}
+    found = {
+        next(iter(names - others)): weight
+        for names, weight in weights.items()
+        if len(names) == len(best.names) and others < names
+    }
+    total = sum(found.values())
+    members = {
+        each: weight / total
+        for each, weight in sorted(found.items(), key=lambda pair: -pair[1])
+        if weight >= MEMBER * total
+    }
+    present = sum(w for names, w in weights.items() if not names.isdisjoint(members))
+    without = search.states.get(others, search.base)
+    before, after = without.evidence.unexplained, best.evidence.unexplained
+    left = min(after / before, 1.0) if before > 0.0 else 0.0
+    rest = best.evidence.rest(name) if best.rough else 0.0
+    sure = present * (1.0 - stands_in(rest))
+    return Class(members, sure, rest, left, best.evidence.log - without.evidence.log)
+
+
+def _depends_on(state: State) -> dict[str, float]:
+    found = state.evidence
+    energies: dict[str, float] = {}
+    groups = zip(found.background.groups, found.energies, found.discrepant, strict=True)
+    for each, energy, wrong in groups:
+        if wrong:
+            energies[each.name] = energies.get(each.name, 0.0) + float(energy)
+    total = sum(energies.values())
+    if not found.unexplained:
+        return {}
+    shares = {name: energy / total for name, energy in energies.items() if energy > MEMBER * total}
+    return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
+
+
+def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
+    """Return how every candidate stands, the most probable first."""
+    weights = probabilities(search)
+    nominal = search.base.evidence.log
+    named = {name for each in reading.named for name in each.members}
+    chance = {
+        name: sum(w for names, w in weights.items() if name in names)
+        for name in {name for names in weights for name in names}
+    }
+    fitted: dict[str, float] = {}
+    for names, state in search.states.items():
+        for name in names:
+            gain = state.evidence.log - nominal
+            fitted[name] = max(gain, fitted.get(name, gain))
+    found = []
+    for name, first in search.first_order.items():
+        gain = fitted.get(name, first.gain)
+        probability = chance.get(name, 0.0)
+        why = "" if name in named else _why_not(gain, probability, name in fitted)
+        found.append(Standing(name, probability, gain, name in fitted, why))
+    return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
+
+
+def _why_not(gain: float, probability: float, fitted: bool) -> str:
+    if gain < 1.0:
+        return "explains no more than chance would"
+    if probability < MEMBER:
+        return "others explain far more" if fitted else "others explain far more, to first order"
+    return "not sure enough to be named"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect that is missing, or a class of effects that these data cannot tell apart.
+
+    Parameters
+    ----------
+    members : tuple of (str, str, float)
+        Effect, component and probability to be the one, most probable first.
+    probability : float
+        That one of them is missing.
+    parameters : dict
+        Estimate and one standard uncertainty of the most probable member, by name.
+    log_gain : float
+        Natural logarithm of the evidence with it over that without it.
+    explains : float
+        Share of the error above the noise that it explains.
+    buys : dict
+        Fall of the held-out error and its standard uncertainty, by quantity and unit.
+    compensable, evidence, check : str
+        For the technician.
+    """
+
+    members: tuple[tuple[str, str, float], ...]
+    probability: float
+    parameters: Mapping[str, tuple[float, float]]
+    log_gain: float
+    explains: float
+    buys: Mapping[str, tuple[float, float]]
+    compensable: str
+    evidence: str
+    check: str
+
+    @property
+    def name(self) -> str:
+        """Most probable member as ``effect@component``."""
+        return self.names[0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All members as ``effect@component``."""
+        return tuple(f"{effect}@{component}" for effect, component, _ in self.members)
+
+
+@dataclass(frozen=True)
+class NotExcited:
+    """A candidate that these data could not have shown.
+
+    Parameters
+    ----------
+    effect, component : str
+        Which.
+    needs : str
+        What to record.
+    """
+
+    effect: str
+    component: str
+    needs: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Answer to the question which physical effect is missing.
+
+    Parameters
+    ----------
+    verdict : str
+        ``effect``, ``none`` or ``unknown``.
+    probability : float
+        Of the verdict.
+    noise : dict
+        Scatter of one unit as instrument and dwells tell it, root mean square by quantity and unit.
+    discrepancy : dict
+        What the model with the findings leaves above that noise, likewise.
+    before, after : dict
+        Error on the held-out units, without and with the findings, likewise.
+    findings : tuple of Finding
+        The surest first.
+    suspects : tuple of Finding
+        What is not sure enough to be named.
+    depends_on : dict of str to float
+        On what that which is left depends, with its share.
+    unexplained : float
+        Share of the error above the noise that no finding explains.
+    standings : tuple of Standing
+        Every candidate, most probable first.
+    not_excited : tuple of NotExcited
+        What these data cannot tell.
+    absorbed : tuple of str
+        What calibration took up, largest first.
+    scope : str
+        What the held-out units are.
+    notes : tuple of str
+        What a person should know of it.
+    """
+
+    verdict: Verdict
+    probability: float
+    noise: Mapping[str, float]
+    discrepancy: Mapping[str, float]
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    findings: tuple[Finding, ...]
+    suspects: tuple[Finding, ...]
+    depends_on: Mapping[str, float]
+    unexplained: float
+    standings: tuple[Standing, ...]
+    not_excited: tuple[NotExcited, ...]
+    absorbed: tuple[str, ...] = ()
+    scope: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+    def as_json(self, ranking: bool = False) -> dict[str, Any]:
+        """Return plain containers for `json.dump`.
+
+        Parameters
+        ----------
+        ranking : bool
+            Whether every candidate is told.
+        """
+        found: dict[str, Any] = {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "probability": self.probability,
+            "scope": self.scope,
+            "noise": dict(self.noise),
+            "discrepancy": dict(self.discrepancy),
+            "before": {f"rms_{key}": value for key, value in self.before.items()},
+            "after": {f"rms_{key}": value for key, value in self.after.items()},
+            "findings": [_finding(each) for each in self.findings],
+            "suspects": [_finding(each) for each in self.suspects],
+            "unexplained": {"share": self.unexplained, "depends_on": dict(self.depends_on)},
+            "not_excited": [
+                {"effect": each.effect, "component": each.component, "needs": each.needs}
+                for each in self.not_excited
+            ],
+            "absorbed": list(self.absorbed),
+        }
+        if ranking:
+            found["ranking"] = [
+                {
+                    "candidate": each.name,
+                    "probability": each.probability,
+                    "log_gain": each.log_gain,
+                    "fitted": each.fitted,
+                    "why_not": each.why_not,
+                }
+                for each in self.standings
+            ]
+        return found
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {
+        "class": [
+            {"effect": effect, "component": component, "probability": probability}
+            for effect, component, probability in finding.members
+        ],
+        "probability": finding.probability,
+        "parameters": {name: list(value) for name, value in finding.parameters.items()},
+        "log_gain": finding.log_gain,
+        "explains": finding.explains,
+        "buys": {key: list(gain) for key, gain in finding.buys.items()},
+        "compensable": finding.compensable,
+        "evidence": finding.evidence,
+        "check": finding.check,
+    }

@@ -1,0 +1,124 @@
+"""Candidate effects: each a function from parameters to a change of the observations.
+
+A candidate is linear in its `parameters` and may be non-linear in its `shape` (a gap, a time
+constant, an order).  For a fixed shape it is a block of columns, so every question about it is
+linear algebra; the shape itself is searched on its grid (variable projection).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.observations import Array, Observations
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A factor in front of one column.
+
+    Parameters
+    ----------
+    name : str
+        Name with its unit, for example ``flexibility_percent``.
+    lower, upper : float
+        What is physically possible.
+    plausible : float, optional
+        Size that would not surprise: the scale of its prior, and what decides whether the data
+        could have shown the effect.
+    scale : float, optional
+        Usual size, if that is another one: then the scale of its prior.  Without either it is the
+        size at which the column does as much as the base leaves.
+    """
+
+    name: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    plausible: float | None = None
+    scale: float | None = None
+
+
+@dataclass(frozen=True)
+class ShapeParameter:
+    """A parameter on which the columns depend non-linearly, with the values to try first.
+
+    Parameters
+    ----------
+    name : str
+        Name with its unit, for example ``time_constant_s``.
+    grid : tuple of float
+        Increasing values; the search stays between the first and the last.
+    """
+
+    name: str
+    grid: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse a grid that cannot be searched."""
+        if len(self.grid) < 2 or any(np.diff(self.grid) <= 0):
+            raise InputError(f"grid of {self.name!r} needs at least two increasing values")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one place.
+
+    Parameters
+    ----------
+    effect, component : str
+        What, and where.
+    parameters : tuple of Parameter
+        One for each of the k columns.
+    columns : callable
+        (observations, shape values) -> (n, m, k) change of the observations per parameter.
+    shape : tuple of ShapeParameter, optional
+        Non-linear parameters, in the order in which `columns` takes them.
+    needs : str, optional
+        What data would excite the effect.
+    evidence, check : str, optional
+        What a technician would see; what to do on the machine to be sure.
+    compensable : str, optional
+        ``yes``, ``needs_signal`` or ``no``.
+    inexactness : float, optional
+        Share of what the effect does by which its law may be wrong under any one condition (0.05:
+        5 %); what is left of a large effect within it is no evidence for another one.
+    """
+
+    effect: str
+    component: str
+    parameters: tuple[Parameter, ...]
+    columns: Callable[[Observations, tuple[float, ...]], Array]
+    shape: tuple[ShapeParameter, ...] = ()
+    needs: str = "more varied conditions"
+    evidence: str = ""
+    check: str = ""
+    compensable: str = "yes"
+    inexactness: float = 0.05
+
+    @property
+    def name(self) -> str:
+        """Effect and place as one word, ``effect@component``."""
+        return f"{self.effect}@{self.component}"
+
+    @property
+    def shapes(self) -> list[tuple[float, ...]]:
+        """Every combination of the grids; one empty shape for a linear effect."""
+        return list(product(*(shape.grid for shape in self.shape)))
+
+    def evaluate(self, observations: Observations, shape: tuple[float, ...]) -> Array:
+        """Columns at one shape, (n, m, k).
+
+        Raises
+        ------
+        InputError
+            If the columns have another size than announced or are not numbers.
+        """
+        columns = np.asarray(self.columns(observations, shape), dtype=np.float64)
+        expected = (*observations.values.shape, len(self.parameters))
+        if columns.shape != expected:
+            raise InputError(f"{self.name} returned columns {columns.shape}, not {expected}")
+        if not np.isfinite(columns).all():
+            raise InputError(f"{self.name} returned a column that is not a number")
+        return columns

@@ -1,0 +1,549 @@
+"""How probable a set of effects is, given a table: one marginal likelihood for every question.
+
+Residuals r, whitened to N numbers of unit scatter, are linear in all that is unknown about the
+point z0 where a fit ended:
+
+    r + J (z - z0) + F b = noise,   noise ~ N(0, v),   z ~ prior,   b ~ N(0, a_g^2)
+
+J holds set-up, tolerances and effects; F what has no name: the slow drift of an instrument, and the
+discrepancy of the model over the conditions (Kennedy and O'Hagan 2001).  The amplitudes a_g of its
+groups and the excess scatter v are those of the largest evidence (MacKay 1992); everything else is
+integrated (Laplace's method, exact where a law is linear).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg.lapack import dpotri
+from scipy.special import gammaln
+
+Array = NDArray[np.float64]
+
+TAIL = 2.0
+"""Degrees of freedom of the prior of an effect's size (assumed), a multivariate t: a fault ten
+times as large as the effect of an ordinary wrist is rare, but no wonder."""
+
+MISFIT = 0.05
+"""Prior probability that units scatter more than is known of their noise (assumed)."""
+
+MOST_MISFIT = 3.0
+"""Standard deviation of the logarithm of that excess variance (assumed)."""
+
+OUTSIDE = 0.2
+"""Prior probability that a model is wrong in a way that no effect of the catalogue is (assumed),
+spread evenly over the groups of the discrepancy."""
+
+SURPRISE = 2.0
+"""Standard deviations of the logarithm of a drift's amplitude that no instrument reaches, but one
+of 40."""
+
+OFF = 1e-3
+"""Amplitude of a group that is absent, in scatters of a unit."""
+
+LAST_STEPS = 3
+"""Steps to the most probable unknowns where slopes hold everywhere; only the tails of the priors
+ask for more than one."""
+
+MOST_STEPS, ENOUGH = 15, 0.1
+"""Steps of the search for the amplitudes, and the gain of log evidence below which it ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Columns of one kind that have no name, with one amplitude.
+
+    Parameters
+    ----------
+    name : str
+        What they depend on.
+    quantity : str
+        Name of the quantity that they change.
+    columns : (N, k) float
+        Whitened, for an amplitude of 1.
+    expected : float
+        Amplitude that is expected, of an instrument's drift; 0 for a discrepancy, which may be
+        absent.
+    width : float
+        Standard deviation of the logarithm of the amplitude about the expected one.
+    """
+
+    name: str
+    quantity: str
+    columns: Array
+    expected: float = 0.0
+    width: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Background:
+    """All groups of a table, put together once for all sets of effects.
+
+    Parameters
+    ----------
+    groups : tuple of Group
+        None where nothing but the noise is without a name.
+    noise_width : float
+        Standard deviation of the logarithm of the noise's variance about the known one.
+    """
+
+    groups: tuple[Group, ...]
+    noise_width: float
+
+    @cached_property
+    def columns(self) -> Array:
+        """Columns of all groups, (N, q)."""
+        return np.concatenate([each.columns for each in self.groups], axis=1)
+
+    @cached_property
+    def group(self) -> NDArray[np.intp]:
+        """Number of the group of each column, (q,)."""
+        return np.repeat(np.arange(len(self.groups)), self.sizes)
+
+    @cached_property
+    def sizes(self) -> NDArray[np.intp]:
+        """Columns in each group, (g,)."""
+        return np.array([each.columns.shape[1] for each in self.groups], dtype=np.intp)
+
+    @cached_property
+    def optional(self) -> NDArray[np.bool_]:
+        """Which groups belong to the discrepancy of the model, (g,)."""
+        return np.array([each.expected == 0.0 for each in self.groups], dtype=bool)
+
+    @cached_property
+    def log_odds(self) -> float:
+        """Log prior odds of one group of the discrepancy to be there."""
+        chance = OUTSIDE / max(int(np.count_nonzero(self.optional)), 1)
+        return float(np.log(chance / (1.0 - chance)))
+
+    @cached_property
+    def gram(self) -> Array:
+        """Products of all columns, (q, q)."""
+        if not self.groups:
+            return np.zeros((0, 0))
+        return np.asarray(self.columns.T @ self.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where a fit of a set of effects ended, and all slopes there; whitened.
+
+    Parameters
+    ----------
+    left : (N,) float
+        What the fit leaves.
+    columns : (N, p) float
+        Change of that by each unknown.
+    z : (p,) float
+        Unknowns, from the means of their priors and in their standard deviations.
+    weight : (p,) float
+        Weights of the Gaussian priors of set-up and tolerances, nearly 0 where there is none.
+    effects : dict of str to (k,) int
+        Places of the unknowns of each effect, which have the prior of effects.
+    inexact : (N, l) float
+        What the laws of the effects may leave because no law is exact.
+    varied : dict of str to (N, l) float
+        What each effect would add if its size changed with the conditions by its own size.
+    linear : bool
+        Whether the slopes hold everywhere: then the unknowns follow the amplitudes.
+    """
+
+    left: Array
+    columns: Array
+    z: Array
+    weight: Array
+    effects: Mapping[str, NDArray[np.intp]]
+    inexact: Array
+    varied: Mapping[str, Array] = field(default_factory=dict)
+    linear: bool = False
+    _beside: dict[int, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+
+    def moved(self, step: Array) -> Point:
+        """Return the point a step (p,) further on, as the slopes tell."""
+        return replace(self, left=self.left + self.columns @ step, z=self.z + step)
+
+    def beside(self, ground: Background) -> tuple[Array, Array]:
+        """Return all columns, those of a background last, and their products; worked out once."""
+        if id(ground) not in self._beside:
+            named = np.concatenate([self.columns, self.inexact], axis=1)
+            beside = ground.columns if ground.groups else named[:, :0]
+            columns = np.concatenate([named, beside], axis=1)
+            own = named.shape[1]
+            gram = np.empty((columns.shape[1], columns.shape[1]))
+            gram[:own, :own] = named.T @ named
+            gram[:own, own:] = named.T @ beside
+            gram[own:, :own] = gram[:own, own:].T
+            gram[own:, own:] = ground.gram
+            self._beside[id(ground)] = columns, gram
+        return self._beside[id(ground)]
+
+
+def log_size_prior(square: float, count: int) -> float:
+    """Return the log density of an effect's `count` unknowns whose squares sum up to `square`."""
+    density = gammaln(0.5 * (TAIL + count)) - gammaln(0.5 * TAIL)
+    density -= 0.5 * count * np.log(TAIL * np.pi)
+    return float(density - 0.5 * (TAIL + count) * np.log1p(square / TAIL))
+
+
+def size_weight(square: float, count: int) -> float:
+    """Return the square of the Gaussian weight that has the slope of that prior."""
+    return (TAIL + count) / (TAIL + square)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """A set of effects at its best amplitudes.
+
+    Parameters
+    ----------
+    point : Point
+        Where its fit ended.
+    background : Background
+        Of the table.
+    amplitude : (g,) float
+        Of the groups.
+    excess : float
+        Variance of what is left of each number once everything is explained, in units of its known
+        noise.
+    """
+
+    point: Point
+    background: Background
+    amplitude: Array
+    excess: float
+
+    @cached_property
+    def _known(self) -> tuple[Array, Array, Array, float]:
+        """Columns, their products, those with what is left, and its square."""
+        point = self.point
+        columns, gram = point.beside(self.background)
+        return columns, gram, columns.T @ point.left, float(point.left @ point.left)
+
+    @cached_property
+    def _priors(self) -> tuple[Array, Array, float]:
+        """Precision and offset of what has a name, and by how much no Gaussian is its prior."""
+        point = self.point
+        extra = point.inexact.shape[1]
+        precision = np.concatenate([point.weight**2, np.ones(extra)])
+        offset = np.concatenate([point.z, np.zeros(extra)])
+        correction = 0.0
+        for places in point.effects.values():
+            count, square = len(places), float(np.sum(point.z[places] ** 2))
+            own = size_weight(square, count)
+            precision[places] = own
+            gaussian = 0.5 * (count * np.log(own / (2.0 * np.pi)) - own * square)
+            correction += log_size_prior(square, count) - gaussian
+        return precision, offset, correction
+
+    @cached_property
+    def precision(self) -> Array:
+        """Precision of the priors of all columns."""
+        return np.concatenate([self._priors[0], 1.0 / self.amplitude[self.background.group] ** 2])
+
+    @cached_property
+    def _solved(self) -> tuple[Array, Array, Array, Array]:
+        """Scaled Cholesky factor of the information, the scales, the step, and the slope."""
+        _, gram, target, _ = self._known
+        precision, offset, _ = self._priors
+        information = gram / self.excess
+        information[np.diag_indices_from(information)] += self.precision
+        slope = target / self.excess
+        slope[: len(offset)] += precision * offset
+        scale = 1.0 / np.sqrt(np.diag(information))
+        factor, _ = cho_factor(information * scale[:, None] * scale, lower=True, check_finite=False)
+        step = -scale * cho_solve((factor, True), scale * slope, check_finite=False)
+        return factor, scale, step, slope
+
+    @cached_property
+    def log(self) -> float:
+        """Natural logarithm of the evidence, up to what all sets of a table share."""
+        factor, scale, step, slope = self._solved
+        precision, offset, correction = self._priors
+        n, ground = len(self.point.left), self.background
+        cost = self._known[3] / self.excess + float(precision @ offset**2 + slope @ step)
+        volume = 2.0 * float(np.sum(np.log(np.diag(factor))) - np.sum(np.log(scale)))
+        log = -0.5 * (n * np.log(self.excess) + cost + volume - np.sum(np.log(self.precision)))
+        log += correction + _log_excess(np.array([self.excess]), ground.noise_width)[0]
+        for size, group, count in zip(self.amplitude, ground.groups, ground.sizes, strict=True):
+            log += _log_amplitude(float(size), group, int(count))
+        log += ground.log_odds * np.count_nonzero(ground.optional & (self.amplitude > OFF))
+        return float(log)
+
+    @property
+    def step(self) -> Array:
+        """Most probable change of the unknowns (p,) from where the fit ended."""
+        return self._solved[2][: self.point.columns.shape[1]]
+
+    @property
+    def unnamed(self) -> Array:
+        """Most probable values of the columns of the background, (q,)."""
+        return self._solved[2][len(self._priors[0]) :]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of all unknowns, those without a name included."""
+        factor, scale, _, _ = self._solved
+        if not len(scale):
+            return np.zeros((0, 0))
+        lower, _ = dpotri(factor, lower=1)
+        whole = np.tril(lower) + np.tril(lower, -1).T
+        return np.asarray(whole * scale[:, None] * scale)
+
+    @cached_property
+    def square(self) -> float:
+        """Sum of squares of what is left when everything is explained."""
+        _, gram, target, own = self._known
+        step = self._solved[2]
+        return float(own + 2.0 * target @ step + step @ gram @ step)
+
+    @cached_property
+    def _beyond(self) -> Array:
+        """Products (q, q) of what of the background's columns what has a name could not take up."""
+        ground = self.background
+        own = len(self.precision) - len(ground.group)
+        gram = self._known[1]
+        information = gram[:own, :own] + np.diag(self.excess * self.precision[:own])
+        scale = 1.0 / np.sqrt(np.diag(information))
+        factor, _ = cho_factor(information * scale[:, None] * scale, lower=True, check_finite=False)
+        mixed = scale[:, None] * gram[:own, own:]
+        taken = solve_triangular(factor, mixed, lower=True, check_finite=False)
+        return np.asarray(ground.gram - taken.T @ taken)
+
+    @cached_property
+    def energies(self) -> Array:
+        """Sum of squares that each group explains beyond what has a name, (g,)."""
+        ground, b = self.background, self.unnamed
+        parts = [ground.group == number for number in range(len(ground.groups))]
+        return np.array([float(b[on] @ self._beyond[np.ix_(on, on)] @ b[on]) for on in parts])
+
+    @cached_property
+    def discrepant(self) -> NDArray[np.bool_]:
+        """Which groups say that the model is wrong, (g,).
+
+        Those of the discrepancy that are there, and a drift far beyond that of such an instrument.
+        """
+        found = []
+        for size, group in zip(self.amplitude, self.background.groups, strict=True):
+            if group.expected:
+                found.append(np.log(size / group.expected) > SURPRISE * group.width)
+            else:
+                found.append(size > OFF)
+        return np.array(found)
+
+    @cached_property
+    def unexplained(self) -> float:
+        """Sum of squares that neither what has a name nor the noise explains.
+
+        Only what nothing in the set could take up counts: columns without a name are free to cancel
+        what a set-up does.
+        """
+        ground = self.background
+        on = self.discrepant[ground.group]
+        b = np.where(on, self.unnamed, 0.0)
+        smooth = max(float(b @ self._beyond @ b), 0.0) if on.any() else 0.0
+        return smooth + self._misfit * len(self.point.left)
+
+    def left_of(self, quantity: str, count: int) -> float:
+        """Return the variance of a quantity that is not explained, in units of its known noise.
+
+        Parameters
+        ----------
+        quantity : str
+            Name of a quantity of the table.
+        count : int
+            Measured numbers of it.
+        """
+        own = [each.quantity == quantity for each in self.background.groups]
+        parts = self.energies * self.discrepant
+        share = float(parts[own].sum() / parts.sum()) if parts.any() else 0.0
+        smooth = self.unexplained - self._misfit * len(self.point.left)
+        return smooth * share / count + self._misfit
+
+    @property
+    def _misfit(self) -> float:
+        """Excess of the scatter that no wrongly known noise explains."""
+        known = 3.0 * self.background.noise_width
+        return self.excess - 1.0 if np.log(self.excess) > known else 0.0
+
+    def rest(self, name: str) -> float:
+        """Return how much of an effect is left in its own shape, 0 where its law is right.
+
+        Sum of squares above the noise that the same effect, its size changing with the conditions,
+        would still explain, over that of the effect itself.
+
+        Parameters
+        ----------
+        name : str
+            Of an effect of the set.
+        """
+        point, places = self.point, self.point.effects[name]
+        own = point.columns[:, places] @ point.z[places]
+        named = point.left + point.columns @ self.step
+        basis, sizes, _ = np.linalg.svd(point.varied[name], full_matrices=False)
+        basis = basis[:, sizes > 1e-6 * sizes[0]] if len(sizes) else basis
+        noise = self.excess * basis.shape[1]
+        left = max(float(np.sum((basis.T @ named) ** 2)) - noise, 0.0)
+        return left / max(float(own @ own), 1e-300)
+
+    def without_discrepancy(self) -> Evidence:
+        """Return the set as if all that it leaves were noise."""
+        amplitude = np.where(self.background.optional, OFF, self.amplitude)
+        left = self.point.left
+        return replace(self, amplitude=amplitude, excess=max(1.0, float(left @ left) / len(left)))
+
+    def strength(self, columns: Array) -> float:
+        """Return how many standard deviations unknowns of typical size leave beyond the rest.
+
+        Parameters
+        ----------
+        columns : (N, k) float
+            As for `gains`.
+        """
+        factor, scale, _, _ = self._solved
+        mixed = solve_triangular(
+            factor, scale[:, None] * (self._known[0].T @ columns), lower=True, check_finite=False
+        )
+        information = (columns.T @ columns - mixed.T @ mixed / self.excess) / self.excess
+        return float(np.sqrt(max(np.linalg.eigvalsh(information)[-1], 0.0)))
+
+    def gains(self, blocks: Sequence[Array]) -> list[tuple[float, Array]]:
+        """Return what effects would each add to the log evidence, to first order.
+
+        Parameters
+        ----------
+        blocks : sequence of (N, k) arrays
+            Change of what is left by the unknowns of each effect, whitened, in standard deviations
+            of their priors.
+
+        Returns
+        -------
+        list of (float, (k,) array)
+            Gain, the amplitudes as they are, and the unknowns.
+        """
+        factor, scale, step, _ = self._solved
+        known, counts = self._known[0], [each.shape[1] for each in blocks]
+        columns = np.concatenate(blocks, axis=1)
+        mixed = solve_triangular(
+            factor, scale[:, None] * (known.T @ columns), lower=True, check_finite=False
+        )
+        slope = -columns.T @ (self.point.left + known @ step) / self.excess
+        ends = np.cumsum(counts)
+        found = []
+        for first, end in zip(ends - counts, ends, strict=True):
+            own, beside = columns[:, first:end], mixed[:, first:end]
+            information = (own.T @ own - beside.T @ beside / self.excess) / self.excess
+            found.append(_gain(information, slope[first:end]))
+        return found
+
+
+def _gain(information: Array, slope: Array) -> tuple[float, Array]:
+    """Return the gain of an effect and its unknowns: Laplace's method at the better of two modes.
+
+    The prior has a peak and tails: a large effect is found from the side of the tails.
+    """
+    return max((_mode(information, slope, near) for near in (1.0, 1e-8)), key=lambda each: each[0])
+
+
+def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array]:
+    count = len(slope)
+    for _ in range(5):
+        whole = information + weight * np.eye(count)
+        z = np.linalg.solve(whole, slope)
+        weight = size_weight(float(z @ z), count)
+    fits = float(slope @ z - 0.5 * z @ information @ z)
+    prior = log_size_prior(float(z @ z), count) + 0.5 * count * np.log(2.0 * np.pi)
+    return fits + prior - 0.5 * float(np.linalg.slogdet(whole)[1]), np.asarray(z)
+
+
+def evidence(point: Point, background: Background, near: Evidence | None = None) -> Evidence:
+    """Return a fitted set at the amplitudes of its largest evidence.
+
+    Parameters
+    ----------
+    point : Point
+        Where its fit ended.
+    background : Background
+        Of the table.
+    near : Evidence, optional
+        Of a set like it: where the search for the amplitudes begins.
+    """
+    if near is None:
+        amplitude = np.array([each.expected or 1.0 for each in background.groups], dtype=float)
+        best = Evidence(point, background, amplitude, 1.0)
+    else:
+        # What is absent there may be there here.
+        best = Evidence(point, background, np.maximum(near.amplitude, 0.03), near.excess)
+    for _ in range(MOST_STEPS):
+        trial = _improved(best)
+        gained = trial.log - best.log
+        best = trial if gained > 0.0 else best
+        if gained < ENOUGH:
+            break
+    for number in np.flatnonzero(background.optional & (best.amplitude > OFF)):
+        amplitude = best.amplitude.copy()
+        amplitude[number] = OFF
+        absent = replace(best, amplitude=amplitude)
+        best = absent if absent.log > best.log else best
+    for _ in range(LAST_STEPS if point.linear else 0):
+        best = replace(best, point=best.point.moved(best.step))
+    return best
+
+
+def _improved(at: Evidence) -> Evidence:
+    """Return fixed points of the evidence's slope, one step on (MacKay 1992)."""
+    ground = at.background
+    covariance, names = at.covariance, len(at.covariance) - len(ground.group)
+    b = at.unnamed
+    second = b**2 + np.diag(covariance)[names:]
+    squares = np.bincount(ground.group, second, minlength=len(ground.groups))
+    amplitude = [
+        _amplitude(float(square), int(count), group)
+        for square, count, group in zip(squares, ground.sizes, ground.groups, strict=True)
+    ]
+    trace = float(np.sum(at._known[1] * covariance))
+    excess = _excess(at.square + trace, len(at.point.left), ground.noise_width)
+    return replace(at, amplitude=np.array(amplitude), excess=excess)
+
+
+def _amplitude(square: float, count: int, group: Group) -> float:
+    size = float(np.sqrt(square / count))
+    for _ in range(5):
+        if group.expected:
+            slope = float(np.log(size / group.expected)) / group.width**2
+        else:
+            # Of the logarithm of a half-Cauchy density of scale 1 over the logarithm of the size.
+            slope = (size**2 - 1.0) / (size**2 + 1.0)
+        size = float(np.sqrt(square / max(count + slope, 0.3 * count)))
+    return max(size, OFF)
+
+
+def _log_amplitude(size: float, group: Group, count: int) -> float:
+    """Return the log prior of an amplitude, with the width at which the data know it."""
+    if group.expected:
+        return -0.5 * float(np.log(size / group.expected) / group.width) ** 2
+    if size <= OFF:
+        return 0.0
+    density = 2.0 / np.pi * size / (1.0 + size**2)
+    return float(np.log(density) + 0.5 * np.log(np.pi / count))
+
+
+def _log_excess(excess: Array, width: float) -> Array:
+    """Return the log prior of the excess: the noise as known, or something unknown beside it."""
+    x = np.log(excess)
+    known = np.exp(-0.5 * (x / width) ** 2) / width
+    other = np.where(x > 0.0, 2.0 * np.exp(-0.5 * (x / MOST_MISFIT) ** 2) / MOST_MISFIT, 0.0)
+    return np.asarray(np.log(((1.0 - MISFIT) * known + MISFIT * other) / np.sqrt(2.0 * np.pi)))
+
+
+LOG_EXCESS = np.linspace(-0.7, 16.0, 1600)
+
+
+def _excess(square: float, count: int, width: float) -> float:
+    grid = np.exp(LOG_EXCESS)
+    log = -0.5 * (count * LOG_EXCESS + square / grid) + _log_excess(grid, width)
+    return float(grid[np.argmax(log)])

@@ -1,0 +1,98 @@
+"""The sealed part: put aside before looking, opened when the search is over.
+
+It names nothing and only takes away.  Whenever an effect goes, those that are left are judged by it
+again, for they are fitted anew.
+
+Held out means another session where there is one: inside a session a badly excited parameter
+improves every cross-validation and fails the day after.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.inference.observations import Array, Mask, Observations, Quantity
+
+JUDGES = 8
+"""Blocks of the sealed part from which the uncertainty of a gain is taken."""
+
+
+def sealed_units(observations: Observations, share: float) -> Mask:
+    """Which units are put aside: the last session, or the end of the only one, (n,)."""
+    sessions = observations.sessions
+    names = np.unique(sessions)
+    if len(names) > 1:
+        return sessions == names[-1]
+    n = observations.n_units
+    return np.arange(n) >= n - max(1, round(share * n))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Residuals of a model on units that it has not seen.
+
+    Parameters
+    ----------
+    residual : (n, m) array
+        In the units of the table; NaN = not measured.
+    white : (N,) array
+        Whitened, without what the set-up of the session could still take up: where a wander or a
+        registration goes after the end of the data is no evidence against an effect.
+    """
+
+    residual: Array
+    white: Array
+
+    @property
+    def energy(self) -> float:
+        """Weighted sum of squares, in units of the noise."""
+        return float(self.white @ self.white)
+
+    def rmse(self, quantity: Quantity) -> float:
+        """Root mean square of the vector norm of a quantity; blanks do not count."""
+        columns = self.residual[:, list(quantity.components)]
+        measured = np.isfinite(columns)
+        total = np.sum(np.where(measured, columns, 0.0) ** 2, axis=0)
+        mean = total / np.maximum(measured.sum(axis=0), 1)
+        return float(np.sqrt(mean.sum())) * quantity.per_si
+
+    def squares(self, quantity: Quantity) -> Array:
+        """Squared vector norm of each unit, (n,); NaN where no component was measured."""
+        columns = self.residual[:, list(quantity.components)]
+        measured = np.isfinite(columns)
+        total = np.sum(np.where(measured, columns, 0.0) ** 2, axis=1)
+        return np.where(measured.any(axis=1), total, np.nan)
+
+
+def refuted(before: HeldOut, after: HeldOut) -> bool:
+    """Whether an effect makes sealed units worse by more than chance explains.
+
+    The change f of the prediction gains 2 r f - f^2; with a right f its standard deviation is
+    2 |f|, so a loss beyond twice that is none of a right effect.
+    """
+    change = float(np.linalg.norm(before.white - after.white))
+    gain = before.energy - after.energy
+    return gain < -4 * change
+
+
+def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, float]:
+    """Fall of the held-out error of a quantity and its standard uncertainty.
+
+    Parameters
+    ----------
+    before, after : HeldOut
+        Without and with the effect.
+    quantity : Quantity
+        What is told.
+    """
+    fall = before.squares(quantity) - after.squares(quantity)
+    measured = np.isfinite(fall)
+    if not measured.any():
+        return 0.0, 0.0
+    blocks = time_blocks(np.zeros(int(measured.sum()), dtype=np.int64), JUDGES)
+    means = np.array([fall[measured][blocks == block].mean() for block in np.unique(blocks)])
+    error = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
+    level = before.rmse(quantity) + after.rmse(quantity)
+    slope = quantity.per_si**2 / level if level > 0 else 0.0
+    return before.rmse(quantity) - after.rmse(quantity), float(error * slope)

@@ -1,0 +1,352 @@
+"""What the search asks of a plain table: fits of sets, linear but for the shapes of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from wrist_stiffness.inference.candidates import Candidate
+from wrist_stiffness.inference.evidence import Background, Point, size_weight
+from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisance_columns
+from wrist_stiffness.inference.observations import Array, Observations
+from wrist_stiffness.inference.search import Ranked, Trial
+from wrist_stiffness.inference.table import Table
+
+FREE = 30.0
+"""Standard deviation of a parameter that has no prior, in the size at which it alone would do as
+much as was measured."""
+
+ROUNDS = 10
+"""Of the fit with the heavy tails of the priors."""
+
+Shape = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A candidate in a set.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Which.
+    shape : tuple of float
+        Where it is not linear.
+    """
+
+    candidate: Candidate
+    shape: Shape
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """A set of candidates fitted whole to a table.
+
+    Parameters
+    ----------
+    problem : LinearProblem
+        What was fitted to.
+    terms : dict of str to Term
+        The set.
+    z : (p,) float
+        Nuisances and parameters, in the standard deviations of their priors.
+    """
+
+    problem: LinearProblem
+    terms: Mapping[str, Term]
+    z: Array
+
+    @property
+    def names(self) -> Collection[str]:
+        """Effects of the set."""
+        return self.terms
+
+    @cached_property
+    def places(self) -> dict[str, NDArray[np.intp]]:
+        """Places of the parameters of each effect."""
+        found, first = {}, self.problem.n_nuisances
+        for name, term in self.terms.items():
+            found[name] = np.arange(first, first + len(term.candidate.parameters))
+            first += len(term.candidate.parameters)
+        return found
+
+    def change(self, name: str) -> Array:
+        """Return what an effect of the set does to the observations, (n, m)."""
+        term = self.terms[name]
+        sizes = self.problem.sizes[name] * self.z[self.places[name]]
+        return np.asarray(self.problem.evaluate(term.candidate, term.shape) @ sizes)
+
+    @cached_property
+    def point(self) -> Point:
+        """Where the fit ended, whitened."""
+        problem, table = self.problem, self.problem.table
+        columns = problem.columns(tuple(self.terms.values()))
+        inexact = [
+            table.inexact(self.change(name), term.candidate.inexactness)
+            for name, term in self.terms.items()
+        ]
+        varied = {name: table.inexact(self.change(name), 1.0) for name in self.terms}
+        bent = [problem.tangents(self, name) for name in self.terms]
+        free = np.concatenate([np.zeros((len(columns), 0)), *bent], axis=1)
+        p = columns.shape[1]
+        held = problem.held(self)
+        columns = columns * ~held
+        return Point(
+            problem.white - columns @ self.z,
+            np.concatenate([-columns, -free], axis=1),
+            np.concatenate([self.z, np.zeros(free.shape[1])]),
+            np.ones(p + free.shape[1]),
+            self.places,
+            np.concatenate([np.zeros((len(columns), 0)), *inexact], axis=1),
+            varied,
+            not free.shape[1] and not held.any(),
+        )
+
+
+@dataclass(eq=False)
+class LinearProblem:
+    """A table, its candidates and its nuisances as the search asks them.
+
+    Parameters
+    ----------
+    table : Table
+        Whitened.
+    candidates : sequence of Candidate
+        The catalogue.
+    nuisances : NuisanceColumns
+        Over that table.
+    """
+
+    table: Table
+    candidates: Sequence[Candidate]
+    nuisances: NuisanceColumns
+    sizes: dict[str, Array] = field(init=False)
+    _evaluated: dict[tuple[str, Shape], Array] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Whiten the base and take its sizes."""
+        table = self.table
+        self.white: Array = table.whiten(np.nan_to_num(table.observations.values))
+        bare = table.whiten(self.nuisances.columns)
+        norm = np.linalg.norm(bare, axis=0)
+        much = FREE * max(float(np.linalg.norm(self.white)), 1.0)
+        free = much / np.where(norm > 0.0, norm, 1.0)
+        prior = self.nuisances.prior_std
+        self.base_sizes: Array = np.where(np.isfinite(prior), prior, free)
+        self._base = bare * self.base_sizes
+        self._by_name = {each.name: each for each in self.candidates}
+        self.sizes = {each.name: self._sizes(each) for each in self.candidates}
+        self._trials = [self._trial(each) for each in self.candidates]
+
+    @property
+    def n_nuisances(self) -> int:
+        """Parameters of the base."""
+        return self._base.shape[1]
+
+    @cached_property
+    def background(self) -> Background:
+        """What has no name."""
+        blocks = []
+        for each in self._trials:
+            for shape, columns in each.blocks:
+                term = Term(self._by_name[each.name], shape)
+                alone = self.fitted({each.name: term})
+                # What its bounds forbid explains nothing, and leaves that to the discrepancy.
+                if not self.held(alone)[alone.places[each.name]].all():
+                    blocks.append(columns)
+        return self.table.background(np.concatenate([self._base, *blocks], axis=1))
+
+    def begin(self) -> LinearFit:
+        """Return the base alone."""
+        return self.fitted({})
+
+    def trials(self, fit: LinearFit) -> Sequence[Trial]:
+        """Return the candidates that are not in a set."""
+        return [each for each in self._trials if each.name not in fit.terms]
+
+    def added(self, fit: LinearFit, ranked: Ranked) -> LinearFit | None:
+        """Return the best fit with one effect more; None where its bounds leave nothing of it."""
+        name = ranked.trial.name
+        candidate = self._by_name[name]
+        terms = {**fit.terms, name: Term(candidate, ranked.shape)}
+        if candidate.shape:
+            terms[name] = Term(candidate, self._best_shape(fit, terms, name))
+        found = self.fitted(terms)
+        return found if np.any(found.z[found.places[name]]) else None
+
+    def without(self, fit: LinearFit, name: str) -> LinearFit:
+        """Return the fit with one effect less."""
+        return self.fitted({own: term for own, term in fit.terms.items() if own != name})
+
+    def evaluate(self, candidate: Candidate, shape: Shape) -> Array:
+        """Return the columns of a candidate over the table, (n, m, k)."""
+        key = (candidate.name, shape)
+        if key not in self._evaluated:
+            self._evaluated[key] = candidate.evaluate(self.table.observations, shape)
+        return self._evaluated[key]
+
+    def columns(self, terms: Sequence[Term]) -> Array:
+        """Return what base and terms do, whitened, for standard deviations of their priors."""
+        own = [self._whitened(each.candidate, each.shape) for each in terms]
+        return np.concatenate([self._base, *own], axis=1)
+
+    def fitted(self, terms: Mapping[str, Term]) -> LinearFit:
+        """Fit a set of terms at their shapes, within the bounds of their parameters."""
+        columns = self.columns(tuple(terms.values()))
+        bare = LinearFit(self, terms, np.zeros(columns.shape[1]))
+        gram, target = columns.T @ columns, columns.T @ self.white
+        lower, upper = self._bounds(bare)
+        held = np.zeros(len(target), dtype=bool)
+        z = bare.z
+        for _ in range(len(target) + 1):
+            z = _solved(gram, target, bare.places, held, z)
+            beyond = ~held & ((z < lower) | (z > upper))
+            if not beyond.any():
+                break
+            held |= beyond
+            z = np.clip(z, lower, upper)
+        return LinearFit(self, terms, z)
+
+    def held(self, fit: LinearFit) -> NDArray[np.bool_]:
+        """Return which parameters stand at a bound."""
+        lower, upper = self._bounds(fit)
+        return np.asarray((fit.z <= lower) | (fit.z >= upper))
+
+    def tangents(self, fit: LinearFit, name: str) -> Array:
+        """Return the change by the shape of an effect, in widths of its range, (N, s)."""
+        term = fit.terms[name]
+        found = []
+        for place, parameter in enumerate(term.candidate.shape):
+            low, high = parameter.grid[0], parameter.grid[-1]
+            ends = []
+            for step in (-1e-3, 1e-3):
+                shape = list(term.shape)
+                shape[place] = float(np.clip(shape[place] + step * (high - low), low, high))
+                ends.append((shape[place], self._whitened(term.candidate, tuple(shape))))
+            slope = (ends[1][1] - ends[0][1]) / (ends[1][0] - ends[0][0])
+            # A Gaussian as dense as an even spread over the range.
+            width = (high - low) / np.sqrt(2.0 * np.pi)
+            found.append(slope @ fit.z[fit.places[name]] * width)
+        return np.array(found).reshape(-1, len(self.white)).T
+
+    def _bounds(self, fit: LinearFit) -> tuple[Array, Array]:
+        lower, upper = np.full(len(fit.z), -np.inf), np.full(len(fit.z), np.inf)
+        for name, places in fit.places.items():
+            parameters = fit.terms[name].candidate.parameters
+            lower[places] = [each.lower for each in parameters] / self.sizes[name]
+            upper[places] = [each.upper for each in parameters] / self.sizes[name]
+        return lower, upper
+
+    def _best_shape(self, fit: LinearFit, terms: Mapping[str, Term], name: str) -> Shape:
+        candidate, start = terms[name].candidate, terms[name].shape
+        limits = [(each.grid[0], each.grid[-1]) for each in candidate.shape]
+        width = np.array([high - low for low, high in limits])
+
+        def cost(scaled: Array) -> float:
+            shape = tuple((scaled * width).tolist())
+            found = self.fitted({**terms, name: Term(candidate, shape)})
+            left = self.white - self.columns(tuple(found.terms.values())) @ found.z
+            self._evaluated.pop((name, shape), None)
+            return float(left @ left + found.z @ found.z)
+
+        bounds = [(low / w, high / w) for (low, high), w in zip(limits, width, strict=True)]
+        begin = np.array(start) / width
+        simplex = np.vstack([begin, *(begin + s for s in _simplex(begin, bounds))])
+        found = minimize(
+            cost,
+            begin,
+            method="Nelder-Mead",
+            bounds=bounds,
+            options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 0.05, "maxfev": 60},
+        )
+        best = found.x if found.fun < cost(begin) else begin
+        return tuple((best * width).tolist())
+
+    def _whitened(self, candidate: Candidate, shape: Shape) -> Array:
+        return self.table.whiten(self.evaluate(candidate, shape) * self.sizes[candidate.name])
+
+    def _trial(self, candidate: Candidate) -> Trial:
+        blocks = [(shape, -self._whitened(candidate, shape)) for shape in candidate.shapes]
+        return Trial(candidate.name, True, tuple(blocks))
+
+    def _sizes(self, candidate: Candidate) -> Array:
+        """Return the scales of the priors of the parameters, (k,)."""
+        stated = [each.scale or each.plausible for each in candidate.parameters]
+        if all(stated):
+            return np.array(stated, dtype=float)
+        middle = candidate.shapes[len(candidate.shapes) // 2]
+        norm = np.linalg.norm(self.table.whiten(self.evaluate(candidate, middle)), axis=0)
+        left = self.white - self._base @ self.begin_z
+        much = float(np.linalg.norm(left)) / np.where(norm > 0.0, norm, 1.0)
+        return np.array([own or size for own, size in zip(stated, much, strict=True)])
+
+    @cached_property
+    def begin_z(self) -> Array:
+        """The base alone, fitted."""
+        base = self._base
+        return _solved(
+            base.T @ base, base.T @ self.white, {}, np.zeros(base.shape[1], bool), np.zeros(0)
+        )
+
+
+def _simplex(begin: Array, bounds: Sequence[tuple[float, float]]) -> Array:
+    """Return steps along each axis that stay inside, a tenth of the range."""
+    return np.diag(
+        [0.1 if at + 0.1 <= high else -0.1 for at, (_, high) in zip(begin, bounds, strict=True)]
+    )
+
+
+def _solved(
+    gram: Array,
+    target: Array,
+    effects: Mapping[str, Any],
+    held: NDArray[np.bool_],
+    z: Array,
+) -> Array:
+    """Return the most probable unknowns where those that are held stay, (p,)."""
+    z = np.where(held, z, 0.0) if len(z) else np.zeros(len(target))
+    if not len(target):
+        return z
+    # The tails of the priors first: a large effect is found from their side.
+    weight = np.ones(len(target))
+    for places in effects.values():
+        weight[places] = 1e-8
+    free = np.flatnonzero(~held)
+    rest = target - gram[:, held] @ z[held]
+    for _ in range(ROUNDS if effects else 1):
+        information = gram[np.ix_(free, free)] + np.diag(weight[free])
+        scale = 1.0 / np.sqrt(np.diag(information))
+        z[free] = scale * np.linalg.solve(information * scale[:, None] * scale, scale * rest[free])
+        for places in effects.values():
+            weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
+    return z
+
+
+def linear_problem(
+    observations: Observations,
+    candidates: Sequence[Candidate],
+    nuisances: Sequence[Nuisance],
+    ordered: bool,
+) -> LinearProblem:
+    """Make a table ready for the search.
+
+    Parameters
+    ----------
+    observations : Observations
+        Without lost units.
+    candidates, nuisances : sequence
+        The catalogue, and what is refitted.
+    ordered : bool
+        Whether the rows follow each other in time.
+    """
+    base = nuisance_columns(observations, tuple(nuisances))
+    blocks = [each.evaluate(observations, s) for each in candidates for s in each.shapes]
+    nothing = np.zeros((*observations.values.shape, 0))
+    table = Table(observations, base.columns, np.concatenate([nothing, *blocks], axis=2), ordered)
+    return LinearProblem(table, candidates, base)

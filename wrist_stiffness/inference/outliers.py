@@ -1,0 +1,71 @@
+"""Units that no model explains: lost beams and dropouts, found before anything is fitted."""
+
+import numpy as np
+
+from wrist_stiffness.inference.observations import Array, Mask, Observations
+from wrist_stiffness.inference.projection import leading_directions
+
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a Gaussian over its median absolute deviation."""
+
+ROUNDS = 15
+
+LEAST = 1e-3
+"""Directions weaker than this share of the strongest could follow a single lost beam."""
+
+MOST_DIRECTIONS = 0.25
+"""Of the measured values: more directions would follow the noise of all of them."""
+
+RIDGE = 1e-9
+"""Keeps a direction solvable that only lost units show."""
+
+
+def robust_scale(values: Array) -> Array:
+    """Robust standard deviation of each component, (m,); one where nothing was measured."""
+    scale = np.ones(values.shape[1])
+    for component, column in enumerate(values.T):
+        good = column[np.isfinite(column)]
+        if good.size:
+            deviation = np.median(np.abs(good - np.median(good)))
+            scale[component] = MAD_TO_SIGMA * deviation if deviation > 0 else 1.0
+    return scale
+
+
+def lost_units(observations: Observations, columns: Array, limit: float) -> Mask:
+    """Which units lie far from a model with everything in it.
+
+    Iteratively reweighted least squares with Tukey's biweight on the distance of the whole unit,
+    so that one lost beam of a hundred does not pull the fit.
+
+    Parameters
+    ----------
+    observations : Observations
+        Table.
+    columns : (n, m, p) array
+        Base and candidates.
+    limit : float
+        Robust standard deviations beyond which a unit is lost.
+
+    Returns
+    -------
+    (n,) array of bool
+        True = lost.
+    """
+    n, m = observations.values.shape
+    measured = observations.measured
+    values = np.where(measured, observations.values, 0.0)
+    size = robust_scale(observations.values)
+    rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
+    basis = leading_directions(rows, int(MOST_DIRECTIONS * measured.sum()), LEAST)
+    target = (values / size).reshape(-1)
+    weight = np.ones(n)
+    distance = np.zeros(n)
+    for _ in range(ROUNDS):
+        weighted = np.repeat(weight, m)[:, None] * basis
+        gram = weighted.T @ basis + RIDGE * np.eye(basis.shape[1])
+        fit = basis @ np.linalg.solve(gram, weighted.T @ target)
+        residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
+        scaled = np.where(measured, residual / robust_scale(residual), 0.0)
+        distance = np.sqrt(np.sum(scaled**2, axis=1) / np.maximum(measured.sum(axis=1), 1))
+        weight = np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
+    return distance > limit

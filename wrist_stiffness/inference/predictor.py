@@ -1,0 +1,152 @@
+"""What a diagnosis learned, as predictions for units that it has not seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.candidates import Candidate
+from wrist_stiffness.inference.linear import LinearFit
+from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns
+from wrist_stiffness.inference.observations import Array, Observations
+from wrist_stiffness.inference.search import State
+
+SCHEMA = 1
+"""Of the file."""
+
+LEAST = 1e-3
+"""Probability from which a set has a part in the predictions."""
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedSet:
+    """One set of effects with its values.
+
+    Parameters
+    ----------
+    probability : float
+        Its share in the predictions.
+    effects : dict of str to ((s,) floats, (k,) floats)
+        Shape and parameters of each effect.
+    nuisances : dict of (str, int or None, int) to float
+        Values by group, session and place in the group.
+    """
+
+    probability: float
+    effects: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]]
+    nuisances: Mapping[tuple[str, int | None, int], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """Predicts what was measured beside the model, averaged over the sets of effects.
+
+    Parameters
+    ----------
+    sets : tuple of PredictedSet
+        Their probabilities sum up to 1.
+    candidates : sequence of Candidate
+        The laws.
+    nuisances : sequence of Nuisance
+        What was refitted.
+    """
+
+    sets: tuple[PredictedSet, ...]
+    candidates: Sequence[Candidate]
+    nuisances: Sequence[Nuisance]
+
+    def predict(self, units: Observations) -> Array:
+        """Return what to add to the model's predictions, (n, m).
+
+        The registration of a session that was not in the data is 0: set it up first.
+
+        Parameters
+        ----------
+        units : Observations
+            Conditions; the values are not looked at.
+        """
+        base = nuisance_columns(units, tuple(self.nuisances))
+        laws = {each.name: each for each in self.candidates}
+        total = np.zeros(units.values.shape)
+        for each in self.sets:
+            values = np.array([each.nuisances.get(key, 0.0) for key in base.keys])
+            change = base.columns @ values
+            for name, (shape, sizes) in each.effects.items():
+                change = change + laws[name].evaluate(units, shape) @ np.array(sizes)
+            total += each.probability * change
+        return total
+
+    def save(self, path: str | Path) -> None:
+        """Write the values as JSON; the laws themselves stay in the program."""
+        sets = [
+            {
+                "probability": each.probability,
+                "effects": {n: [list(s), list(v)] for n, (s, v) in each.effects.items()},
+                "nuisances": [[*key, value] for key, value in each.nuisances.items()],
+            }
+            for each in self.sets
+        ]
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps({"schema": SCHEMA, "sets": sets}, indent=1) + "\n")
+
+
+def load_predictor(
+    path: str | Path, candidates: Sequence[Candidate], nuisances: Sequence[Nuisance]
+) -> Predictor:
+    """Read a predictor that was saved.
+
+    Parameters
+    ----------
+    path : path
+        File.
+    candidates, nuisances : sequence
+        Those of the diagnosis.
+
+    Raises
+    ------
+    InputError
+        If the file is none of these, or names a law that is not among the candidates.
+    """
+    try:
+        content: Any = json.loads(Path(path).read_text())
+        if content["schema"] != SCHEMA:
+            raise InputError(f"{path}: schema {content['schema']}, not {SCHEMA}")
+        sets = tuple(
+            PredictedSet(
+                float(each["probability"]),
+                {n: (tuple(s), tuple(v)) for n, (s, v) in each["effects"].items()},
+                {
+                    (name, session, place): value
+                    for name, session, place, value in each["nuisances"]
+                },
+            )
+            for each in content["sets"]
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: no saved predictor ({error})") from error
+    unknown = {name for each in sets for name in each.effects} - {c.name for c in candidates}
+    if unknown:
+        raise InputError(f"{path}: {sorted(unknown)[0]} is not among the candidates")
+    return Predictor(sets, candidates, nuisances)
+
+
+def predicted_set(state: State, probability: float) -> PredictedSet:
+    """Return a set of the search at its most probable values."""
+    fit: LinearFit = state.fit
+    problem, found = fit.problem, state.evidence
+    z = (found.point.z + found.step)[: len(fit.z)]
+    z = np.where(problem.held(fit), fit.z, z)
+    effects = {
+        name: (term.shape, tuple((problem.sizes[name] * z[fit.places[name]]).tolist()))
+        for name, term in fit.terms.items()
+    }
+    values = (problem.base_sizes * z[: problem.n_nuisances]).tolist()
+    nuisances = dict(zip(problem.nuisances.keys, values, strict=True))
+    return PredictedSet(probability, effects, nuisances)

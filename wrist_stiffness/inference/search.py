@@ -1,0 +1,306 @@
+"""The search for the most probable sets of effects.
+
+A set is fitted whole, with everything that belongs to set-up and tolerances, and judged by its
+evidence.  Effects are added, dropped and swapped; every set that was fitted stays and counts in the
+answer.  Which of the candidates are worth a fit, their slopes tell to first order.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from wrist_stiffness.inference.evidence import Array, Background, Evidence, Point, evidence
+
+LEADERS = 6
+"""Candidates of each ranking that are fitted whole."""
+
+NEGLIGIBLE = 3.0
+"""Log odds against a set, beside the best one so far, below which it is not fitted: 1 in 20."""
+
+CLOSE = 0.6
+"""Share of the leader's gain to first order below which, once the leader leaves nothing, a
+candidate is not fitted: nothing that leaves more than noise comes near."""
+
+FALLS = 0.8
+"""Share of what was left before that an effect may leave if the search is to go on beside it: what
+explains less than a fifth stands in for something that nobody named."""
+
+MOST_EFFECTS = 4
+"""Effects of a set: more are hardly told apart in one recording."""
+
+Names = frozenset[str]
+
+
+class Fit(Protocol):
+    """A set of effects, fitted whole."""
+
+    @property
+    def names(self) -> Collection[str]:
+        """Effects of the set."""
+
+    @property
+    def point(self) -> Point:
+        """Where it ended."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A candidate about a fitted set.
+
+    Parameters
+    ----------
+    name : str
+        `effect@component`.
+    smooth : bool
+        Whether its slopes show what it does.
+    blocks : tuple of ((s,) floats, (N, k) array)
+        At points of the grid of what is not linear in it: change of what is left by each unknown,
+        whitened, in standard deviations of the priors.
+    """
+
+    name: str
+    smooth: bool
+    blocks: tuple[tuple[tuple[float, ...], Array], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """What a candidate gains to first order, at its best shape.
+
+    Parameters
+    ----------
+    trial : Trial
+        The candidate.
+    gain : float
+        Of log evidence.
+    shape : tuple of float
+        Where on its grid.
+    z : (k,) float
+        Its unknowns.
+    """
+
+    trial: Trial
+    gain: float
+    shape: tuple[float, ...]
+    z: Array
+
+
+class Problem(Protocol):
+    """What the search asks of a mechanism."""
+
+    @property
+    def background(self) -> Background:
+        """What has no name."""
+
+    def begin(self) -> Any:
+        """Return the fit without any effect."""
+
+    def trials(self, fit: Any) -> Sequence[Trial]:
+        """Return the candidates about a fit."""
+
+    def added(self, fit: Any, ranked: Ranked) -> Any:
+        """Return the best fit with one effect more."""
+
+    def without(self, fit: Any, name: str) -> Any:
+        """Return the fit with one effect less, begun where this one ended."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A fitted set and how probable it is.
+
+    Parameters
+    ----------
+    fit : Fit
+        The set.
+    evidence : Evidence
+        Of it.
+    log : float
+        Log evidence and log prior of the set.
+    """
+
+    fit: Any
+    evidence: Evidence
+    log: float
+
+    @property
+    def names(self) -> Names:
+        """Effects of the set."""
+        return frozenset(self.fit.names)
+
+    @property
+    def rough(self) -> bool:
+        """Whether more than noise is left."""
+        return self.evidence.unexplained > 0.0
+
+
+class Search:
+    """The search in one table.
+
+    Parameters
+    ----------
+    problem : Problem
+        What may be asked.
+    seconds : float, optional
+        Time after which no further fit is begun.
+    tell : callable, optional
+        Told what is being done.
+    most_effects : int, optional
+        Most effects of a set.
+    falls : float, optional
+        Share of what was left that an effect may leave if the search is to go on beside it;
+        infinite where fits cost so little that it always may.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        seconds: float = np.inf,
+        tell: Callable[[str], None] = lambda text: None,
+        most_effects: int = MOST_EFFECTS,
+        falls: float = FALLS,
+    ) -> None:
+        self._problem, self._tell, self._most = problem, tell, most_effects
+        self._falls = falls
+        self._end = time.monotonic() + seconds
+        self.states: dict[Names, State] = {}
+        self.first_order: dict[str, Ranked] = {}
+        self.in_time = True
+        self._catalogue = 0
+        tell("fitting the nominal model with its tolerances")
+        self.base = self._known(problem.begin(), None)
+
+    def run(self) -> None:
+        """Search until no move gains, or the time is over."""
+        best = self._deepened(self.base)
+        for _ in range(self._most):
+            for name in sorted(best.names):
+                less = self._less(best, name)
+                if less.names:
+                    self._grown(less, best.names)
+            better = self.best
+            if better.log <= best.log:
+                break
+            best = self._deepened(better)
+
+    @property
+    def price(self) -> float:
+        """Log prior odds against one effect: about one is missing in all, anywhere."""
+        return float(np.log(max(self._catalogue, 1)))
+
+    @property
+    def best(self) -> State:
+        """The most probable set so far."""
+        return max(self.states.values(), key=lambda each: each.log)
+
+    def _deepened(self, state: State) -> State:
+        """Add effects one after the other for as long as that pays."""
+        while len(state.names) < self._most:
+            found = self._grown(state)
+            if not found:
+                break
+            best = max(found, key=lambda each: each.log)
+            # Those that cannot be told apart share what one of them would gain.
+            if np.logaddexp.reduce([each.log for each in found]) <= state.log:
+                break
+            fell = best.evidence.unexplained < self._falls * state.evidence.unexplained
+            state = best
+            if self._falls < np.inf and not (fell and best.rough):
+                break
+        return self.best
+
+    def _grown(self, state: State, not_again: Collection[str] = ()) -> list[State]:
+        """Return the sets with one effect more that were worth a fit."""
+        self._tell(f"asking every candidate{_beside(state.names)}")
+        trials = [each for each in self._problem.trials(state.fit) if each.name not in not_again]
+        self._catalogue = max(self._catalogue, len(trials) + len(state.names))
+        as_noise = _ranked(state.evidence.without_discrepancy(), trials)
+        beyond = _ranked(state.evidence, trials)
+        if not state.names:
+            for each in (*as_noise, *beyond):
+                known = self.first_order.get(each.trial.name)
+                if known is None or known.gain < each.gain:
+                    self.first_order[each.trial.name] = each
+        chosen = self._worth_a_fit(state, as_noise, beyond)
+        found: list[State] = []
+        settled = False
+        for each in chosen:
+            if time.monotonic() > self._end:
+                self.in_time = False
+                break
+            if settled and each.gain < CLOSE * chosen[0].gain:
+                continue
+            self._tell(f"fitting {each.trial.name}{_beside(state.names)}")
+            fit = self._problem.added(state.fit, each)
+            if fit is None:
+                self._impossible(each)
+                continue
+            found.append(self._known(fit, state))
+            settled = settled or not found[-1].rough
+        return found
+
+    def _impossible(self, ranked: Ranked) -> None:
+        """Take back what slopes promised of a candidate that no fit allows."""
+        first = self.first_order.get(ranked.trial.name)
+        if first is not None:
+            self.first_order[ranked.trial.name] = replace(first, gain=0.0)
+
+    def _worth_a_fit(
+        self, state: State, as_noise: Sequence[Ranked], beyond: Sequence[Ranked]
+    ) -> list[Ranked]:
+        chosen: dict[str, Ranked] = {}
+        least = self.price - NEGLIGIBLE
+        for ranking in (as_noise, beyond):
+            for each in ranking[:LEADERS]:
+                known = chosen.get(each.trial.name)
+                if each.gain > least and (known is None or known.gain < each.gain):
+                    chosen[each.trial.name] = each
+        found = sorted(chosen.values(), key=lambda each: -each.gain)
+        if state.rough:
+            laws = set()
+            for each in as_noise:
+                law = each.trial.name.partition("@")[0]
+                if not each.trial.smooth and law not in laws:
+                    laws.add(law)
+                    found += [each] if each.trial.name not in chosen else []
+        return found
+
+    def _less(self, state: State, name: str) -> State:
+        """Return the set with one effect less, fitted from where this one ended."""
+        self._tell(f"fitting without {name}")
+        return self._known(self._problem.without(state.fit, name), state)
+
+    def _known(self, fit: Any, near: State | None) -> State:
+        found = evidence(fit.point, self._problem.background, near.evidence if near else None)
+        new = State(fit, found, found.log - self.price * len(fit.names))
+        known = self.states.get(new.names)
+        if known is None or known.log < new.log:
+            self.states[new.names] = new
+            if not new.names:
+                self.base = new
+        return self.states[new.names]
+
+
+def _beside(names: Collection[str]) -> str:
+    return f" beside {', '.join(sorted(names))}" if names else ""
+
+
+def _ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
+    """Return what each trial gains at its best shape, largest first."""
+    flat = [(each, shape, columns) for each in trials for shape, columns in each.blocks]
+    best: dict[str, Ranked] = {}
+    if not flat:
+        return []
+    gains = at.gains([columns for _, _, columns in flat])
+    rows = len(at.point.left)
+    for (trial, shape, _), (gain, z) in zip(flat, gains, strict=True):
+        # The shape was chosen among others (Schwarz 1978).
+        gain -= 0.5 * len(shape) * float(np.log(rows))
+        if trial.name not in best or best[trial.name].gain < gain:
+            best[trial.name] = Ranked(trial, gain, shape, z)
+    return sorted(best.values(), key=lambda each: -each.gain)

@@ -1,0 +1,74 @@
+"""Scatter that neighbouring units have in common: what a motor at rest hides of its count.
+
+A rest, a change of the load and the next rest have the same hidden angles: their differences know
+nothing of them, and their mean is no better than one of them.  Taken for independent, the hidden
+counts would both drown what a load does and make the mean look too good.
+"""
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from wrist_stiffness.inference.observations import Array, Observations
+
+
+def own_covariance(observations: Observations, covariance: Array) -> Array:
+    """Return the covariance of each unit without what it shares, (n, m, m).
+
+    Parameters
+    ----------
+    observations : Observations
+        Units.
+    covariance : (m, m) or (n, m, m) array
+        Of each unit by itself.
+    """
+    n, m = observations.values.shape
+    whole = np.broadcast_to(covariance, (n, m, m))
+    if observations.shared is None or observations.stand is None:
+        return whole
+    shared = observations.shared * (observations.stand >= 0)[:, None, None]
+    return np.asarray(whole - shared @ np.swapaxes(shared, 1, 2))
+
+
+class Apart:
+    """Brings columns to unit scatter that the units of a stand no longer share.
+
+    The covariance of a stand is that of independent units plus few directions; its inverse root
+    differs from theirs in these directions alone.
+
+    Parameters
+    ----------
+    observations : Observations
+        Units.
+    factors : (n, m, m) array
+        Inverse factors of each unit's own covariance.
+    """
+
+    def __init__(self, observations: Observations, factors: Array) -> None:
+        self._factors = factors
+        self._shrink = np.empty((0, 1))
+        if observations.shared is None or observations.stand is None:
+            return
+        loadings = factors @ (observations.shared * observations.measured[:, :, None])
+        numbers = np.arange(observations.values.size).reshape(observations.values.shape)
+        entries, sizes, count = [], [np.empty(0)], 0
+        for stand in np.unique(observations.stand[observations.stand >= 0]):
+            units = observations.stand == stand
+            tall = loadings[units].reshape(-1, loadings.shape[2])
+            left, size, _ = np.linalg.svd(tall, full_matrices=False)
+            rows, columns = np.meshgrid(numbers[units], count + np.arange(len(size)), indexing="ij")
+            entries.append(np.stack([left.ravel(), rows.ravel(), columns.ravel()]))
+            sizes.append(size)
+            count += len(size)
+        if count:
+            self._shrink = 1.0 - 1.0 / np.sqrt(1.0 + np.concatenate(sizes)[:, None] ** 2)
+            value, row, column = np.concatenate(entries, axis=1)
+            at = (row.astype(int), column.astype(int))
+            self._directions = csr_array((value, at), shape=(observations.values.size, count))
+
+    def __call__(self, columns: Array) -> Array:
+        """Return columns (n, m, k), zero where not measured, of unit scatter, (n, m, k)."""
+        white = np.asarray(self._factors @ columns)
+        if len(self._shrink):
+            flat = white.reshape(len(white) * white.shape[1], white.shape[2])
+            flat -= self._directions @ (self._shrink * (self._directions.T @ flat))
+        return white
