@@ -47,7 +47,7 @@ clean:
 	rm -rf $(VENV) demo build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find wrist_stiffness test -name __pycache__ -prune -exec rm -rf {} +
 
-$(READY): setup.py constraints.txt $(wildcard wrist_stiffness/mechanism/native/*)
+$(READY): setup.py constraints.txt $(wildcard wrist_stiffness/*/native/*)
 	@echo "$(VERSION)" | grep -qx '3\.1[12]' || \
 	  { echo "error: $(PYTHON) is not Python 3.11 or 3.12; use make PYTHON=python3.11" >&2; exit 1; }
 	$(PYTHON) -m venv $(if $(OTHER),--clear) $(VENV)

@@ -17,19 +17,23 @@ def shared(pattern: str) -> tuple[str, list[str]]:
     return f"share/{NAME}/{Path(pattern).parent}", files
 
 
-NATIVE = f"{NAME}/mechanism/native"
-# Without a C compiler the package installs all the same and runs on NumPy alone, slower.  The
-# stable interface makes one build serve every Python; no fused multiply-add, so that all
-# processors round alike.
-native = Extension(
-    f"{NAME}.mechanism._native",
-    sorted(str(path.relative_to(HERE)) for path in (HERE / NATIVE).glob("*.c")),
-    depends=[f"{NATIVE}/wrist.h"],
-    define_macros=[("Py_LIMITED_API", "0x030B0000")],
-    py_limited_api=True,
-    extra_compile_args=["-O3", "-ffp-contract=off"],
-    optional=True,
-)
+def compiled(room: str, name: str) -> Extension:
+    """Return the C of a room as an extension module.
+
+    Without a C compiler the package installs all the same and runs without it, slower.  The stable
+    interface makes one build serve every Python; no fused multiply-add, so that all processors
+    round alike.
+    """
+    folder = HERE / NAME / room / "native"
+    return Extension(
+        f"{NAME}.{room}.{name}",
+        sorted(str(path.relative_to(HERE)) for path in folder.glob("*.c")),
+        depends=[str(path.relative_to(HERE)) for path in folder.glob("*.h")],
+        define_macros=[("Py_LIMITED_API", "0x030B0000")],
+        py_limited_api=True,
+        extra_compile_args=["-O3", "-ffp-contract=off"],
+        optional=True,
+    )
 
 
 setup(
@@ -44,7 +48,7 @@ setup(
     maintainer_email="maintainers@wrist-stiffness.example",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},
-    ext_modules=[native],
+    ext_modules=[compiled("mechanism", "_native"), compiled("recording", "_records")],
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

@@ -26,13 +26,13 @@ import numpy as np
 from closed_loop_drive import Corrected, Motion, cell_of
 from closed_loop_page import write_page
 
-from wrist_stiffness.campaign.fitting.calibrate import calibrate, said_calibrated
-from wrist_stiffness.campaign.fitting.extend import extend
-from wrist_stiffness.campaign.fitting.free_effects import commissioning
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import BUILT, SET_UP
+from wrist_stiffness.campaign.searching.calibrate import calibrate, said_calibrated
 from wrist_stiffness.campaign.searching.candidates import compensable
 from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
+from wrist_stiffness.campaign.searching.extend import extend
+from wrist_stiffness.campaign.searching.free_effects import commissioning
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect

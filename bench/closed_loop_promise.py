@@ -98,11 +98,14 @@ class Corrected:
         """Return the corrected angles of a sample."""
         script = self.script
         if i == round(TARE_S * RATE_HZ):
-            self.stream.use_zero(self.stream.loads.measured_zero())
+            limit = self.stream.settings.supervisor.limit
+            self.stream.use_zero(self.stream.loads.measured_zero(limit))
             self.stream.enabled = True
         if i in script.told:
             told = script.told[i]
-            self.stream.declare_payload(told and Payload(told[0], tuple(told[1].tolist())))
+            self.stream.supervisor.declare_payload(
+                told and Payload(told[0], tuple(told[1].tolist()))
+            )
         wanted = script.command[i]
         stamp = START_NS + i * PERIOD_NS
         theta = self.stream.on_command(stamp, "", NAMES, wanted.tolist()).theta

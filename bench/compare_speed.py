@@ -19,9 +19,9 @@ from typing import Any
 # Threads of the linear algebra wait for each other on a busy machine, and waiting counts as work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import compare_models
+from wrist_stiffness.campaign.comparing.sentences import sentences
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.unit_session import as_units
@@ -51,8 +51,9 @@ def stages(path: Path) -> dict[str, float]:
 
 
 def compared(model: Any, session: MeasuredSession) -> Any:
-    """Compare one model with one session."""
-    return compare_models([("model", model)], [session], np.random.default_rng(0))
+    """Compare one model with one session, and say on what its error depends."""
+    found = compare_models([("model", model)], [session])
+    return found.verdict, sentences(found.models[0].explained)
 
 
 def main() -> None:

@@ -72,7 +72,7 @@ FRAMES = (
     "{ft: {parent: wrist_platform, position_mm: [0, 0, 40], rpy_deg: [0, 0, 90],"
     " acts_on: environment}, b: {parent: wrist_base}}"
 )
-RIVALS = """{"schema": 1, "noise_floor": {"s_um": 1.0, "phi_mdeg": 2.0}, "findings":
+RIVALS = """{"schema": 2, "noise": {"s_um": 1.0, "phi_mdeg": 2.0}, "suspects": [], "findings":
 [{"class": [{"effect": "backlash", "component": "motor_1"}],
 "parameters": {"width_mdeg": [20.0, 2.0]}}], "not_excited": []}"""
 TABLE = """\

@@ -27,6 +27,11 @@ RUNS = (
     ("Recordings against rosbags and mcap", ["recording_speed.py"], ["5000"]),
     ("One pose and stacks of poses", ["mechanism_speed.py"], []),
     ("Effects, one sample and a recording", ["model_speed.py"], []),
+    (
+        "Many wrists at once",
+        ["scale.py"],
+        ["--wrists", "200", "--recordings", "2", "--processes", "1"],
+    ),
     ("Compare, ten minutes at 1 kHz", ["compare_speed.py"], None),
     ("A pose condensed against the whole wrist by finite elements", ["fem_speed.py"], None),
 )

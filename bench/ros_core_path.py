@@ -15,7 +15,7 @@ from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model

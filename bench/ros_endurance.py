@@ -165,12 +165,13 @@ def stream(source: Source, pids: dict[str, int], seconds: float, rate_hz: float)
     for name, pid in pids.items():
         heard = source.answers[name].heard
         times = 1e6 * np.array([heard[s] - start for s, start in sent.items() if s in heard])
+        median = f"{np.median(times):.0f}" if len(times) else "none"
         share = 100.0 * (cpu_seconds(pid) - cpu[name]) / wall
         said = source.said.get(name, {})
         taken = sum(int(n) for key, n in said.items() if key.split()[0] in ("samples", "refused"))
         lost, way_in = count - len(times), warm + count - taken if said else "?"
         print(
-            f"{name:20} {lost:6d} {way_in:>7} {np.median(times):12.0f}  "
+            f"{name:20} {lost:6d} {way_in:>7} {median:>12}  "
             f"{high_percentile(times):24} {share:3.0f} %  "
             f"{memory[name][0]:.1f}, {memory[name][1]:.1f}, {memory[name][-1]:.1f}; "
             f"{said.get('loads that came late', '')}"
@@ -178,7 +179,9 @@ def stream(source: Source, pids: dict[str, int], seconds: float, rate_hz: float)
 
 
 def high_percentile(values: np.ndarray) -> str:
-    """Return p99 with the 95 % interval of its rank."""
+    """Return p99 with the 95 % interval of its rank, for any number of values."""
+    if not len(values):
+        return "none"
     half = 1.96 * np.sqrt(0.99 * 0.01 / len(values))
     low, p99, high = np.quantile(values, [max(0.99 - half, 0.0), 0.99, min(0.99 + half, 1.0)])
     return f"{p99:.0f} ({low:.0f} to {high:.0f})"

@@ -349,6 +349,7 @@ def main() -> int:
     """Run the rounds that give as many messages."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--messages", type=int, default=100_000)
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no round after")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--round", type=int, default=5000, help="messages in a round")
     arguments = parser.parse_args()
@@ -358,7 +359,9 @@ def main() -> int:
     try:
         fuzz.look_after("at the start")
         done = 0
-        while fuzz.sent.total() < arguments.messages:
+        while (
+            fuzz.sent.total() < arguments.messages and time.monotonic() - start < arguments.seconds
+        ):
             name = list(fuzz.processes)[done % 3]
             fuzz.send_wild(arguments.round)
             for _ in range(12):

@@ -19,7 +19,9 @@ def start(context: LaunchContext) -> list[LogInfo | Node]:
     given = context.launch_configurations
     cell = truth("cell", given["cell"])
     simulated = {"use_sim_time": truth("use_sim_time", given["use_sim_time"])}
-    parameters: list[dict[str, object] | str] = [simulated]
+    namespace = given["namespace"].strip("/")
+    prefix = given["frame_prefix"] or (f"{namespace}/" if namespace else "")
+    parameters: list[dict[str, object] | str] = [simulated, {"frame_prefix": prefix}]
     if given["params_file"]:
         parameters.append(given["params_file"])
     if given["model_file"]:

@@ -19,7 +19,8 @@ ROOMS_USED = {
     "campaign": ONLINE | {"compensation", "inference", "recording"},
     "recording": set(),
     "simulation": {"mechanism", "lookup", "recording"},
-    "workflows": CORE | {"shipped"},
+    "analysis": CORE,
+    "workflows": CORE | {"analysis", "shipped"},
     "cli": CORE | {"workflows", "shipped"},
     "ros": CORE | {"workflows", "shipped"},
     "errors": set(),
@@ -78,9 +79,8 @@ def violations(module, text):
 
 ROOMS_OF_CAMPAIGN = {
     "reading": set(),
-    "fitting": set(),
-    "comparing": {"fitting"},
-    "searching": {"fitting"},
+    "comparing": {"searching"},
+    "searching": set(),
     "planning": set(),
 }
 

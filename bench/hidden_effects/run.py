@@ -106,8 +106,8 @@ def version_of(solver: str) -> str:
         ),
         "told_the_name": (
             *OWN,
-            "wrist_stiffness.campaign.fitting.calibrate",
-            "wrist_stiffness.campaign.fitting.extend",
+            "wrist_stiffness.campaign.searching.calibrate",
+            "wrist_stiffness.campaign.searching.extend",
         ),
     }.get(solver, ())
     # The project's calibration of what is read is in the floor of every score.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.searching.base_fit import fit_base, free_base
-from wrist_stiffness.campaign.searching.base_problem import SILENT
+from wrist_stiffness.campaign.searching.problem import SILENT
 from wrist_stiffness.campaign.searching.taken_up import taken_up
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.effect import Effect, Estimate

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
-from wrist_stiffness.campaign.fitting.calibrate import told_model
-from wrist_stiffness.campaign.fitting.fit import fit
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, free_all
-from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import AXES, GAPS
+from wrist_stiffness.campaign.searching.base_fit import fit_cleaned
+from wrist_stiffness.campaign.searching.calibrate import fitted, told_model
+from wrist_stiffness.campaign.searching.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.campaign.searching.problem import FitProblem
+from wrist_stiffness.campaign.searching.result import told_parameters
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -45,11 +45,17 @@ def simulated(model, *hidden, seed=1, seconds=60.0, **settings):
     return MeasuredSession("s", block, sample.measured_shift, sample.measured_rotation)
 
 
-def measured(model, block, rng, sigma=SIGMA):
-    """Return a session in which the wrist is the model, with white noise and hidden counts."""
+def measured(model, block, rng, sigma=SIGMA, drift=0.0):
+    """Return a session in which the wrist is the model, with white noise and hidden counts.
+
+    A drift is told in units of that noise; it lasts 20 s and 200 s, half of its variance each.
+    """
     twist = model.batch(block).measured
+    apart = np.abs(block.time[:, None] - block.time)
+    slow = 0.5 * (np.exp(-apart / 20.0) + np.exp(-apart / 200.0))
+    slow = np.linalg.cholesky(slow + 1e-9 * np.eye(len(slow)))
     rotation, shift = exp_twist(twist)
-    noise = rng.normal(size=twist.shape) * sigma
+    noise = (rng.normal(size=twist.shape) + drift * slow @ rng.normal(size=twist.shape)) * sigma
     wobble, _ = exp_twist(np.concatenate([np.zeros((len(noise), 3)), noise[:, 3:]], axis=1))
     step = model.table.geometry.limits.encoder_step
     shaft = block.theta + step * rng.uniform(-0.5, 0.5, block.theta.shape)
@@ -68,6 +74,10 @@ def poses(rng, n=40, load=0.5):
 
 def problem_of(model, sessions, free):
     return FitProblem(model, tuple(as_units(model, each) for each in sessions), tuple(free))
+
+
+def fit(problem, start=None):
+    return fitted(*fit_cleaned(problem, start))
 
 
 def by_name(found):
@@ -114,12 +124,12 @@ def test_registrations_of_a_millimetre_are_recovered_to_the_noise(model):
         planted = next(e for e in true if e.name == each.effect).estimates[each.key].value
         assert abs(each.value - planted) < 3.5 * each.sigma
         assert each.sigma < 10.0
-    assert found.misfit == pytest.approx(1.0, abs=0.4)
+    assert not found.rough
     assert found.arrived
 
 
 @pytest.mark.slow
-def test_three_of_a_thousand_lie_beyond_three_sigma(model):
+def test_errors_are_as_large_as_their_uncertainties_say(model):
     """Chi square of all errors over twenty seeds; parameters are drawn from their priors."""
     free = (
         free_all(effect("bushing_stiffness@joint_1")),
@@ -136,29 +146,31 @@ def test_three_of_a_thousand_lie_beyond_three_sigma(model):
             )
             for each in free
         ]
-        session = measured(model.with_effects(*true), poses(rng, 30), rng)
+        drift = 0.5 * np.exp(rng.uniform(-1.0, 1.0))
+        session = measured(model.with_effects(*true), poses(rng, 30), rng, drift=drift)
         found = fit(problem_of(model, [session], free))
         planted = {(e.name, key): v.value for e in true for key, v in e.estimates.items()}
         steps = [u.step for u in found.problem.unknowns]
         error = np.array([p.value - planted[p.effect, p.key] for p in found.parameters]) / steps
         total += error @ np.linalg.solve(found.covariance, error)
         count += len(error)
-    assert chi2.ppf(0.001, count) < total < chi2.ppf(0.999, count)
+    # How large the drift is must be guessed from thirty poses.
+    assert 0.75 < total / count < 1.5
 
 
 def test_scatter_beyond_what_the_instrument_states_is_found(model):
     rng = np.random.default_rng(13)
     true = effect("measurement_frame@pose_sensor", shift_x_um=100.0)
-    more = np.repeat([4.0, 1.0], 3)
-    session = measured(model.with_effects(true), poses(rng, 60), rng, more * SIGMA)
+    session = measured(model.with_effects(true), poses(rng, 60), rng, 4.0 * SIGMA)
     session = replace(session, covariance=np.diag(SIGMA**2))
     found = fit(problem_of(model, [session], [free_all(effect(true.name), per_session=True)]))
-    # Poses measured once are no means over a rest.
-    shift, turn = found.wander[0, 0], found.wander[0, 3]
-    assert shift == pytest.approx(np.sqrt(15.0) * SIGMA[0], rel=0.35)
-    assert turn < SIGMA[3]
+    # Noise is what the instrument states; what it scatters beyond is told beside it.
+    assert found.rough
+    left = np.hypot(found.noise["s_um"], found.discrepancy["s_um"])
+    assert left == pytest.approx(4.0 * np.sqrt(3.0) * 1e6 * SIGMA[0], rel=0.35)
     known = by_name(found)["measurement_frame@pose_sensor", "shift_x_um"].sigma
-    assert known == pytest.approx(1e6 * 4.0 * SIGMA[0] / np.sqrt(60), rel=0.4)
+    by_scatter = 1e6 * 4.0 * SIGMA[0] / np.sqrt(60)
+    assert by_scatter < known < 2.0 * by_scatter
 
 
 def test_columns_are_the_derivative_of_the_residual(model):
@@ -191,7 +203,7 @@ def test_lost_beams_do_not_move_the_fit(model):
     lost = fit(problem_of(model, [replace(session, shift=shift)], free))
     assert lost.lost == 2
     (before,), (after,) = clean.parameters, lost.parameters
-    assert abs(after.value - before.value) < 0.5 * before.sigma
+    assert abs(after.value - before.value) < 0.8 * before.sigma
     assert after.sigma < 1.3 * before.sigma
 
 
@@ -277,10 +289,16 @@ def test_half_a_correlation_is_not_told_together(model, correlation):
         free_all(effect("encoder_offset@motor_2"), per_session=True),
     )
     found = fit(problem_of(model, [measured(model, poses(rng), rng)], free))
-    alike = np.array([[1.0, correlation], [correlation, 1.0]])
-    assert [p.together for p in replace(found, covariance=alike).parameters] == [(), ()]
-    alike = np.array([[1.0, 1.6 * correlation], [1.6 * correlation, 1.0]])
-    assert all(p.together for p in replace(found, covariance=alike).parameters)
+
+    def together(share):
+        covariance = np.array([[1.0, share], [share, 1.0]])
+        return [
+            each.together
+            for each in told_parameters(found.problem, found.z, covariance, np.ones(2))
+        ]
+
+    assert together(correlation) == [(), ()]
+    assert all(together(1.6 * correlation))
 
 
 @pytest.mark.parametrize(
@@ -326,7 +344,8 @@ def test_rough_data_lead_into_the_valley_of_the_true_flanges(model, seed):
     problem = problem_of(model, [session], free)
     led, best = fit(problem), fit(problem, true)
     apart = led.z - best.z
-    assert apart @ np.linalg.solve(best.covariance, apart) < 1.0
+    # Where a flange is about to touch, steps end at a kink.
+    assert apart @ np.linalg.solve(best.covariance, apart) < 2.0
 
 
 def test_what_the_fit_cannot_follow_widens_its_uncertainty(model):
@@ -338,10 +357,11 @@ def test_what_the_fit_cannot_follow_widens_its_uncertainty(model):
     session = replace(measured(soft, twice, rng), covariance=None)
     free = (FreeEffect(effect(FRAME), {"shift_x_um": 1000.0}, True),)
     found = fit(problem_of(model, [session], free))
-    assert found.misfit > 3.0
-    white = replace(found.noise, scale=1.0).whiten(found.seen, found.columns)
-    by_scatter = 1000.0 / np.linalg.norm(white)
-    assert found.parameters[0].sigma == pytest.approx(np.sqrt(found.misfit) * by_scatter, rel=1e-3)
+    assert found.rough
+    assert found.discrepancy["phi_mdeg"] > found.noise["phi_mdeg"]
+    (shift,) = found.parameters
+    assert abs(shift.value) < 3.0 * shift.sigma
+    assert shift.sigma > 2.0 * 1e6 * SIGMA[0] / np.sqrt(60)
 
 
 def test_what_moved_only_with_another_is_told_as_well(model):

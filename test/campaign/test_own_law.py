@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.searching.base_fit import fit_base
-from wrist_stiffness.campaign.searching.candidates import Point, wrist_candidates
+from wrist_stiffness.campaign.searching.candidates import Point, searched, wrist_candidates
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model import registry
 from wrist_stiffness.model.effects import joint_friction
@@ -45,7 +45,7 @@ def as_a_users_own(monkeypatch, tmp_path):
 
 def test_a_sticky_law_of_ones_own_has_the_columns_and_starts_of_ours(point, as_a_users_own):
     def candidates():
-        return [each for each in wrist_candidates(point, ()) if each.law.id == LAW]
+        return [each for each in wrist_candidates(point, searched(())) if each.law.id == LAW]
 
     ours = candidates()
     as_a_users_own()

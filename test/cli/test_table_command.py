@@ -52,7 +52,7 @@ def test_shipped_table_is_good_and_of_the_shipped_geometry(tmp_path):
 def test_table_that_states_too_small_an_error_is_not_good(small_table, tmp_path, capsys, quantity):
     table, _ = small_table
     errors = copy.deepcopy(table.header.errors)
-    errors["predicted"]["operative"][quantity] *= 0.99
+    errors["predicted"]["operative"][quantity] *= 0.2
     path = tmp_path / "boastful.npz"
     save_table(replace(table, header=replace(table.header, errors=errors)), path)
     code, findings = check(path, tmp_path)

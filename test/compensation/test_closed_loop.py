@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervisor import State, SupervisorSettings
+from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.simulation.stops import Stops
 

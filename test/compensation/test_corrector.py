@@ -59,7 +59,7 @@ def test_the_compiled_search_is_the_one_in_python(theta, load, on_platform, obje
     running = RunningModel(model, HeldSignals(1.0), HeldSignals(1.0))
     corrector = Corrector()
     corrected(corrector, running, STEP_NS, theta, None, own)
-    corrector._held[:] = held
+    corrector.held[:] = held
     play = own.safety.deadband_steps * geometry.limits.encoder_step
     try:
         wanted = search(running, own, 0, load, theta, None, held, play)
@@ -87,7 +87,8 @@ def commands(count, seed):
     stamps = STEP_NS * np.arange(1, count + 1)
     stamps[count // 2 :] += 500 * STEP_NS
     wanted = rng.random(count) > 0.02
-    return CompiledCommands(stamps, theta, load, rng.random(count) > 0.5, wanted)
+    shares = np.ones(count)
+    return CompiledCommands(stamps, theta, load, rng.random(count) > 0.5, wanted, shares)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -96,7 +97,7 @@ def test_a_block_is_its_commands_one_by_one_to_the_bit(seed):
     running, together, alone = running_model(), Corrector(), Corrector()
     correcting = Correcting(together, running, running.compiled, SETTINGS, block)
     for begin in range(0, len(block.wanted), 150):
-        correcting.correct(begin, min(begin + 150, len(block.wanted)))
+        correcting.correct(min(begin + 150, len(block.wanted)))
     rows, faults = correcting.found, correcting.faults
     running = running_model()
     for i, stamp_ns in enumerate(block.stamp_ns.tolist()):
@@ -107,7 +108,7 @@ def test_a_block_is_its_commands_one_by_one_to_the_bit(seed):
         if one.correction is not None:
             assert np.array_equal(rows.rows[i, 2:8], one.correction.after)
             twist = one.correction.prediction.twist
-            assert np.array_equal(rows.predicted.twist[i], twist)
+            assert np.array_equal(rows.twist[i], twist)
             assert np.array_equal(rows.active[i], one.correction.prediction.active)
     assert len(faults) >= 5
     assert np.abs(rows.applied).max() > 1e-5

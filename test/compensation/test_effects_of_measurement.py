@@ -10,7 +10,7 @@ import pytest
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import catalogue, find_law

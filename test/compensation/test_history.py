@@ -16,7 +16,7 @@ from wrist_stiffness.compensation.monitor_stream import MonitorStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervisor import State, SupervisorSettings
+from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block, Sample
 from wrist_stiffness.model.effect import Effect
@@ -218,7 +218,8 @@ def test_a_frozen_contact_comes_back_neither_by_the_residual_nor_by_the_memory(m
             stamp = SECOND + i * SECOND // 10
             force = DOWN[:3] + [push if i >= 20 else 0.0, 0.0, 0.0]
             stream.loads.add(stamp, "wrist_base", force, DOWN[3:])
-            command = stream.on_command(stamp, "", NAMES, [0.1, 0.2])
+            # A motion, by which the contact may have come.
+            command = stream.on_command(stamp, "", NAMES, [0.1 + 1e-3 * (i >= 20), 0.2])
         assert stream.supervision.payload is not None
         assert (stream.supervision.state is State.IN_CONTACT) is (push > 0.0)
         commands.append(command)

@@ -1,15 +1,17 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import LoadHistory, LoadIntake
+from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.errors import InputError, StaleLoadError
 from wrist_stiffness.model.error_model import Load
 
 SECOND = 1_000_000_000
 AGE_LIMIT_S = 0.5
+LIMIT = Thresholds(0.05, 0.002)
 
 
 def load_of(value, on_platform=False):
@@ -90,7 +92,7 @@ def intake():
 
 
 def tare(loads):
-    loads.zero = loads.measured_zero()
+    loads.zero = loads.measured_zero(LIMIT)
     return loads.zero.load.wrench
 
 
@@ -98,10 +100,44 @@ def test_tare_takes_the_mean_of_the_last_second_as_zero():
     loads = intake()
     loads.add(0, "wrist_base", [9.0, 0, 0], [0, 0, 0])
     for i in range(5):
-        loads.add(2 * SECOND + i * SECOND // 10, "wrist_base", [i, 0, 0], [0, 0, 1.0])
-    assert tare(loads).tolist() == [2.0, 0, 0, 0, 0, 1.0]
+        loads.add(2 * SECOND + i * SECOND // 10, "wrist_base", [2.0 + i % 2, 0, 0], [0, 0, 1.0])
+    assert tare(loads).tolist() == pytest.approx([2.4, 0, 0, 0, 0, 1.0])
     _, load = loads.at(2 * SECOND + SECOND // 10)
-    assert load.wrench.tolist() == [-1.0, 0, 0, 0, 0, 0]
+    assert load.wrench.tolist() == pytest.approx([0.6, 0, 0, 0, 0, 0])
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    hertz=st.floats(0.5, 2.0),
+    phase=st.floats(0.0, 6.3),
+    rate=st.sampled_from([50, 200]),
+    couple=st.booleans(),
+)
+def test_tare_under_a_swinging_load_is_refused(hertz, phase, rate, couple):
+    """Six thresholds of swing; a tenth of one is not worth a word."""
+    limit = LIMIT.moment if couple else LIMIT.force
+    for size in (6.0, 0.1):
+        loads, wrench = intake(), np.zeros(6)
+        for i in range(2 * rate):
+            wrench[3 * couple] = size * limit * np.sin(2.0 * np.pi * hertz * i / rate + phase)
+            loads.add(SECOND + i * SECOND // rate, "wrist_base", wrench[:3], wrench[3:])
+        if size < 1.0:
+            assert np.abs(tare(loads)).max() <= size * limit
+            continue
+        with pytest.raises(InputError, match="tare: the load moves by"):
+            tare(loads)
+        assert loads.zero is None
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 1000), rate=st.sampled_from([50, 200]), size=st.floats(0.0, 3.0))
+def test_tare_of_a_noisy_sensor_is_no_swing(seed, rate, size):
+    """Its thresholds grow with its noise instead."""
+    noise = np.random.default_rng(seed).normal(size=(rate + 1, 6))
+    loads = intake()
+    for i, each in enumerate(size * noise * np.repeat(LIMIT, 3)):
+        loads.add(SECOND + i * SECOND // rate, "wrist_base", each[:3], each[3:])
+    tare(loads)
 
 
 def test_tare_without_a_load_is_refused():

@@ -8,7 +8,7 @@ import pytest
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.memory import play
 from wrist_stiffness.model.parameters import Estimate

@@ -89,6 +89,25 @@ def test_a_stream_knows_the_frames_and_the_parameter_goes_first():
     assert np.allclose(stream.loads.at(3)[1].wrench[:3], (T[3] @ T[1])[:3, 2])
 
 
+def test_the_prefix_of_a_wrist_may_stand_before_all_its_frames():
+    """By it two wrists share one /tf; the other wrist's frames are none of this one's."""
+    mapped = {"here": SensorFrame("wrist_platform")}
+    stream = PredictionStream(None, StreamSettings(frames=Frames(mapped, "left/")))
+    chain = [
+        transform("left/wrist_platform", "left/ft", 1),
+        transform("right/wrist_base", "foot", 2),
+    ]
+    stream.on_static_transforms(chain)
+    frames = stream.loads.frames
+    for name in ("ft", "left/ft", "/left/ft", "left/here", "wrist_platform", "left/wrist_platform"):
+        assert frames.load(name, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)).on_platform
+    assert frames.is_at_origin("left/wrist_base")
+    assert frames.turns("left/wrist_platform")
+    for name in ("foot", "right/wrist_base", "right/ft"):
+        with pytest.raises(FrameError, match="is not known"):
+            frames.load(name, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+
+
 def test_a_slash_before_a_name_does_not_count():
     found = sensor_frames([transform("/wrist_platform", "/ft", 1)])
     assert found.keys() == {"ft"}

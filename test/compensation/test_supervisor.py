@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from wrist_stiffness.compensation import supervisor as module
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.payload import Payload, Thresholds
+from wrist_stiffness.compensation.payload import Payload, Scales, Thresholds
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervisor import State, Supervisor, SupervisorSettings
+from wrist_stiffness.compensation.supervision import State, SupervisorSettings
+from wrist_stiffness.compensation.supervisor import LATE_S, Supervisor
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel, Load
@@ -22,6 +23,8 @@ REACH = np.radians(0.5)
 HERE, THERE = np.array([0.1, -0.2]), np.array([-0.3, 0.25])
 PART = Payload(0.2, (0.01, -0.02, 0.03))
 NOTHING = np.zeros(6)
+TRUST = SupervisorSettings().trust
+MOTION = 1e-3  # rad, some encoder steps: such a motion may bring a contact
 AGREED = 1e-5  # N m, of thresholds of 2e-3: what the first guess of the centre leaves
 
 
@@ -56,15 +59,13 @@ class Cell:
             wrench = np.asarray(acting, dtype=float)
             if on_platform:
                 wrench = np.concatenate([rotation.T @ each for each in wrench.reshape(2, 3)])
-            self.corrected = self.supervisor.judge(
-                self.stamp,
-                self.theta.tolist(),
-                Load(wrench, on_platform),
-                rotation,
-                self.table.geometry,
-                self.settings,
-                REACH,
-            ).wrench
+            load_in_f = Load(wrench, on_platform).in_base(self.table.mechanism.forward(self.theta))
+            scales = self.supervisor.scales(self.table.geometry)
+            reading = scales.reading(load_in_f.tolist(), rotation.tolist())
+            judged = self.supervisor.judge(
+                self.stamp, self.theta.tolist(), reading, self.settings, REACH
+            )
+            self.corrected = np.zeros(6) if judged is None else np.array(judged)
             self.supervisor.share(self.turn)
             state = self.supervisor.supervision.state
             if [state] != self.states[-1:]:
@@ -146,15 +147,26 @@ def test_noise_below_the_thresholds_changes_nothing(table, noise):
 @pytest.mark.parametrize("push", [side(0.3), side(0.0, 0.01)], ids=["force", "couple"])
 def test_in_contact_the_payload_alone_is_corrected_for(cell, push):
     cell.feel(3.0, PART)
+    cell.theta = HERE + MOTION
     told = cell.feel(1.0, cell.weight(PART) + push)
     assert (told.state, told.valid, bool(told.text)) == (State.IN_CONTACT, False, True)
-    assert np.allclose(cell.corrected, cell.weight(PART), rtol=0.0, atol=AGREED)
+    assert np.allclose(cell.corrected, cell.weight(PART), rtol=0.0, atol=MOTION * 0.2 * 9.81)
+    assert told.share == 1.0
     assert cell.feel(0.3, PART).state is State.IN_CONTACT
     assert cell.feel(0.3, PART).state is State.HOLDING
 
 
+@pytest.mark.parametrize("push", [side(0.3), side(0.0, 0.01)], ids=["force", "couple"])
+def test_a_contact_that_no_motion_brought_may_have_taken_the_payload(cell, push):
+    """Released under a ceiling, whose load is as large as that of the part."""
+    cell.feel(3.0, PART)
+    told = cell.feel(2.0, cell.weight(PART) + push)
+    assert (told.state, told.payload, told.share) == (State.IN_CONTACT, None, 0.0)
+
+
 def test_a_part_that_is_lost_in_contact_is_not_corrected_for(cell):
     cell.feel(3.0, PART)
+    cell.theta = HERE + MOTION
     cell.feel(1.0, cell.weight(PART) + side(0.3))
     told = cell.feel(0.5, side(0.3))
     assert (told.state, told.payload) == (State.IN_CONTACT, None)
@@ -163,6 +175,7 @@ def test_a_part_that_is_lost_in_contact_is_not_corrected_for(cell):
 def test_in_contact_a_payload_stands_in_only_where_its_moment_is_known(cell):
     """Its centre along gravity shows at another pose; there the contact hides it."""
     cell.feel(3.0, PART)
+    cell.theta = HERE + MOTION
     assert cell.feel(1.0, cell.weight(PART) + side(1.5)).payload is not None
     cell.theta = THERE
     assert cell.feel(1.0, cell.weight(PART) + side(1.5)).payload is None
@@ -276,6 +289,58 @@ def test_a_load_that_comes_late_while_the_wrist_moves_is_no_contact(cell):
     assert cell.states.count(State.HOLDING) == 1
 
 
+def test_the_farther_a_load_departs_the_sooner_it_is_believed(table):
+    def seconds(push):
+        cell = Cell(table)
+        cell.feel(3.0, PART)
+        for i in range(100):
+            if cell.feel(0.01, cell.weight(PART) + side(push)).state is State.IN_CONTACT:
+                return i / 100
+        return np.inf
+
+    assert seconds(0.049) == np.inf
+    assert 0.08 <= seconds(0.055) <= 0.1
+    assert 0.01 <= seconds(0.5) <= 0.02
+    # One reading alone is believed never.
+    assert seconds(50.0) == 0.01
+
+
+def test_in_contact_with_a_lost_part_the_correction_fades_wherever_the_contact_points(cell):
+    cell.feel(3.0, PART)
+    cell.turn = np.array([0.0, 1e-3, 0.0])
+    cell.theta = HERE + MOTION
+    helping = np.array([0.3, 0.0, 0.0, 0.0, 0.01, 0.0])
+    assert cell.feel(0.5, cell.weight(PART) + helping).share == 1.0
+    told = cell.feel(1.5, helping)
+    assert (told.state, told.payload, told.share) == (State.IN_CONTACT, None, 0.0)
+
+
+@pytest.mark.parametrize("hertz", [20, 1000])
+def test_a_payload_is_learned_by_time_not_by_the_number_of_readings(table, hertz):
+    cell = Cell(table)
+    scales = Scales(table.geometry)
+    reading = scales.reading(cell.weight(PART).tolist(), cell.rotation().tolist())
+    learned = scales.unknown(reading)
+    for _ in range(hertz):
+        assert learned.explains(reading, SupervisorSettings().limit, 1.0 / (hertz * LATE_S))
+    # Five readings that are independent, each of a third of the threshold.
+    wanted = SupervisorSettings().limit.moment / np.sqrt(5.0)
+    assert learned.open_moment(reading.rows) == pytest.approx(wanted, rel=1e-3)
+
+
+@settings(max_examples=50, deadline=None)
+@given(doubt=st.floats(1.0, 10.0), other=st.floats(0.0, 1.0))
+def test_the_trust_leaves_least_of_the_error_in_the_worst_case(doubt, other):
+    softer = np.geomspace(1.0 / doubt, doubt, 1001)
+
+    def worst(share):
+        return np.max(np.abs(1.0 - share * softer))
+
+    trust = SupervisorSettings(model_doubt=doubt).trust
+    assert worst(trust) <= min(worst(other), 1.0) + 1e-12
+    assert SupervisorSettings(model_doubt=doubt, follow=True).trust == 1.0
+
+
 def test_thresholds_are_not_below_the_scatter_of_the_load(cell):
     cell.supervisor.scatter = Thresholds(0.5, 0.05)
     assert cell.feel(2.0, side(0.3)).state is State.FREE
@@ -302,11 +367,11 @@ def stream_of(table, **options):
     return stream
 
 
-def drive(stream, seconds, wrench, start=0.0):
+def drive(stream, seconds, wrench, start=0.0, theta=HERE):
     for i in range(round(50 * seconds)):
         stamp = round((10.0 + start + i / 50) * SECOND)
         stream.loads.add(stamp, "wrist_base", wrench[:3], wrench[3:])
-        command = stream.on_command(stamp, "", NAMES, HERE)
+        command = stream.on_command(stamp, "", NAMES, theta)
     return command
 
 
@@ -338,5 +403,19 @@ def test_a_plan_without_commands_is_corrected_for_what_was_held_before_it(soft):
     follow = stream_of(soft, supervisor=SupervisorSettings(follow=True))
     follow.loads.add(10 * SECOND, "wrist_base", weight[:3], weight[3:])
     wanted = follow.on_trajectory(10 * SECOND, "", NAMES, plan)
-    assert np.allclose(found.points[0].positions, wanted.points[0].positions, rtol=0.0, atol=1e-7)
-    assert np.max(np.abs(found.points[0].positions - HERE)) > 1e-4
+    added, full = (each.points[0].positions - HERE for each in (found, wanted))
+    assert np.allclose(added, TRUST * full, rtol=0.0, atol=1e-7)
+    assert np.max(np.abs(added)) > 1e-4
+
+
+def test_a_plan_is_valid_only_where_the_payload_is_known(soft):
+    """One pose hides the height of a payload's centre, which another pose shows."""
+    stream, cell = stream_of(soft), Cell(soft)
+    drive(stream, 4.0, cell.weight(PART))
+    here, there = planned_point(2, HERE), planned_point(2, THERE)
+    assert stream.on_trajectory(14 * SECOND, "", NAMES, [here]).valid
+    doubted = stream.on_trajectory(14 * SECOND, "", NAMES, [here, there])
+    assert (doubted.fault, doubted.valid) == (None, False)
+    cell.theta = THERE
+    drive(stream, 4.0, cell.weight(PART), 4.0, THERE)
+    assert stream.on_trajectory(18 * SECOND, "", NAMES, [here, there]).valid

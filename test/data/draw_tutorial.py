@@ -22,7 +22,7 @@ RECORDINGS = Path(__file__).parent / "tutorial"
 PICTURES = Path(__file__).parents[2] / "docs/pictures"
 
 STORIES = {
-    "tutorial-known": ("tuesday", "approach direction", ("wrist_7", "worn")),
+    "tutorial-known": ("tuesday", "the side of approach", ("wrist_7", "worn")),
     "tutorial-unknown": ("thursday", "clamp_bar", ("worn", "clamped")),
 }
 """Recording, condition and models by the beginning of the pictures' names."""
@@ -43,13 +43,14 @@ def draw(name: str, folder: Path) -> None:
             models,
             [model.after[q.key].rms for model in found.models],
             [model.after[q.key].uncertainty for model in found.models],
-            {"noise floor": found.floor[q.key]},
+            {"instrument noise": found.noise[q.key]},
         )
         for q in found.quantities
     ]
     draw_bars(bars).savefig(PICTURES / f"{name}-fall.png", dpi=130)
-    statement = next(s for s in found.models[0].told.statements if s.condition.topic == topic)
-    shown = against(statement, [(model.name, model.refitted) for model in found.models])
+    told = next(each for each in found.models[0].explained.told if topic in each.members)
+    others = [(model.name, model.refitted) for model in found.models[1:]]
+    shown = against(told.curve, told.name, others)
     draw_against([shown]).savefig(PICTURES / f"{name}-shown.png", dpi=130)
 
 

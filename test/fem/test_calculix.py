@@ -24,11 +24,11 @@ needs_ccx = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module")
-def model(make_wrist, coarse):
+@pytest.fixture(scope="module", params=["rigid", "sliding"])
+def model(make_wrist, coarse, request):
     wrist = make_wrist(gap=2e-6, skew=0.15)
     pose = mechanism_of(wrist).forward([0.3, -0.2])
-    return factor_pose(build_wrist(wrist, coarse), pose)
+    return factor_pose(build_wrist(wrist, coarse, request.param == "sliding"), pose)
 
 
 @needs_ccx
@@ -70,3 +70,20 @@ def test_no_number_is_longer_than_calculix_reads(model, tmp_path):
     assert max(len(item) for line in lines for item in line.split(",")) <= 20
     assert max(map(len, lines)) <= 132
     assert math.isclose(float(lines[0].split(",")[1]), model.placed[0].nodes[0, 0] * 1e3)
+
+
+def test_no_direction_of_a_node_depends_on_two_equations(model, tmp_path):
+    """CalculiX refuses a deck in which the first terms of two equations are one unknown."""
+    wrist, turned = model.wrist, mechanism_of(model.wrist.geometry)
+    for theta in ([0.3, -0.2], [-0.5, 0.4]):
+        pose = factor_pose(wrist, turned.forward(theta))
+        deck = tmp_path / "pose.inp"
+        write_deck(pose, deck, LOAD, GRAVITY, np.ones(len(pose.gaps), dtype=bool))
+        lines = deck.read_text().splitlines()
+        first = [
+            tuple(lines[k + 2].split(",")[:2])
+            for k, line in enumerate(lines)
+            if line == "*EQUATION"
+        ]
+        assert len(first) > 100
+        assert len(set(first)) == len(first)

@@ -151,7 +151,7 @@ def test_distributing_walls_soften_every_part_in_every_direction(skewed_componen
 
 
 def test_unknown_interface_model_is_refused(make_wrist, coarse):
-    with pytest.raises(InputError, match="'glued' is not one of rigid, distributing"):
+    with pytest.raises(InputError, match="'glued' is not one of rigid, distributing, sliding"):
         elastic_components(make_wrist(), coarse, interface="glued")
 
 

@@ -155,6 +155,26 @@ def test_warm_or_cold_link_under_closed_flanges(poses, components, geometry, nam
 
 
 @pytest.mark.slow
+def test_sliding_bushings(geometry, coarse):
+    """Normal ties alone, solved whole with no slide or turn imposed, give what is condensed."""
+    sliding, _ = elastic_components(geometry, coarse, "sliding")
+    wrist, mechanism = build_wrist(geometry, coarse, slides=True), mechanism_of(geometry)
+    rng = np.random.default_rng(26)
+    closed = 0
+    for name in ("link_1", "joint_3", "joint_4"):
+        model = factor_pose(wrist, mechanism.forward(rng.uniform(-0.6, 0.6, 2)))
+        load = rng.normal(size=6) * [2, 2, 2, 0.03, 0.03, 0.03]
+        screw = rng.normal(size=6) * np.repeat([20e-6, 5e-4], 3)
+        for screws in ({}, {name: screw}):
+            solution = solve_pose(model, load, Disturbance(gravity=GRAVITY, screws=screws))
+            twist, force = condensed_twist(model.configuration, sliding, load, GRAVITY, screws)
+            closed += int(np.count_nonzero(solution.forces))
+            assert relative_difference(solution.twist, twist) < AGREEMENT
+            np.testing.assert_allclose(force, solution.forces, atol=1e-6)
+    assert closed > 0
+
+
+@pytest.mark.slow
 def test_energy_balance(poses):
     """Work of load, weight and contact forces is twice the strain energy of all elements."""
     for model, load in poses[:3]:

@@ -17,7 +17,7 @@ from wrist_stiffness.fem.elasticity import (
 from wrist_stiffness.fem.factor import factorise
 from wrist_stiffness.fem.mesh import mesh_solid
 from wrist_stiffness.fem.parts import ElasticBody, Solid, assemble_body
-from wrist_stiffness.fem.solids import bushing_section
+from wrist_stiffness.fem.solids import MeshSettings, bushing_section
 from wrist_stiffness.fem.superelement import condense
 from wrist_stiffness.mechanism.geometry import Material
 
@@ -125,6 +125,52 @@ def test_bonded_sleeve_squeezed_sideways_lies_between_bounds(plain_sleeve):
     layer = math.pi * middle * dimensions.length / dimensions.wall * (first + 3 * shear)
     measured = 1 / condense(plain_sleeve, "rigid").flexibility[0, 0]
     assert 0.9 * layer < measured < 1.02 * layer
+
+
+def test_sliding_sleeve_squeezed_sideways_is_lames_annulus(plain_sleeve):
+    """Far from its ends: bonded inside, pushed without friction outside, in plane strain.
+
+    Both ends give way by the same amount, so the difference of two lengths is the middle's.
+    """
+    dimensions = plain_sleeve.solid.dimensions
+    inner = dimensions.pin_diameter / 2
+    outer = inner + dimensions.wall
+    sizes = MeshSettings(
+        link=1.0, bore=1.0, bushing=0.25e-3, bushing_corner=0.25e-3, bushing_arc=1.0e-3
+    )
+    stiffness = []
+    for length in (8e-3, 12e-3):
+        solid = replace(plain_sleeve.solid, dimensions=replace(dimensions, length=length))
+        flexibility = condense(assemble_body(solid, sizes), "sliding").flexibility
+        stiffness.append(1 / flexibility[0, 0])
+    exact = frictionless_annulus(dimensions.material, inner, outer)
+    assert (stiffness[1] - stiffness[0]) / 4e-3 == pytest.approx(exact, rel=1e-3)
+    # Glue carries 7 % more: the check can tell the two walls apart.
+    assert 1 / condense(plain_sleeve, "rigid").flexibility[0, 0] / 16e-3 > 1.05 * exact
+
+
+def frictionless_annulus(material, inner, outer):
+    """Force for each length and sideways shift of the outer wall [N/m^2], from Navier's equations.
+
+    u_r = f(r) cos t and u_t = g(r) sin t: a rigid shift, a dipole, the line force, a quadratic.
+    """
+    first, shear = lame(material)
+    kappa = 3 - 4 * material.poisson
+    modes = (
+        lambda r: (1, -1, 0, 0),
+        lambda r: (r**-2, r**-2, -2 * r**-3, -2 * r**-3),
+        lambda r: (kappa * math.log(r) - 1, -kappa * math.log(r), kappa / r, -kappa / r),
+        lambda r: [w * v for w in (r**2, 2 * r) for v in (shear - first, 3 * first + 5 * shear)],
+    )
+
+    def rows(r):
+        f, g, df, dg = np.array([mode(r) for mode in modes], dtype=float).T
+        pressure = first * (df + (f + g) / r) + 2 * shear * df
+        return f, g, pressure, shear * (dg - (f + g) / r)
+
+    held, moved = rows(inner), rows(outer)
+    system = np.array([held[0], held[1], moved[0], moved[3]])
+    return math.pi * outer * moved[2] @ np.linalg.solve(system, [0.0, 0.0, 1.0, 0.0])
 
 
 def test_swept_bushing_agrees_with_a_meshed_cad_solid(plain_sleeve, coarse):

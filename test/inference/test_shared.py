@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.shared import Apart, own_covariance
-from wrist_stiffness.inference.whitening import NoiseModel, component_factors
+from wrist_stiffness.inference.shared import Apart, component_factors, own_covariance
 
 STAND = np.array([0, 0, -1, 1, 1, 1, -1])
 
@@ -59,13 +58,7 @@ def test_part_of_a_table_shares_what_is_left_of_it(table):
     assert float(np.sum(white**2)) == pytest.approx(exact, rel=1e-9)
 
 
-def test_a_noise_model_whitens_by_what_is_shared_and_what_is_beyond(table):
-    beyond, scale = np.diag([0.3, 0.2, 0.1]), 2.5
-    noise = NoiseModel(beyond, 0.0, 1.0, np.inf, "given", scale=scale)
-    columns = np.random.default_rng(7).normal(size=(7, 3, 4))
-    white = noise.whiten(table, columns)
-    seen = table.measured.ravel()
-    total = scale * (dense(table) + np.kron(np.eye(7), beyond))
-    flat = columns.reshape(21, 4)[seen]
-    exact = flat.T @ np.linalg.solve(total[np.ix_(seen, seen)], flat)
-    assert white.T @ white == pytest.approx(exact, rel=1e-9)
+def test_unmeasured_components_are_left_out_of_the_coupling():
+    covariance = np.array([[[4.0, 1.0], [1.0, 9.0]]])
+    factor = component_factors(covariance, np.array([[True, False]]))
+    np.testing.assert_allclose(factor[0], [[0.5, 0], [0, 1]])

@@ -45,18 +45,29 @@ def test_spline_passes_through_the_closed_form_at_its_nodes(shipped):
     assert np.max(np.abs(difference)) < 1e-7
 
 
-def test_spline_agrees_with_closed_form_to_the_stated_error(shipped, poses):
-    """At poses other than those from which the error was stated, with own weight and contact."""
-    configuration = shipped.mechanism.forward(poses)
-    figures = [
-        rated_map(configuration, shipped.operators_at(configuration, way), shipped.geometry)[:, 3:]
+@pytest.mark.parametrize("region", ["operative", "domain"])
+def test_stated_spline_error_covers_poses_and_loads_never_drawn_before(shipped, region):
+    """As vectors, with own weight and contact, under loads of the whole range; fresh every time."""
+    rng = np.random.default_rng()
+    lower, upper = shipped.workspace.rectangle
+    poses = rng.uniform(lower, upper, (4000, 2))
+    inside = shipped.workspace.operative if region == "operative" else shipped.workspace.domain
+    configuration = shipped.mechanism.forward(poses[inside(poses)][:1000])
+    directions = rng.normal(size=(2, len(configuration.b), 3))
+    sizes = rng.uniform(0.0, [[5.0], [0.1]], (2, len(configuration.b)))
+    sizes /= np.linalg.norm(directions, axis=2)
+    loads = np.hstack(list(sizes[..., None] * directions))
+    exact, splined = (
+        respond(shipped.operators_at(configuration, way), loads).twist.reshape(-1, 2, 3)
         for way in ("closed_form", "spline")
-    ]
-    stated = shipped.header.errors["predicted"]["operative"]
-    found = np.max(np.abs(figures[1] / figures[0] - 1.0), axis=0)
-    # The stated error is a maximum over 400 poses; twice that bounds another sample.
-    assert found[0] <= 2.0 * stated["s"]
-    assert found[1] <= 2.0 * stated["phi"]
+    )
+    relative = np.linalg.norm(splined - exact, axis=2) / np.linalg.norm(exact, axis=2)
+    stated = shipped.header.errors["predicted"][region]
+    # Of a hundred, 99 were covered when it was stated: 95 of a thousand fresh ones always are.
+    assert np.mean(relative[:, 0] <= stated["s"]) >= 0.95
+    assert np.mean(relative[:, 1] <= stated["phi"]) >= 0.95
+    # Nor is it so large that anything would pass.
+    assert np.mean(relative[:, 0] <= stated["s"] / 10.0) < 0.95
 
 
 def test_an_entry_that_vanishes_is_measured_by_its_row(shipped):

@@ -60,6 +60,21 @@ CASES = {
         [0.0, 0.6, 0.8],
         "axes: home pose is singular: |D| = 0.00e+00 below 1e-06",
     ),
+    "modulus in Pa": (
+        "materials.steel.young_GPa",
+        200e9,
+        "young_GPa: 200000000000.0 is not below 2000",
+    ),
+    "modulus in MPa": (
+        "materials.polymer.young_GPa",
+        2400.0,
+        "young_GPa: 2400.0 is not below 2000",
+    ),
+    "density in g/cm3": (
+        "materials.steel.density_kg_m3",
+        7.85,
+        "density_kg_m3: 7.85 is not above 10",
+    ),
     "normal along b": (
         "platform.normal",
         [0.0, 1.0, 0.0],

@@ -44,7 +44,10 @@ ELEMENTS = {
     "bool": st.booleans(),
     # rosbags refuses bytes above 127.
     "byte": st.integers(0, 127),
+    "uint8": st.integers(0, 255),
+    "int32": st.integers(-(2**31), 2**31 - 1),
     "uint32": st.integers(0, 2**32 - 1),
+    "float32": st.floats(width=32),
     "float64": st.floats(),
     "string": TEXTS,
     **dict.fromkeys(SECONDS_NANOSECONDS, TIMES),
@@ -75,8 +78,8 @@ def foreign(message, make):
     fields = {}
     for item in fields_of(message.ros_type):
         value = getattr(message, item.attribute)
-        if item.element == "float64" and (item.is_sequence or item.count):
-            fields[item.name] = np.array(value, dtype=np.float64)
+        if item.element in ("uint8", "float64") and (item.is_sequence or item.count):
+            fields[item.name] = np.array(value, dtype=item.element)
         elif item.is_sequence:
             fields[item.name] = [value_of(item, element) for element in value]
         else:

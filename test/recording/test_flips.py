@@ -16,6 +16,7 @@ from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import open_recording
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import channel_of
+from wrist_stiffness.recording.messages import String
 
 FORMS = {
     "zstd": {"compression": CompressionType.ZSTD},
@@ -69,6 +70,27 @@ def read(path):
     columns = [(name, times.tolist(), [bytes(row) for row in part]) for name, times, part in rows]
     blocks = [message for block in recording.blocks() for message in block.messages()]
     return (topics, raw, columns, blocks), recording.damage
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_a_record_taken_for_one_of_another_kind_is_told(tmp_path, timeline, form):
+    # Such as the file's header for a message: its profile's length is then channel 4.
+    more = [(f"/more_{number}", 10**9 + number, String("x")) for number in range(4)]
+    data = stored([*timeline(10), *more], **form)
+    path = tmp_path / "flipped.mcap"
+    path.write_bytes(data)
+    whole, _ = read(path)
+    begins = {opcode: begin for opcode, begin, _ in reversed(list(records(data)))}
+    for opcode, begin in begins.items():
+        for bit in range(8):
+            flipped = bytearray(data)
+            flipped[begin] ^= 1 << bit
+            path.write_bytes(flipped)
+            try:
+                found, damage = read(path)
+            except RecordingError:
+                continue
+            assert damage or found == whole, (opcode.name, bit)
 
 
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)

@@ -209,6 +209,8 @@ def test_a_whole_trajectory_is_corrected_point_by_point(graph, corrector, model)
         assert np.allclose(point.velocities, wanted[::-1], rtol=0, atol=1e-9)
         assert len(point.accelerations) == 0
         assert point.time_from_start.sec == i
+    known = "load known all along the last trajectory"
+    graph.status("angle_corrector", lambda status, values: values[known] == "true")
 
 
 def test_a_trajectory_is_corrected_whole_or_not_at_all(graph, corrector):

@@ -88,8 +88,10 @@ class Run:
         self._graph = graph
         self.answers = graph.probe.create_publisher(message_type, topic, 10)
         self._message_type, self.quiet_s = message_type, 0.0
+        self.last = 0
         graph.listen(JointState, "/joint_states")
-        graph.add(CellSimulator, programs=1, program_s=1.0, rate_hz=RATE_HZ, listeners=1)
+        arguments = {"programs": 1, "program_s": 1.0, "rate_hz": RATE_HZ, "listeners": 1}
+        self.cell = graph.add(CellSimulator, **arguments)
         graph.until(self.answers.get_subscription_count, "listener")
 
     def spin(self, seconds):
@@ -106,8 +108,9 @@ class Run:
         self._graph.until(quiet, "end of the run")
 
     def answer(self):
-        """Answer the last sample."""
-        header = self._graph.heard["/joint_states"][-1].header
+        """Answer the last sample; on a busy machine others may have come before it."""
+        heard = self._graph.heard["/joint_states"]
+        header, self.last = heard[-1].header, len(heard)
         self.answers.publish(self._message_type(header=header))
 
 
@@ -160,10 +163,13 @@ def test_a_run_says_who_fell_silent(graph, monkeypatch, capsys, answered, gone):
         "pose_error_predictor: no answer heard to ([0-9]+) of ([0-9]+) samples, ([0-9]+) of", line
     )
     missing, asked, silence = map(int, told.groups())
-    assert asked == len(heard) >= 2 * RATE_HZ
+    # What was said before the end may not have been taken yet.
+    graph.executor.remove_node(run.cell)
+    graph.until(lambda: len(heard) == asked, "last sample")
+    assert asked >= 2 * RATE_HZ
     # The motors' queue holds one: of answers that come close together only the newest is heard.
     assert asked - answered <= missing < asked + (answered == 0)
-    assert asked - answered - 5 <= silence <= missing
+    assert asked - run.last <= silence <= missing
 
 
 @pytest.mark.slow

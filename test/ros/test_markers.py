@@ -7,9 +7,10 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from wrist_stiffness.model.error_model import Load
-from wrist_stiffness.ros.markers import body_transforms, wrist_markers
+from wrist_stiffness.ros.body_transforms import body_transforms
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 from wrist_stiffness.ros.qos import STATE_QOS
+from wrist_stiffness.workflows.wrist_drawing import WristDrawing
 
 SECOND = 1_000_000_000
 DOWN = Load(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
@@ -22,7 +23,8 @@ def place(point):
 @pytest.fixture
 def drawn(model):
     prediction = model.predict(np.array([0.4, -0.3]), DOWN)
-    message = wrist_markers(SECOND, model.table, prediction, 500.0)
+    drawing = WristDrawing(model.table.geometry, 500.0)
+    message = drawing.message(SECOND, prediction.configuration, prediction.twist)
     return prediction, {marker.ns: marker for marker in message.markers}
 
 
@@ -86,6 +88,10 @@ def test_transforms_and_description_name_the_same_bodies(graph, model, model_pat
     configuration = model.predict(np.array([0.2, -0.4]), Load(np.zeros(6))).configuration
     transforms = body_transforms(7, configuration)
     assert {each.child_frame_id for each in transforms} | {"wrist_base"} == links
+    prefixed = body_transforms(7, configuration, "left/")
+    children = {each.child_frame_id for each in prefixed}
+    assert children | {"left/wrist_base"} == {f"left/{link}" for link in links}
+    assert {each.header.frame_id for each in prefixed} == {"left/wrist_base"}
     (platform,) = (each for each in transforms if each.child_frame_id == "wrist_platform")
     turn = platform.transform.rotation
     found = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()

@@ -6,6 +6,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Temperature
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.model.effect import Effect
@@ -56,6 +57,25 @@ def numbers(message):
 def expected(model, theta=THETA, wrench=DOWN):
     twist = model.predict(np.array(theta), Load(np.array(wrench))).twist
     return np.concatenate(pose_of_twist(twist)).tolist()
+
+
+def test_frames_have_the_prefix_of_their_wrist(graph, model_path):
+    node = graph.add(PoseErrorPredictor, model_file=str(model_path), frame_prefix="left/")
+    topics = {
+        "/pose_error_predicted": PoseWithCovarianceStamped,
+        "/pose_error/s_um": Vector3Stamped,
+        "/wrist_markers": MarkerArray,
+    }
+    for topic, message_type in topics.items():
+        graph.listen(message_type, topic)
+        graph.connected(topic)
+    graph.load(SECOND, frame_id="left/wrist_base")
+    wait_for_load(graph, node, SECOND)
+    graph.joints("/joint_states", SECOND)
+    graph.until(lambda: all(graph.heard[topic] for topic in topics), "answers")
+    first, second, markers = (graph.heard[topic][0] for topic in topics)
+    frames = {each.header.frame_id for each in (first, second, *markers.markers)}
+    assert frames == {"left/wrist_base"}
 
 
 def test_publishes_what_the_model_predicts_to_the_bit(graph, predictor, model):

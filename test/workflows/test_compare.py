@@ -53,23 +53,25 @@ def compared(with_backlash, tmp_path_factory):
 def test_the_hidden_backlash_is_the_first_thing_that_is_told(compared):
     _, values, _ = compared
     first = values["models"][0]["depends_on"][0]
-    assert first["condition"] == "approach of motor 2"
-    (turn,) = (each["phi_mdeg"] for each in first["changes"] if "phi_mdeg" in each)
-    # The motion of the platform is the motor's, seen through the Jacobian.
-    assert 55 < turn[0] < 100
-    assert turn[0] > 10 * turn[1]
+    assert first["condition"] == "the side of approach"
+    assert first["probability"] > 0.999
+    assert "When motor 2 is approached with rising rather than falling angle" in first["sentence"]
+    change, sigma = re.search(r"turns by ([\d.]+) \+- ([\d.]+) mdeg", first["sentence"]).groups()
+    # Means of both sides are 70 mdeg apart; speed goes with the side, and takes a part of it.
+    assert 45 < float(change) < 75
+    assert float(change) > 10 * float(sigma)
 
 
 def test_the_error_falls_to_the_noise_with_the_right_model(compared):
     printed, values, _ = compared
     before, after = (model["after_registration"]["phi_mdeg"]["rms"] for model in values["models"])
-    floor = values["noise_floor"]["phi_mdeg"]
-    assert before > 5 * floor
-    assert after < 1.15 * floor
+    noise = values["instrument_noise"]["phi_mdeg"]
+    assert before > 5 * noise
+    assert after < 1.15 * noise
     assert values["models"][1]["explained_headroom"]["phi_mdeg"] > 0.9
     assert values["models"][1]["depends_on"] == []
     assert "with_backlash is off by" in printed
-    assert "no more than the noise" in printed
+    assert "noise and drift of the instrument, no more (" in printed
 
 
 def test_a_model_as_drawn_that_fails_is_to_be_calibrated_first(compared, tmp_path):
@@ -128,7 +130,7 @@ def test_a_model_fitted_to_the_recording_is_said_to_be(with_backlash, tmp_path, 
 def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong():
     mistake = "Look at the set-up first: with positions times 1000 the error falls"
     model = {"model": "wrist_7", "after_registration": {"s_um": {"rms": 4.9}}, "depends_on": []}
-    values = {"models": [model], "noise_floor": {"s_um": 0.004}, "verdict": ["off", mistake]}
+    values = {"models": [model], "instrument_noise": {"s_um": 0.004}, "verdict": ["off", mistake]}
     rows = (FleetRow(Path("a"), values), FleetRow(Path("b"), None, "no recording"))
     title, _, row, _, _, told = FleetComparison(rows).lines()
     assert title.startswith("wrist_7, RMS with registrations")
@@ -159,11 +161,11 @@ def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys)
     out = tmp_path / "fleet.json"
     assert main(["compare", str(folder), "--each", "--json", str(out)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert "approach of motor 2" in next(line for line in lines if "wrist_b" in line)
+    assert "the side of approach" in next(line for line in lines if "wrist_b" in line)
     assert "not compared: " in next(line for line in lines if "wrist_x" in line)
     rows = json.loads(out.read_text())["recordings"]
     assert [row["comparison"] is None for row in rows] == [False, True]
-    assert np.isfinite(rows[0]["comparison"]["noise_floor"]["s_um"])
+    assert np.isfinite(rows[0]["comparison"]["instrument_noise"]["s_um"])
 
 
 @pytest.mark.parametrize(

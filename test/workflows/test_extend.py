@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.fitting.calibrate import calibrate
+from wrist_stiffness.campaign.comparing.sentences import sentences
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.calibrate import calibrate
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -119,8 +120,8 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert size.value * soft.value > 0.0
     (line,) = (line for line in found.lines() if "sag_mdeg  " in line)
     assert "usual size" not in line
-    before, after = found.extension.before.rms, found.extension.after.rms
-    assert after["phi_mdeg"] < 1.3 * found.errors.floor["phi_mdeg"]
+    before, after = found.errors.rows.values()
+    assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
     assert before["phi_mdeg"] > 1.5 * after["phi_mdeg"]
     again = {effect.name: effect for effect in load_model(output).effects}["sag@link_2"]
     assert again.law.formula.text == "sag_mdeg * tanh(W_fz / soft_N)"
@@ -147,7 +148,8 @@ def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_p
         addition, session_of(model, planted.with_values({"bow_um_per_N": 20.0}))
     )
     (bow,) = found.extension.own
-    assert abs(bow.value - 20.0) < 3.5 * bow.sigma < 1.0
+    # Of any law a share is in doubt, 5 % where it does not say how much.
+    assert abs(bow.value - 20.0) < 3.0 * bow.sigma < 0.2 * bow.value
     assert [text for text in found.extension.warnings if "usual size" not in text] == []
     with python_laws(True):
         again = load_model(output)
@@ -236,13 +238,13 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     arguments = ["--effect", "backlash@motor_2", "--fit", str(RECORDING), "-o", str(output)]
     assert main(["extend", *arguments, "--json", str(report)]) == 0
     told = json.loads(report.read_text())
-    assert told["before"]["rmse_phi_mdeg"] > 4.0 * told["noise_floor"]["phi_mdeg"]
-    # Half a second at 10 Hz: of the true noise the wander stays whole, and the floor knows it not.
+    assert told["before"]["rmse_phi_mdeg"] > 4.0 * told["noise"]["phi_mdeg"]
+    # Half a second at 10 Hz: of the true noise the wander stays whole.
     shift = instrument("interferometer").shift
     true_um = 1e6 * np.sqrt(3.0 * (shift.white**2 / 5.0 + shift.wander**2))
     assert told["after"]["rmse_s_um"] < 1.1 * true_um
-    assert told["after"]["rmse_phi_mdeg"] < 1.2 * told["noise_floor"]["phi_mdeg"]
-    assert "slow wander of the instrument, which may be the rest" in capsys.readouterr().out
+    assert told["after"]["rmse_phi_mdeg"] < 1.2 * told["noise"]["phi_mdeg"]
+    assert "what is left is no more than the noise" in capsys.readouterr().out
     summary = replay(RECORDING, output, tmp_path / "out.mcap")
     assert summary.predictions == summary.joint_states > 0
 
@@ -253,9 +255,10 @@ def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_b
     notes = {"calibrated": [*SET_UP, *BUILT, "encoder_offset"]}
     found, output = extend_by(backlash, replace(session, notes=notes))
     (width,) = found.extension.parameters
-    assert abs(width.value - 60.0) < 3.5 * width.sigma < 7.0
-    assert found.extension.after.rms["phi_mdeg"] < 1.3 * found.errors.floor["phi_mdeg"]
-    assert found.extension.before.rms["phi_mdeg"] > 2.0 * found.extension.after.rms["phi_mdeg"]
+    assert abs(width.value - 60.0) < 3.0 * width.sigma < 0.25 * width.value
+    before, after = found.errors.rows.values()
+    assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
+    assert before["phi_mdeg"] > 2.0 * after["phi_mdeg"]
     assert [effect.name for effect in load_model(output).effects] == ["backlash@motor_1"]
     with pytest.raises(InputError, match="nothing is left to calibrate: .*'calibrated'"):
         calibrate(model, [replace(session, notes=notes)])
@@ -302,10 +305,10 @@ def test_what_compare_prints_is_what_extend_takes(model, extend_by, screw, kind)
         ["humidity"]
     )
     session = session_of(model, true.with_values({f"plate_{UNIT[kind]}": 2.0}))
-    found = compare_models([("m", model)], [session], np.random.default_rng(0))
-    (told,) = (text for text in found.models[0].told.sentences if "humidity, " in text)
+    found = compare_models([("m", model)], [session])
+    (told,) = (t for t in sentences(found.models[0].explained) if "depends on humidity" in t)
     words = re.search(rf"{kind} (\(.*?\)|[+-][xyz])", told)[0]
-    assert direction_of([words]) == pytest.approx(screw, abs=0.05)
+    assert direction_of([words]) == pytest.approx(screw, abs=0.07)
     addition = FormulaEffect(
         "plate", "frame", direction_of([words]), f"plate_{UNIT[kind]} * humidity", {}
     )

@@ -2,16 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.fitting import extend as fitting
-from wrist_stiffness.campaign.fitting.calibrate import calibrate
-from wrist_stiffness.campaign.fitting.extend import _judged_at_size, _require_new, _widened
-from wrist_stiffness.campaign.fitting.free_effects import FreeEffect, commissioning, unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.calibrate import calibrate
+from wrist_stiffness.campaign.searching.extend import _require_new
+from wrist_stiffness.campaign.searching.free_effects import commissioning, unfitted
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -77,10 +75,9 @@ def test_a_soft_bushing_is_added_at_its_size_and_the_error_falls(recorded, tmp_p
     (flexibility,) = found.own
     assert abs(flexibility.value - SOFTER_PERCENT) < 3.5 * flexibility.sigma
     assert flexibility.sigma < 0.05 * SOFTER_PERCENT
-    floor = found.floor.rms(found.after.observations)
-    assert found.after.rms["s_um"] < 1.2 * floor["s_um"]
-    assert found.after.rms["phi_mdeg"] < 1.2 * floor["phi_mdeg"]
-    assert held_back.after["s_um"] > 1.5 * floor["s_um"]
+    for quantity in found.quantities:
+        assert found.after.rmse(quantity) < 1.2 * found.fit.noise[quantity.key]
+    assert held_back.after["s_um"] > 1.5 * found.fit.noise["s_um"]
     # What stood in for it goes back; of itself nothing is said there.
     assert SOFT not in {before.effect for before, _ in found.base_moved}
     assert "load_scale@load_sensor" in {before.effect for before, _ in found.base_moved}
@@ -154,62 +151,3 @@ def test_with_an_axis_that_was_added_the_gaps_stay_that_it_left():
         step = Step("extend", "2026-01-01", "ab" * 32, {}, added=added)
         child = replace(model.with_effects(*fitted), lineage=(step,))
         assert tuple(each.name for each in unfitted(child).effects) == stay
-
-
-LOST = np.where(np.arange(6)[:, None] < 2, np.nan, 1.2)
-
-
-@pytest.mark.parametrize(
-    ("from_base", "from_drawing", "better"),
-    [
-        ((1.0, 0.1), (0.9, 0.1), 1),
-        ((0.9, 0.1), (1.0, 0.1), 0),
-        # What it takes for lost beams is no merit of a fit.
-        ((1.0, 0.1), (LOST, 0.1), 0),
-        ((LOST, 0.1), (1.0, 0.1), 1),
-        # To leave as much with less is.
-        ((1.0, 0.9), (1.0, 0.1), 1),
-        ((1.0, 0.1), (1.0, 0.9), 0),
-    ],
-)
-def test_of_two_starts_the_one_that_leaves_less_is_kept(
-    monkeypatch, from_base, from_drawing, better
-):
-    own = FreeEffect(effect(SOFT))
-    unknown = SimpleNamespace(free=0, key="flexibility_percent")
-    problem = SimpleNamespace(free=(own,), unknowns=(unknown,), weights=np.ones(1))
-    noise = SimpleNamespace(whiten=lambda seen, columns: columns)
-    begun = [
-        SimpleNamespace(
-            fit=SimpleNamespace(
-                problem=problem,
-                residual=np.ones((6, 6)) * residual,
-                z=np.array([z]),
-                covariance=np.zeros((1, 1)),
-                noise=noise,
-                seen=None,
-            )
-        )
-        for residual, z in (from_base, from_drawing)
-    ]
-    monkeypatch.setattr(
-        fitting, "judged", lambda wide, start=None, progress=None: begun[start is None]
-    )
-    assert _judged_at_size(problem, ("base", 0), None)[1] is begun[better]
-
-
-def test_priors_widen_to_the_size_that_a_parameter_has():
-    """And beyond it by as much again, because the prior had held it back."""
-    loose = effect("creep@joint_1")
-    own = FreeEffect(loose, {p.key: p.scale for p in loose.parameters})
-    assert _widened(own, {"delayed_percent": 7.0, "time_constant_s": 9.0}) == {
-        "delayed_percent": 49.0
-    }
-    # What the law is not proportional to has a size of its own; nothing becomes narrower.
-    wave = effect("transmission_error@motor_1")
-    sizes = dict.fromkeys((p.key for p in wave.parameters), 3.0) | {"run_out_cos_percent": 0.5}
-    wider = _widened(FreeEffect(wave, {}, widening={"run_out_cos_percent": 2.0}), sizes)
-    assert wider["cos_mdeg"] == wider["sin_3_mdeg"] == pytest.approx(9.0)
-    assert wider["run_out_cos_percent"] == 2.0
-    assert wider["run_out_sin_percent"] == pytest.approx(9.0)
-    assert "order" not in wider

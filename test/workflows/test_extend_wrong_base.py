@@ -22,10 +22,11 @@ def test_the_error_of_another_day_falls_to_the_floor(tmp_path, monkeypatch):
 
     found = json.loads((tmp_path / "judged.json").read_text())
     before, after = (model["after_registration"] for model in found["models"])
-    floor = found["noise_floor"]
+    floor = found["instrument_noise"]
     assert before["phi_mdeg"]["rms"] > 4.0 * floor["phi_mdeg"]
     for key in ("s_um", "phi_mdeg"):
         assert after[key]["rms"] < 1.25 * floor[key]
     told = json.loads((tmp_path / "worn.json").read_text())
     (width,) = (p for p in told["parameters"] if p["effect"] == "backlash")
-    assert width["value"] > 30.0 * width["sigma"]
+    # A law may be off by 5 % of its own size.
+    assert width["value"] > 10.0 * width["sigma"]

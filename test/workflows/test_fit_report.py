@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.fit import fit
-from wrist_stiffness.campaign.fitting.free_effects import free_all
-from wrist_stiffness.campaign.fitting.problem import FitProblem
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.base_fit import fit_cleaned
+from wrist_stiffness.campaign.searching.calibrate import fitted
+from wrist_stiffness.campaign.searching.free_effects import free_all
+from wrist_stiffness.campaign.searching.problem import FitProblem
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -33,7 +34,7 @@ def test_what_is_not_told_stands_under_what_to_record():
         ("encoder_offset", "motor_1"),
     )
     free = tuple(free_all(Effect(find_law(law), place)) for law, place in places)
-    found = fit(FitProblem(model, (as_units(model, session),), free))
+    found = fitted(*fit_cleaned(FitProblem(model, (as_units(model, session),), free)))
     lines = untold_lines(found, found.parameters)
     assert lines == [
         f"  for these record {find_law('link_stiffness').excited_by}:",
@@ -58,5 +59,5 @@ def test_rests_that_nothing_measured_are_not_counted():
     shift[1::2], rotation[1::2] = np.nan, np.nan
     session = MeasuredSession("s", block, shift, rotation, np.diag(np.repeat([1e-6, 1e-5], 3) ** 2))
     free = (free_all(Effect(find_law("encoder_offset"), "motor_1")),)
-    found = fit(FitProblem(model, (as_units(model, session),), free))
+    found = fitted(*fit_cleaned(FitProblem(model, (as_units(model, session),), free)))
     assert used_lines([session], found)[0].startswith("s: 15 rests and 0 half seconds in motion")

@@ -75,8 +75,7 @@ def test_a_fit_repeated_gives_the_same_answer(tmp_path, recorded):
     for found in (first, second):
         assert max(abs(each.moved) for each in found.parameters) > 5.0
     # What it began with is told as it stands, though.
-    assert second.before == pytest.approx(first.after)
-    assert first.before["s_um"] > 1.2 * first.after["s_um"]
+    assert second.before["s_um"] < 1.1 * first.after["s_um"] < first.before["s_um"]
 
 
 def test_another_day_is_new_knowledge(tmp_path, recorded):

@@ -13,7 +13,7 @@ import pytest
 from distributed import LocalCluster
 
 from wrist_stiffness.errors import InputError, RecordingError
-from wrist_stiffness.workflows.fleet import map_recordings
+from wrist_stiffness.workflows.fleet import map_recordings, spread
 
 PATHS = [Path(name) for name in ("good", "bad", "ugly", "best")]
 
@@ -93,6 +93,22 @@ def test_a_worker_that_dies_is_a_row_with_its_error():
     dead, good = map_recordings(partial(judge, length=0), paths, workers=1)
     assert "the worker died" in dead.error
     assert good.result[0] == 4
+
+
+def dies_once(number, folder):
+    """Take the worker along, the first time that a number comes."""
+    marker = folder / str(number)
+    if number % 2 and not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number**2
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_loses_nothing(tmp_path):
+    answers = spread(partial(dies_once, folder=tmp_path), range(6), workers=2)
+    assert [answer.result for answer in answers] == [0, 1, 4, 9, 16, 25]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["1", "3", "5"]
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch):

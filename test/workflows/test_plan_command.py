@@ -9,6 +9,7 @@ from rosbags.highlevel import AnyReader
 
 from wrist_stiffness.campaign.planning import pool
 from wrist_stiffness.cli.main import main
+from wrist_stiffness.inference.answer import Diagnosis, Finding, NotExcited
 
 LOADS = """
 schema: 1
@@ -24,21 +25,32 @@ loads:
     change_s: 1
 """
 
-DIAGNOSIS = {
-    "schema": 1,
-    "verdict": "effect",
-    "noise_floor": {"s_um": 1.5, "phi_mdeg": 7.0},
-    "findings": [
-        {
-            "class": [
-                {"effect": "backlash", "component": "motor_1"},
-                {"effect": "drive_compliance", "component": "motor_1"},
-            ],
-            "parameters": {"width_mdeg": [20.0, 1.0], "called_otherwise": [1.0, 0.1]},
-        }
-    ],
-    "not_excited": [{"effect": "thermal_softening", "component": "joint_3", "needs": "warmth"}],
-}
+FOUND = Finding(
+    (("backlash", "motor_1", 0.5), ("drive_compliance", "motor_1", 0.5)),
+    0.99,
+    {"width_mdeg": (20.0, 1.0), "called_otherwise": (1.0, 0.1)},
+    9.0,
+    0.9,
+    {},
+    "yes",
+    "",
+    "",
+)
+NOISE = {"s_um": 1.5, "phi_mdeg": 7.0}
+DIAGNOSIS = Diagnosis(
+    "effect",
+    0.99,
+    NOISE,
+    NOISE,
+    NOISE,
+    NOISE,
+    (FOUND,),
+    (),
+    {},
+    0.0,
+    (),
+    (NotExcited("thermal_softening", "joint_3", "warmth"),),
+).as_json()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -126,7 +138,7 @@ def test_nothing_is_left_where_the_plan_cannot_be_written(tmp_path, capsys):
 def test_what_no_load_can_settle_is_a_no_and_writes_nothing(tmp_path, capsys):
     silent = [{"effect": "drive_compliance", "component": "motor_1", "needs": "torque"}]
     diagnosis = {**DIAGNOSIS, "findings": [], "not_excited": silent}
-    diagnosis["noise_floor"] = {"s_um": 500.0, "phi_mdeg": 5000.0}
+    diagnosis["noise"] = {"s_um": 500.0, "phi_mdeg": 5000.0}
     arguments = [*files(tmp_path, diagnosis), "-o", str(tmp_path / "next")]
     assert main(["plan", *arguments]) == 1
     out = capsys.readouterr().out
@@ -138,9 +150,9 @@ def test_what_no_load_can_settle_is_a_no_and_writes_nothing(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"schema": 2}, "found.json: schema: 2 is not 1"),
+        ({"schema": 1}, "found.json: schema: 1 is not 2"),
         ({"findings": {}}, "found.json: findings: {} is not a list"),
-        ({"noise_floor": {"s_um": 0.0, "phi_mdeg": 1.0}}, "noise_floor.s_um: 0.0 is not above 0"),
+        ({"noise": {"s_um": 0.0, "phi_mdeg": 1.0}}, "noise.s_um: 0.0 is not above 0"),
         (
             {"findings": [{"class": [], "parameters": {}}]},
             "findings[0].class: 0 entries, needs a list of at least 1",

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.campaign.planning import pool
 from wrist_stiffness.campaign.planning.question import TARE, WRIST
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.answer import Diagnosis, Finding
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import (
     Header,
@@ -32,20 +33,21 @@ schema: 1
 loads:
   - {kind: weight, name: brass, mass_kg: 0.1, point_mm: [20, 0, -18], change_s: 5}
 """
-DIAGNOSIS = {
-    "schema": 1,
-    "noise_floor": {"s_um": 1.5, "phi_mdeg": 7.0},
-    "findings": [
-        {
-            "class": [
-                {"effect": "backlash", "component": "motor_1"},
-                {"effect": "encoder_eccentricity", "component": "motor_1"},
-            ],
-            "parameters": {"width_mdeg": [40.0, 1.0]},
-        }
-    ],
-    "not_excited": [],
-}
+FOUND = Finding(
+    (("backlash", "motor_1", 0.5), ("encoder_eccentricity", "motor_1", 0.5)),
+    0.99,
+    {"width_mdeg": (40.0, 1.0)},
+    9.0,
+    0.9,
+    {},
+    "yes",
+    "",
+    "",
+)
+NOISE = {"s_um": 1.5, "phi_mdeg": 7.0}
+DIAGNOSIS = Diagnosis(
+    "effect", 0.99, NOISE, NOISE, NOISE, NOISE, (FOUND,), (), {}, 0.0, (), ()
+).as_json()
 START_NS = 1_700_000_000_000_000_000
 RATE_HZ = 10.0
 

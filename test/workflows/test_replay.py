@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.compensation.trajectory import planned_point
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.block import Block
@@ -188,7 +188,7 @@ def test_the_residual_at_the_tool_point_is_the_same_motion(tmp_path):
 def test_replay_of_a_replay_replaces_the_outputs(tmp_path):
     replay(write(tmp_path / "in", TIMELINE), MODEL, tmp_path / "once")
     summary = replay(tmp_path / "once", MODEL, tmp_path / "twice")
-    assert summary.replaced == 12
+    assert summary.replaced == 13
     assert np.array_equal(shifts(tmp_path / "once"), shifts(tmp_path / "twice"))
 
 

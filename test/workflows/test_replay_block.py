@@ -7,9 +7,10 @@ import pytest
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
@@ -32,6 +33,7 @@ from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows.parameter_file import node_settings
 from wrist_stiffness.workflows.replay import replay
 from wrist_stiffness.workflows.signals_ahead import LOOKAHEAD_NS
+from wrist_stiffness.workflows.wrist_drawing import Pace, WristDrawing
 
 MODEL = shipped_file("config/palmieri2015_model.yaml")
 MOTORS = ("motor_1_joint", "motor_2_joint")
@@ -95,6 +97,7 @@ def wanted(settings):
     correcting = CorrectionStream(model, correction, enabled=True)
     stamps, theta, wrench = signals()
     sent = {topic: [] for topic in TOPICS}
+    pace, drawing = Pace(), WristDrawing(model.table.geometry, 1000.0)
     refused = heard = 0
     for i in range(SAMPLES):
         stamp_ns, angles = int(stamps[i]), theta[i].tolist()
@@ -112,6 +115,9 @@ def wanted(settings):
             s_um, mdeg = 1e6 * found.twist[:3], 1e3 * float(np.degrees(1.0)) * found.twist[3:]
             sent["/pose_error/s_um"].append(vector_payload(stamp_ns, s_um))
             sent["/pose_error/phi_mdeg"].append(vector_payload(stamp_ns, mdeg))
+            if pace.takes(stamp_ns, 10.0):
+                drawn = drawing.message(stamp_ns, found.configuration, found.twist)
+                sent["/wrist_markers"].append(encode(drawn))
         except WristError:
             refused += 1
         names, first = ("other", *MOTORS), np.nan if i == EMPTY else 0.5
@@ -138,6 +144,7 @@ TOPICS = (
     "/motor_commands_corrected",
     "/motor_positions_corrected",
     "/pose_error_residual",
+    "/wrist_markers",
 )
 
 

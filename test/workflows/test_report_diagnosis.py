@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wrist_stiffness.campaign.comparing.explained import explain
 from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.inference import Diagnosis, Finding, Observations
 from wrist_stiffness.inference.answer import NotExcited, Standing
@@ -17,7 +18,7 @@ from wrist_stiffness.workflows import diagnose
 from wrist_stiffness.workflows.diagnose import Diagnosed
 from wrist_stiffness.workflows.provenance import Provenance, Run
 from wrist_stiffness.workflows.read_sessions import Recordings
-from wrist_stiffness.workflows.report.diagnosis_report import report_of_diagnosis, shown_by
+from wrist_stiffness.workflows.report.diagnosis_report import Shown, report_of_diagnosis
 from wrist_stiffness.workflows.report.page import html_of
 
 FINDING = Finding(
@@ -66,16 +67,34 @@ def observations():
     conditions |= {"speed_1": np.zeros(n), "speed_2": np.zeros(n)}
     conditions |= {"force": rng.uniform(0, 1, n), "loaded_at_rest": rng.integers(0, 2, n) * 1.0}
     conditions["time_s"] = 3.0 * np.arange(n)
-    values = np.repeat([1e-6, 1e-4], 3) * rng.normal(size=(n, 6))
+    scatter = np.repeat([1e-6, 1e-4], 3)
+    values = scatter * rng.normal(size=(n, 6))
     values[:, 2] += 5e-6 * conditions["approach_1"]
-    return Observations(values, conditions, time_s=conditions["time_s"], quantities=QUANTITIES)
+    time = conditions["time_s"]
+    return Observations(values, conditions, np.diag(scatter**2), time, quantities=QUANTITIES)
 
 
 MISTAKE = "Look at the set-up first: with the load's sign turned the error falls from 9 to 1 um"
 
 
+class Units:
+    """What is asked of a session beside its table: the scatter of one measurement."""
+
+    wander, white = np.zeros(6), np.repeat([1e-6, 1e-4], 3)
+
+    def __init__(self, n):
+        self.measured = np.ones(n, dtype=bool)
+
+    def __len__(self):
+        return len(self.measured)
+
+
 def page_of(result, observations, notes=(), mistake=""):
-    shown = shown_by(observations, np.random.default_rng(0), 0.1 * observations.values)
+    n = observations.n_units
+    registration = np.broadcast_to(np.diag(np.repeat(1e-3, 6)), (n, 6, 6))
+    weights = np.full((n, 6), 1.0 / np.repeat([1e-6, 1e-4], 3) ** 2)
+    left = explain(observations, [Units(n)], registration, np.zeros(6), weights)
+    shown = Shown(left, 0.1 * observations.values)
     provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
     told = (mistake, notes, provenance)
     page = report_of_diagnosis(result, shown, ["monday"], *told)

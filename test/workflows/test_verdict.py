@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from wrist_stiffness.campaign.comparing.sentences import percent
 from wrist_stiffness.inference import Diagnosis, Finding
-from wrist_stiffness.workflows.verdict import class_of, correction_of, percent, verdict_lines
+from wrist_stiffness.workflows.verdict import class_of, correction_of, verdict_lines
 
 GROWTH = Finding(
     (("thermal_expansion", "platform", 1.0),), 0.97, {}, 25.0, 0.9, {}, "no", "it grows", ""

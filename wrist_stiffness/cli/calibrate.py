@@ -19,12 +19,12 @@ comparison with measurements shows little but the registration."""
 EPILOG = """\
 examples:
   wrist-stiffness calibrate --fit monday -o wrist_7.yaml
-  wrist-stiffness calibrate wrist_7.yaml --fit monday tuesday --hold-out -o wrist_7.yaml \\
-      --overwrite
+  wrist-stiffness calibrate wrist_7.yaml --fit monday tuesday -o wrist_7.yaml --overwrite
 
-Record poses all over the workspace from both sides, loads of several sizes and directions, and
-none. What a recording does not tell stays as it was, and is said. A recording whose notes
-(/recording_notes) hold {"calibrated": ["encoder_offset"]} keeps such effects as the model has
+The last recording, or the end of the only one, judges a fit that has not seen it; what is written
+is fitted to all. Record poses all over the workspace from both sides, loads of several sizes and
+directions, and none. What a recording does not tell stays as it was, and is said. A recording whose
+notes (/recording_notes) hold {"calibrated": ["encoder_offset"]} keeps such effects as the model has
 them."""
 
 
@@ -39,12 +39,6 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
     add_fit_options(parser)
-    parser.add_argument(
-        "--hold-out",
-        action="store_true",
-        help="judge by the last recording, or the end of the only one, which a first fit "
-        "does not see",
-    )
     parser.set_defaults(run=_run)
 
 
@@ -92,7 +86,6 @@ def _run(arguments: argparse.Namespace) -> int:
         recordings_named(arguments.fit, arguments),
         arguments.output,
         this_run(),
-        arguments.hold_out,
         Progress("calibrate"),
         Progress("a likely mistake put right"),
     )

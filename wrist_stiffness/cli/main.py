@@ -25,6 +25,7 @@ from wrist_stiffness.cli import (
     replay,
     simulate,
     table,
+    tolerances,
 )
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
@@ -94,6 +95,7 @@ COMMANDS: tuple[CommandModule, ...] = (
     diagnose,
     extend,
     plan,
+    tolerances,
     cell,
 )
 

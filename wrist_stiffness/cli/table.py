@@ -66,9 +66,10 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     )
     build.add_argument(
         "--interface",
-        choices=("rigid", "distributing"),
+        choices=("rigid", "distributing", "sliding"),
         default="rigid",
-        help="how a pin or hub holds a wall: every point, or in the mean (default: rigid)",
+        help="how a pin or hub holds a wall: every point, in the mean, or a bushing's by pressure "
+        "alone (default: rigid)",
     )
     build.add_argument(
         "--evaluation",

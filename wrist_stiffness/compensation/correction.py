@@ -154,7 +154,7 @@ def compiled_task(objective: Objective, play: float) -> Array:
 def correction_of(found: CorrectedRows, place: int, model: ErrorModel, load: Load) -> Correction:
     """Return one of n compiled corrections, under its load."""
     row = found.rows[place]
-    prediction = model.prediction_of(found.predicted, place, load)
+    prediction = model.prediction_of(row[8:14], row[20:], found.active[place], load)
     return Correction(row[:2], row[2:8], prediction, row[14:20].reshape(3, 2))
 
 

@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.compensation.correction import Correction
-from wrist_stiffness.compensation.corrector import Correcting, Corrector, faded, search
-from wrist_stiffness.compensation.intake import COMMAND
-from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
-from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
-from wrist_stiffness.compensation.payload import Held, Payload, Thresholds
-from wrist_stiffness.compensation.perishable import require_within_limits
-from wrist_stiffness.compensation.pose import seen_from
-from wrist_stiffness.compensation.running_model import RunningModel
-from wrist_stiffness.compensation.safety import within_joint_limits
-from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import Stream, as_rows
-from wrist_stiffness.compensation.supervisor import Supervision, Supervisor
-from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point, neighbours
-from wrist_stiffness.errors import (
-    InputError,
-    SingularPoseError,
-    StaleLoadError,
-    UnreachablePoseError,
-    WristError,
+from wrist_stiffness.compensation.corrected import (
+    CorrectedBlock,
+    CorrectedCommand,
+    CorrectedTrajectory,
 )
-from wrist_stiffness.mechanism.compiled import CompiledCommands, Flags
+from wrist_stiffness.compensation.corrector import Correcting, Corrector
+from wrist_stiffness.compensation.intake import COMMAND
+from wrist_stiffness.compensation.judged_load import judged_load
+from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
+from wrist_stiffness.compensation.payload import Held, Reading, Thresholds
+from wrist_stiffness.compensation.perishable import require_within_limits, within_limits
+from wrist_stiffness.compensation.plan import PlanCorrector
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.stream import Stream
+from wrist_stiffness.compensation.supervision import Supervision
+from wrist_stiffness.compensation.supervisor import Supervisor
+from wrist_stiffness.compensation.trajectory import PlannedPoint
+from wrist_stiffness.errors import InputError, StaleLoadError, WristError
+from wrist_stiffness.mechanism.compiled import CompiledCommands
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.model.error_model import ErrorModel, Load
@@ -45,89 +42,6 @@ PLAN_WINDOW_NS = 2 * NANOSECONDS
 TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
 
 NOTHING = np.zeros(2)
-
-
-@dataclass(frozen=True)
-class CorrectedCommand:
-    """What to send to the motors for one command.
-
-    Parameters
-    ----------
-    frame_id : str
-        For the header: `wrist_corrected` where correction is on or still fades out.
-    positions : (n,) float
-        All joints of the command, the motors corrected [rad].
-    theta : (2,) float
-        Corrected motor angles [rad].
-    correction : Correction or None
-        As it is applied, with the residual that remains; None while none can be had.
-    fault : WristError or None
-        Why none can be had although correction is on (what was applied before then fades out), or
-        why the model could not remember the command.
-    valid : bool
-        Whether the residual holds: the load is known and corrected for in full
-        (`Supervisor.valid`).
-    """
-
-    frame_id: str
-    positions: Array
-    theta: Array
-    correction: Correction | None
-    fault: WristError | None
-    valid: bool = False
-
-
-@dataclass(frozen=True)
-class CorrectedTrajectory:
-    """What to send for a whole trajectory.
-
-    Parameters
-    ----------
-    frame_id : str
-        For the header: `wrist_corrected` where correction is on.
-    points : tuple of PlannedPoint
-        The motors' angles, speeds and accelerations corrected.
-    fault : WristError or None
-        Why it passes unchanged although correction is on.
-    valid : bool
-        As of a command, at its start.
-    """
-
-    frame_id: str
-    points: tuple[PlannedPoint, ...]
-    fault: WristError | None
-    valid: bool = False
-
-
-@dataclass(frozen=True)
-class CorrectedBlock:
-    """What to send to the motors for n commands.
-
-    Parameters
-    ----------
-    theta : (n, 2) float
-        Corrected motor angles [rad].
-    corrected : (n,) bool
-        Which of them have a correction; residual and covariance of the others are undefined.
-    after : (n, 6) float
-        Residual with the correction as it is applied, at O in F [m, rad].
-    covariance : (n, 6, 6) float
-        Of the prediction behind it.
-    faults : dict of int to WristError
-        Why a command has none.
-    platform : (n, 3, 3) float
-        U -> F of the rigid platform at the corrected angles.
-    valid : (n,) bool
-        As `CorrectedCommand.valid`.
-    """
-
-    theta: Array
-    corrected: Flags
-    after: Array
-    covariance: Array
-    faults: dict[int, WristError]
-    platform: Array
-    valid: Flags
 
 
 class CorrectionStream(Stream):
@@ -174,20 +88,8 @@ class CorrectionStream(Stream):
 
     @property
     def supervision(self) -> Supervision:
-        """What is believed of the load, to be shown and stored."""
+        """What is believed of the load."""
         return self.supervisor.supervision
-
-    def declare_payload(self, payload: Payload | None) -> None:
-        """Take over what a gripper holds; None for nothing (see `Supervisor`)."""
-        self.supervisor.declare_payload(payload)
-
-    def restore(self, payload: Payload | None) -> None:
-        """Expect a payload that was stored (see `Supervisor`)."""
-        self.supervisor.restore(payload)
-
-    def forget(self) -> None:
-        """Judge the load anew."""
-        self.supervisor.forget()
 
     @property
     def correcting(self) -> bool:
@@ -272,20 +174,21 @@ class CorrectionStream(Stream):
                 theta,
                 theta_dot,
                 load,
-                self.supervisor.share,
+                self.supervisor.settled or self.supervisor.share,
             )
             delta, correction = corrected.delta, corrected.correction
             fault = fault or corrected.fault
         forgotten = self._remember(stamp_ns, theta + delta, load, theta_dot)
         if self.correcting:
             fault = fault or forgotten
+        driven = theta + delta
         first, second = self.settings.motors.places(names)
-        sent[first], sent[second] = (theta + delta).tolist()
-        marked = self.correcting or bool(np.any(delta))
+        sent[first], sent[second] = driven.tolist()
+        marked = self.correcting or any(delta.tolist())
         return CorrectedCommand(
             CORRECTED_FRAME if marked else frame_id,
             sent,
-            theta + delta,
+            driven,
             correction,
             fault,
             correction is not None and self.supervisor.valid,
@@ -301,12 +204,7 @@ class CorrectionStream(Stream):
 
     def within_limits(self, theta: Array) -> bool:
         """Tell whether all commands (n, 2) [rad] are within the joint limits."""
-        if self.model is None:
-            return True
-        limits = self.model.table.geometry.limits
-        step = limits.encoder_step
-        inside = (limits.joint_lower - step <= theta) & (theta <= limits.joint_upper + step)
-        return bool(inside.all())
+        return self.model is None or within_limits(theta, self.model.table.geometry.limits)
 
     def on_commands(self, stamps: NDArray[np.int64], theta: Array) -> CorrectedBlock:
         """Correct many commands, to the bit as `on_command` would one by one.
@@ -318,80 +216,85 @@ class CorrectionStream(Stream):
         theta : (n, 2) float
             Motor angles, finite and within the joint limits [rad].
 
-        Returns
-        -------
-        CorrectedBlock
-            For all of them.
         """
         running, settings, supervisor = self.running_model(), self.settings, self.supervisor
         compiled = running.compiled
         if compiled is None:
             raise InputError("this model is corrected command by command")
-        measured = self.loads.block_at(stamps)
-        wrench, on_platform, known = as_rows(measured)
-        table, n = running.model.table, len(stamps)
-        limits = table.geometry.limits
-        at, inside = compiled.forward(theta)
-        usable = inside & (np.linalg.norm(wrench[:, :3], axis=1) <= 0.999 * limits.force)
-        usable &= np.linalg.norm(wrench[:, 3:], axis=1) <= 0.999 * limits.moment
-        commands = CompiledCommands(stamps, theta, wrench, on_platform, known.copy())
+        wrench, on_platform, wanted = self.loads.block_at(stamps)
+        table, n, follow = running.model.table, len(stamps), settings.supervisor.follow
+        rows, usable = supervisor.scales(table.geometry).rows_of(table, theta, wrench, on_platform)
+        commands = CompiledCommands(stamps, theta, wrench, on_platform, wanted, np.ones(n))
         block = Correcting(self._corrector, running, compiled, settings, commands)
-        angles, platforms, begin = theta.tolist(), at.platform, 0
+        angles, readings, times = theta.tolist(), rows.tolist(), stamps.tolist()
+        usable &= wanted
         valid = np.zeros(n, dtype=bool)
-        for i, stamp_ns in enumerate(stamps.tolist()):
+        # Where every load is followed and none is missing, each counts for itself.
+        skipped = n - 1 if follow and wanted.all() and supervisor.settled else 0
+        valid[:skipped] = True
+        for i in range(skipped, n):
             try:
-                found = measured[i]
-                if found is None or not usable[i]:
-                    load = self._load(stamp_ns, theta[i])
+                if follow or not usable[i]:
+                    load = self._load(times[i], theta[i])
+                    wrench[i], on_platform[i] = load.wrench, load.on_platform
                 else:
-                    load = supervisor.judge(
-                        stamp_ns,
-                        angles[i],
-                        found,
-                        platforms[i],
-                        table.geometry,
-                        settings.supervisor,
-                        settings.correction_limit,
+                    reading = Reading.of_row(readings[i])
+                    judged = supervisor.judge(
+                        times[i], angles[i], reading, settings.supervisor, settings.correction_limit
                     )
-                commands.wanted[i] = True
-                wrench[i], on_platform[i] = load.wrench, load.on_platform
+                    wrench[i], on_platform[i] = 0.0 if judged is None else judged, False
+                if supervisor.since_ns == times[i]:
+                    block.search(i)
+                    self._corrector.release()
             except WristError as error:
                 block.faults[i] = error
-                commands.wanted[i] = False
                 if isinstance(error, StaleLoadError):
                     supervisor.lost()
-            if not supervisor.undisturbed:
-                block.correct(begin, i)
-                block.correct(i, i + 1, supervisor.share)
-                begin = i + 1
+            wanted[i] = i not in block.faults
+            settled = supervisor.settled
+            commands.share[i] = settled or 0.0
+            if wanted[i] and not settled:
+                block.search(i)
+                block.search_one(supervisor.share)
             valid[i] = supervisor.valid
-        block.correct(begin, n)
+        block.correct(n)
         corrected = commands.wanted.copy()
         corrected[list(block.faults)] = False
-        predicted = block.found.predicted
-        there = Configuration.of_row(np.ascontiguousarray(predicted.configuration))
-        twist = np.ascontiguousarray(predicted.twist)
+        there = Configuration.of_row(np.ascontiguousarray(block.found.configuration))
+        twist = np.ascontiguousarray(block.found.twist)
         covariance = running.model.table_covariance(there, twist)
         return CorrectedBlock(
             theta + block.found.applied,
             corrected,
-            np.ascontiguousarray(block.found.rows[:, 2:8]),
+            np.ascontiguousarray(block.found.after),
             covariance,
             block.faults,
             there.platform,
             valid,
         )
 
-    def on_trajectory(
+    def on_trajectory(self, *plan: Any) -> CorrectedTrajectory:
+        """Correct a trajectory at one go (see `trajectory_work`)."""
+        work = self.trajectory_work(*plan)
+        while True:
+            try:
+                next(work)
+            except StopIteration as finished:
+                result: CorrectedTrajectory = finished.value
+                return result
+
+    def trajectory_work(
         self,
         stamp_ns: int,
         frame_id: str,
         names: Sequence[str],
         points: Sequence[PlannedPoint],
-    ) -> CorrectedTrajectory:
+    ) -> Generator[None, None, CorrectedTrajectory]:
         """Correct every point of a trajectory under the load at its start.
 
-        A trajectory is a plan: it is neither slewed nor held by the hysteresis, and not remembered.
+        In small steps, between which commands may be corrected.  Model, memory, settings and load
+        are those of the first step.  A trajectory is a plan: it is neither slewed nor held by the
+        hysteresis, and not remembered.
 
         Parameters
         ----------
@@ -415,122 +318,38 @@ class CorrectionStream(Stream):
             If a motor is missing, named twice or driven beyond its joint limits: it is not to be
             forwarded.
         """
-        work = self.trajectory_work(stamp_ns, frame_id, names, points)
-        while True:
-            try:
-                next(work)
-            except StopIteration as finished:
-                result: CorrectedTrajectory = finished.value
-                return result
-
-    def trajectory_work(
-        self,
-        stamp_ns: int,
-        frame_id: str,
-        names: Sequence[str],
-        points: Sequence[PlannedPoint],
-    ) -> Generator[None, None, CorrectedTrajectory]:
-        """Do what `on_trajectory` does in small steps, between which commands may be corrected.
-
-        Model, memory, settings and load are those of the first step.
-        """
-        motors, settings, model = self.settings.motors, self.settings, self.model
+        motors, model, correcting = self.settings.motors, self.model, self.correcting
         places = motors.places(names, "trajectory")
-        running: RunningModel | None = None
-        fault: WristError | None = None
-        correcting = self.correcting
+        corrector: PlanCorrector | None = None
+        done, fault = tuple(points), None
         if correcting:
             try:
                 if frame_id == CORRECTED_FRAME:
                     raise InputError(TWICE)
-                held = self._held_by(stamp_ns, points, places)
+                first = points[0].positions[list(places)] if points else None
+                held = self._held_by(stamp_ns, first)
                 running = self.running_model().snapshot()
+                corrector = PlanCorrector(running, self.settings, stamp_ns, held)
             except WristError as error:
                 fault = error
-        done = []
-        for point in points:
-            if model is not None:
-                limits = model.table.geometry.limits
+        if model is not None:
+            limits = model.table.geometry.limits
+            for point in points:
                 require_within_limits("trajectory", point.positions[list(places)], limits, motors)
-            yield
-            if running is None or fault is not None:
-                continue
-            speed = point.velocities[list(places)] if len(point.velocities) else None
-            corrected: list[Array] = []
+                yield
+        if corrector is not None:
             try:
-                for theta in neighbours(point, places):
-                    try:
-                        found = self._planned(running, settings, stamp_ns, held, theta, speed)
-                    except (UnreachablePoseError, SingularPoseError):
-                        if not corrected:
-                            raise
-                        # Beside the point, at the border, the correction has faded to none.
-                        found = theta
-                    corrected.append(found)
-                    yield
+                done = yield from corrector.work(points, places)
             except WristError as error:
                 fault = error
-            else:
-                done.append(corrected_point(point, places, corrected))
-        if running is None or fault is not None:
-            mark = CORRECTED_FRAME if correcting else frame_id
-            return CorrectedTrajectory(mark, tuple(points), fault)
-        return CorrectedTrajectory(CORRECTED_FRAME, tuple(done), None, held.valid)
+        known = corrector is not None and fault is None and corrector.known
+        return CorrectedTrajectory(CORRECTED_FRAME if correcting else frame_id, done, fault, known)
 
-    def residuals(self, command: CorrectedCommand) -> list[tuple[Array, Array]]:
-        """Return what a correction leaves: actual minus desired pose.
-
-        Parameters
-        ----------
-        command : CorrectedCommand
-            With its correction.
-
-        Returns
-        -------
-        list of ((6,) float, (6, 6) float)
-            Twist in F at O and its covariance, and the same at the geometry's tool point where that
-            is not O; empty without a correction.  Where the residual does not hold, the covariance
-            says so as that of a pose does that is not measured.
-        """
-        if command.correction is None:
+    def residuals(self, answer: CorrectedCommand | CorrectedBlock) -> list[tuple[Array, Array]]:
+        """Return what corrections leave at O, and at the geometry's tool point if that is not O."""
+        if self.model is None:
             return []
-        twist, prediction = command.correction.after, command.correction.prediction
-        platform = prediction.configuration.platform
-        return self._left(twist, prediction.covariance, platform, command.valid)
-
-    def block_residuals(self, block: CorrectedBlock) -> list[tuple[Array, Array]]:
-        """Return the same of the commands of a block that have a correction, k of them.
-
-        Returns
-        -------
-        list of ((k, 6) float, (k, 6, 6) float)
-            As `residuals`.
-        """
-        own = np.flatnonzero(block.corrected)
-        rows = block.after[own], block.covariance[own], block.platform[own], block.valid[own]
-        if not self.running_model().model.table.geometry.platform.tool_point.any():
-            doubt = np.where(rows[3], 0.0, NOT_MEASURED)[:, None, None] * np.eye(6)
-            return [(rows[0], rows[1] + doubt)]
-        # One by one: a stack of products may round otherwise.
-        each = [self._left(*row) for row in zip(*rows, strict=True)]
-        return [
-            (
-                np.array([residuals[place][0] for residuals in each]).reshape(-1, 6),
-                np.array([residuals[place][1] for residuals in each]).reshape(-1, 6, 6),
-            )
-            for place in range(2)
-        ]
-
-    def _left(
-        self, twist: Array, covariance: Array, platform: Array, valid: bool
-    ) -> list[tuple[Array, Array]]:
-        doubt = (0.0 if valid else NOT_MEASURED) * np.eye(6)
-        found = [(twist, covariance + doubt)]
-        tool_point = self.running_model().model.table.geometry.platform.tool_point
-        if tool_point.any():
-            there = seen_from(platform @ tool_point)
-            found.append((there @ twist, there @ covariance @ there.T + doubt))
-        return found
+        return answer.residuals(self.model.table.geometry.platform.tool_point)
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
         theta = self.settings.motors.angles(names, positions, COMMAND)
@@ -563,47 +382,18 @@ class CorrectionStream(Stream):
     def _load(self, stamp_ns: int, theta: Array) -> Load:
         """Return the load to correct for."""
         _, measured = self.loads.at(stamp_ns)
-        return self._judged(stamp_ns, theta, measured)
-
-    def _judged(self, stamp_ns: int, theta: Array, measured: Load) -> Load:
         table = self.running_model().model.table
-        # A payload may stand in for it, but a load beyond the table is a fault in any case; turning
-        # a wrench changes neither of its sizes, so its frame does not matter.
-        table.check_load(measured.wrench)
-        return self.supervisor.judge(
-            stamp_ns,
-            theta.tolist(),
-            measured,
-            table.workspace.configuration(theta).platform,
-            table.geometry,
-            self.settings.supervisor,
-            self.settings.correction_limit,
-        )
+        return judged_load(self.supervisor, self.settings, table, stamp_ns, theta, measured)
 
-    def _held_by(
-        self, stamp_ns: int, points: Sequence[PlannedPoint], places: Sequence[int]
-    ) -> Held:
-        """Return what a plan is corrected for.
+    def _held_by(self, stamp_ns: int, first: Array | None) -> Held:
+        """Return what a plan is corrected for, that begins at motor angles (2,) [rad].
 
         Where no commands come, the loads before the plan are judged as at its first point.
         """
         self.loads.at(stamp_ns)
-        start_ns = max(self.supervisor.supervision.stamp_ns, stamp_ns - PLAN_WINDOW_NS)
-        for load_ns, load in self.loads.since(start_ns, stamp_ns) if points else ():
-            self._judged(load_ns, points[0].positions[list(places)], load)
-        return self.supervisor.held()
-
-    @staticmethod
-    def _planned(
-        running: RunningModel,
-        settings: StreamSettings,
-        stamp_ns: int,
-        held: Held,
-        theta: Array,
-        theta_dot: Array | None,
-    ) -> Array:
-        """Return the corrected angles for planned ones."""
-        load = held.load(running.model.table.workspace.configuration(theta).platform)
-        found = search(running, settings, stamp_ns, load, theta, theta_dot)
-        delta = held.share * faded(running, settings, found)
-        return within_joint_limits(theta, delta, running.model.table.geometry.limits)
+        table, supervisor = self.running_model().model.table, self.supervisor
+        start_ns = max(supervisor.supervision.stamp_ns, stamp_ns - PLAN_WINDOW_NS)
+        if first is not None:
+            for load_ns, load in self.loads.since(start_ns, stamp_ns):
+                judged_load(supervisor, self.settings, table, load_ns, first, load)
+        return supervisor.held(self.settings.supervisor)

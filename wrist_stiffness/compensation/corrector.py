@@ -27,11 +27,15 @@ from wrist_stiffness.mechanism.compiled import (
     CompiledCommands,
     CompiledWrist,
     CorrectedRows,
+    CorrectorState,
 )
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import IN_F, IN_U, ErrorModel, Load
 
 WANTED = np.ones(1, dtype=bool)
+
+Share = Callable[[Array], float] | float
+"""Which part of a correction is applied, or a function of the platform's turn (3,) [rad]."""
 
 
 class Corrected(NamedTuple):
@@ -43,17 +47,27 @@ class Corrected(NamedTuple):
 
 
 class Corrector:
-    """What one stream of commands remembers of its corrections."""
+    """What one stream of commands remembers of its corrections.
+
+    Attributes
+    ----------
+    applied : AppliedCorrection
+        What is added to the commands.
+    held : (2,) float
+        The correction that was found last [rad].
+    """
 
     def __init__(self) -> None:
         self.applied = AppliedCorrection()
-        self._held = np.zeros(2)
+        self.held = np.zeros(2)
         self._settings_of: tuple[StreamSettings, ErrorModel] | None = None
         self._task = self._safety = np.zeros(0)
+        # Of one command on its way.
+        self._stamp, self._share = np.zeros(1, dtype=np.int64), np.ones(1)
 
     def release(self) -> None:
         """Search the next correction from nothing."""
-        self._held[:] = 0.0
+        self.held[:] = 0.0
 
     def reset(self) -> None:
         """Begin at zero again."""
@@ -68,7 +82,7 @@ class Corrector:
         theta: Array,
         theta_dot: Array | None,
         load: Load | None,
-        share: Callable[[Array], float],
+        share: Share,
     ) -> Corrected:
         """Correct one command.
 
@@ -86,17 +100,16 @@ class Corrector:
             Their speeds [rad/s].
         load : Load or None
             To correct for; None where there shall be no correction, and what is applied fades out.
-        share : callable
+        share : float or callable
             Which part of a correction is applied, by the platform's turn (3,) [rad].
         """
-        if load is not None and running.compiled is not None:
+        compiled = running.compiled
+        if load is not None and compiled is not None:
             flags = IN_U if load.on_platform else IN_F
-            wrench = np.ascontiguousarray(load.wrench, float)
-            own = CompiledCommands(np.array([stamp_ns]), theta, wrench, flags, WANTED)
-            block = Correcting(self, running, running.compiled, settings, own)
-            if block.search(0, 1) == 1:
-                block.share[0] = share(block.turn(0))
-                block.apply(0, 1)
+            self._stamp[0] = stamp_ns
+            own = CompiledCommands(self._stamp, theta, load.wrench, flags, WANTED, self._share)
+            block = Correcting(self, running, compiled, settings, own)
+            if block.only_one(share):
                 applied = correction_of(block.found, 0, running.model, load)
                 return Corrected(applied.delta, applied, None)
         return self.searched(running, settings, stamp_ns, theta, theta_dot, load, share)
@@ -120,19 +133,19 @@ class Corrector:
         theta: Array,
         theta_dot: Array | None,
         load: Load | None,
-        share: Callable[[Array], float],
+        share: Share,
     ) -> Corrected:
         """Do the same in Python: for models with a memory, and to say what is wrong."""
         found: Correction | None = None
         fault: WristError | None = None
-        held, wanted = self._held.copy(), np.zeros(2)
+        held, wanted = self.held.copy(), np.zeros(2)
         self.release()
         if load is not None:
             try:
                 play = play_of(running.model, settings)
                 found = search(running, settings, stamp_ns, load, theta, theta_dot, held, play)
-                self._held[:] = found.delta
-                part = share(found.jacobian.dot(found.delta))
+                self.held[:] = found.delta
+                part = share(found.jacobian.dot(found.delta)) if callable(share) else share
                 wanted = part * faded(running, settings, found)
             except WristError as error:
                 fault = error
@@ -161,8 +174,6 @@ class Correcting:
     ----------
     found : CorrectedRows
         The corrections.
-    share : (n,) float
-        Part of each that is applied, 1 until it is said [-].
     faults : dict of int to WristError
         Why a command that was wanted has no correction, by its place.
     """
@@ -181,62 +192,74 @@ class Correcting:
         self._settings = settings
         self._task, self._safety = corrector.compiled_settings(running.model, settings)
         self.commands = commands
-        n = len(commands.wanted)
-        self.found = CorrectedRows.room(n, compiled.sectors)
-        self.share = np.ones(n)
+        self.found = CorrectedRows.room(len(commands.wanted), compiled.sectors)
         self.faults: dict[int, WristError] = {}
-
-    def search(self, begin: int, end: int) -> int:
-        """Search corrections and return which command is the first that cannot be served."""
-        held, contact = self._corrector._held, self._running.contact
-        return self._compiled.correct(
-            self._task, self.commands, held, contact, self.found, begin, end
-        )[0]
-
-    def turn(self, place: int) -> Array:
-        """Return by how much a correction turns the platform, (3,) [rad]."""
-        row = self.found.rows[place]
-        turn: Array = row[14:20].reshape(3, 2).dot(row[:2])
-        return turn
-
-    def apply(self, begin: int, end: int) -> None:
-        """Let what was searched through the guards."""
-        applied = self._corrector.applied
-        self._compiled.apply(
-            self._safety,
-            self.commands,
-            self.share,
-            applied.value,
-            applied.stamp_ns,
-            self.found,
-            begin,
-            end,
+        applied = corrector.applied
+        self._state = CorrectorState(
+            corrector.held, running.contact, applied.value, applied.stamp_ns
         )
+        self._searched = self._applied = 0
 
-    def correct(self, begin: int, end: int, share: Callable[[Array], float] | None = None) -> None:
-        """Correct commands whose shares are said, or a single one whose share depends on it."""
-        while begin < end:
-            done = self.search(begin, end)
-            if share is not None and done > begin:
-                self.share[begin] = share(self.turn(begin))
-            self.apply(begin, done)
-            if done < end:
-                self._search_in_python(done, share)
-                done += 1
-            begin = done
+    def correct(self, end: int) -> None:
+        """Correct commands up to a place; what their shares are must be said."""
+        self.search(end)
+        self._apply(end)
 
-    def _search_in_python(self, place: int, share: Callable[[Array], float] | None) -> None:
-        own = self.commands
-        load = Load(own.load[place], bool(own.on_platform[place]))
-        part = float(self.share[place])
+    def search(self, end: int) -> None:
+        """Search corrections up to a place, to be applied later."""
+        while self._searched < end:
+            begin = self._searched
+            self._searched = self._compiled.correct(
+                self._task, None, self.commands, self._state, self.found, begin, end
+            )
+            if self._searched < end:
+                self._search_in_python(float(self.commands.share[self._searched]))
+
+    def search_one(self, share: Callable[[Array], float]) -> None:
+        """Search the next one, and learn which share of it is applied."""
+        if not self._next(share):
+            self._search_in_python(share)
+
+    def only_one(self, share: Share) -> bool:
+        """Correct the only command of a block; tell whether the compiled formulas serve."""
+        if not callable(share):
+            self.commands.share[0] = share
+            state, found = self._state, self.found
+            return self._compiled.correct(self._task, self._safety, self.commands, state, found) > 0
+        if not self._next(share):
+            return False
+        self._apply(1)
+        return True
+
+    def _next(self, share: Callable[[Array], float]) -> bool:
+        own, found, place = self.commands, self.found, self._searched
+        end = place + 1
+        if self._compiled.correct(self._task, None, own, self._state, found, place, end) == place:
+            return False
+        row = found.rows[place]
+        own.share[place] = share(row[14:20].reshape(3, 2).dot(row[:2]))
+        self._searched = end
+        return True
+
+    def _apply(self, end: int) -> None:
+        begin, self._applied = self._applied, end
+        if begin < end:
+            state, found = self._state, self.found
+            self._compiled.correct(None, self._safety, self.commands, state, found, begin, end)
+
+    def _search_in_python(self, share: Share) -> None:
+        """Search and apply the next one."""
+        own, place = self.commands, self._searched
+        self._apply(place)
+        self._searched = self._applied = place + 1
         one = self._corrector.searched(
             self._running,
             self._settings,
             int(own.stamp_ns[place]),
             own.theta[place],
             None,
-            load,
-            share or (lambda turn: part),
+            Load(own.load[place], bool(own.on_platform[place])),
+            share,
         )
         self.found.applied[place] = one.delta
         if one.fault is not None:

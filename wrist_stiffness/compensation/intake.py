@@ -167,9 +167,16 @@ class Frames:
     ----------
     sensors : mapping of str to SensorFrame
         By `frame_name`, beside `wrist_base` and `wrist_platform`.
+    prefix : str
+        Which may stand before the name of every frame, as tf2 tells robots apart.
     """
 
     sensors: Mapping[str, SensorFrame] = field(default_factory=dict)
+    prefix: str = ""
+
+    def own_name(self, frame_id: str) -> str:
+        """Return the name of a frame without the prefix."""
+        return frame_name(frame_id).removeprefix(self.prefix)
 
     def load(self, frame_id: str, force: Sequence[float], moment: Sequence[float]) -> Load:
         """Move a wrench to O.
@@ -194,7 +201,7 @@ class Frames:
             If a component is not finite.
         """
         known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: ON_PLATFORM}
-        name = frame_name(frame_id)
+        name = self.own_name(frame_id)
         frame = self.sensors.get(name) or known.get(name)
         if frame is None:
             names = ", ".join([*known, *self.sensors])
@@ -212,13 +219,12 @@ class Frames:
 
     def is_at_origin(self, frame_id: str) -> bool:
         """Tell whether loads of a frame are at O as they come."""
-        name = frame_name(frame_id)
+        name = self.own_name(frame_id)
         return name in (BASE_FRAME, PLATFORM_FRAME) and name not in self.sensors
 
-    def loads(self, frame_id: str, wrenches: Array) -> list[Load]:
-        """Return finite wrenches (k, 6) of a frame that is at O."""
-        on_platform = frame_name(frame_id) == PLATFORM_FRAME
-        return [Load(wrench, on_platform) for wrench in wrenches]
+    def turns(self, frame_id: str) -> bool:
+        """Tell whether loads of a frame that is at O turn with the platform."""
+        return self.own_name(frame_id) == PLATFORM_FRAME
 
     def on_platform(
         self, frame_id: str, point: Sequence[float], what: str
@@ -233,7 +239,7 @@ class Frames:
         known = {PLATFORM_FRAME: ON_PLATFORM} | {
             own: frame for own, frame in self.sensors.items() if frame.parent == PLATFORM_FRAME
         }
-        name = frame_name(frame_id)
+        name = self.own_name(frame_id)
         if name not in known:
             raise FrameError(
                 f"{what}: frame '{frame_id}' is neither {PLATFORM_FRAME} nor mapped to it "
@@ -267,7 +273,7 @@ class Frames:
         known = {BASE_FRAME: IN_BASE} | {
             own: frame for own, frame in self.sensors.items() if frame.parent == BASE_FRAME
         }
-        name = frame_name(frame_id)
+        name = self.own_name(frame_id)
         if name not in known:
             raise FrameError(
                 f"{what}: frame '{frame_id}' is neither {BASE_FRAME} nor mapped to it "

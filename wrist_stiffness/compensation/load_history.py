@@ -10,13 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.errors import InputError, StaleLoadError, WristError
+from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import Load
 
 NANOSECONDS = 1_000_000_000
 
 TARE_WINDOW_S = 1.0
+
+PART_S = 0.2
+"""A load whose means over this time differ within a tare is no noise: it swings or is moved [s]."""
+
+SIGMAS = 3.0
+"""By so many standard errors of its noise a mean may differ besides."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,20 @@ class LoadHistory:
         self.late = 0
         self._served_ns = (0, 0)
         self._stamps: list[int] = []
-        self._loads: list[Load] = []
+        # Rows of as many loads, the oldest first, behind others that are no longer wanted.
+        self._first = 0
+        self._wrench = np.empty((2 * self.CAPACITY, 6))
+        self._on_platform = np.empty(2 * self.CAPACITY, dtype=bool)
+
+    @property
+    def age_limit_s(self) -> float:
+        """Oldest load that is still used [s]."""
+        return self._age_limit_s
+
+    @age_limit_s.setter
+    def age_limit_s(self, age_limit_s: float) -> None:
+        self._age_limit_s = age_limit_s
+        self._age_limit_ns = round(age_limit_s * NANOSECONDS)
 
     def __len__(self) -> int:
         """Return how many loads are kept."""
@@ -78,18 +99,39 @@ class LoadHistory:
         jumped back: the history begins anew.
         """
         if self._stamps and stamp_ns < self._stamps[-1] - self._age_limit_ns:
-            self._stamps, self._loads, self._served_ns = [], [], (0, 0)
+            self._stamps, self._served_ns = [], (0, 0)
         load_served_ns, served_ns = self._served_ns
         if load_served_ns < stamp_ns <= served_ns:
             self.late += 1
         place = bisect.bisect_left(self._stamps, stamp_ns)
-        if place < len(self._stamps) and self._stamps[place] == stamp_ns:
-            self._loads[place] = load
-            return
-        self._stamps.insert(place, stamp_ns)
-        self._loads.insert(place, load)
-        if len(self._stamps) > self.CAPACITY:
-            del self._stamps[0], self._loads[0]
+        if place == len(self._stamps) or self._stamps[place] != stamp_ns:
+            end = self._room(1).stop
+            if place < len(self._stamps):
+                for column in (self._wrench, self._on_platform):
+                    own = column[self._first + place : end]
+                    own[1:] = own[:-1].copy()
+            self._stamps.insert(place, stamp_ns)
+        self._wrench[self._first + place] = load.wrench
+        self._on_platform[self._first + place] = load.on_platform
+        self._forget()
+
+    def _room(self, count: int) -> slice:
+        """Return where further loads go."""
+        begin = self._first + len(self._stamps)
+        if begin + count > len(self._wrench):
+            for column in (self._wrench, self._on_platform):
+                column[: len(self._stamps)] = column[self._first : begin].copy()
+            self._first, begin = 0, len(self._stamps)
+        return slice(begin, begin + count)
+
+    def _forget(self) -> None:
+        surplus = max(0, len(self._stamps) - self.CAPACITY)
+        del self._stamps[:surplus]
+        self._first += surplus
+
+    def _load(self, place: int) -> Load:
+        row = self._first + place
+        return Load(self._wrench[row].copy(), bool(self._on_platform[row]))
 
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp and load that belong to a joint state.
@@ -121,7 +163,7 @@ class LoadHistory:
                 f"(limit {self.age_limit_s:g} s)"
             )
         self._served_ns = (self._stamps[place], max(stamp_ns, self._served_ns[1]))
-        return self._stamps[place], self._loads[place]
+        return self._stamps[place], self._load(place)
 
     def keeps(self, stamps: NDArray[np.int64], first_ns: int) -> bool:
         """Tell whether loads of further stamps (k,) [ns] leave that of a first sample in place."""
@@ -137,34 +179,46 @@ class LoadHistory:
         newest = self._stamps[-1] if self._stamps else stamps[0] - 1
         return bool(stamps[0] > newest and (np.diff(stamps) > 0).all())
 
-    def extend(self, stamps: NDArray[np.int64], loads: Sequence[Load]) -> None:
-        """Keep loads that rise (see `rises_with`), as `add` would one after the other."""
+    def extend(
+        self, stamps: NDArray[np.int64], wrenches: NDArray[np.float64], on_platform: bool
+    ) -> None:
+        """Keep loads (k, 6) that rise (see `rises_with`), as `add` would one after the other."""
         load_served_ns, served_ns = self._served_ns
         self.late += int(np.count_nonzero((load_served_ns < stamps) & (stamps <= served_ns)))
-        self._stamps += stamps.tolist()
-        self._loads += loads
-        surplus = max(0, len(self._stamps) - self.CAPACITY)
-        del self._stamps[:surplus], self._loads[:surplus]
+        for begin in range(0, len(stamps), self.CAPACITY):
+            part = slice(begin, begin + self.CAPACITY)
+            rows = self._room(len(stamps[part]))
+            self._wrench[rows], self._on_platform[rows] = wrenches[part], on_platform
+            self._stamps += stamps[part].tolist()
+            self._forget()
 
-    def places(self, stamps: NDArray[np.int64]) -> tuple[NDArray[np.intp], list[Load]]:
-        """Return which of the loads kept belongs to each stamp (n,) [ns], -1 where `at` refuses."""
+    def block_at(self, stamps: NDArray[np.int64]) -> tuple[Array, Flags, Flags]:
+        """Return the loads (n, 6) that belong to stamps (n,) [ns], which are in U, which are there.
+
+        Those that `at` refuses are zero.
+        """
         kept = np.array(self._stamps, dtype=np.int64)
         found = np.searchsorted(kept, stamps, side="right") - 1
         known = (found >= 0) & (stamps != 0)
         known[known] = stamps[known] - kept[found[known]] <= self._age_limit_ns
+        wrench, on_platform = np.zeros((len(stamps), 6)), np.zeros(len(stamps), dtype=bool)
         if known.any():
             last = int(np.flatnonzero(known)[-1])
             newest = max(int(stamps[known].max()), self._served_ns[1])
             self._served_ns = int(kept[found[last]]), newest
-        return np.where(known, found, -1), self._loads
+            rows = self._first + found[known]
+            wrench[known], on_platform[known] = self._wrench[rows], self._on_platform[rows]
+        return wrench, on_platform, known
 
-    def mean_since(self, window_s: float) -> Zero:
+    def mean_since(self, window_s: float, limit: Thresholds) -> Zero:
         """Return mean and scatter of the newest loads over a window, for the tare.
 
         Parameters
         ----------
         window_s : float
             Up to the newest stamp [s].
+        limit : Thresholds
+            By which another load departs.
 
         Returns
         -------
@@ -176,27 +230,31 @@ class LoadHistory:
         StaleLoadError
             If there is no load.
         InputError
-            If loads in F and in U are mixed.
+            If loads in F and in U are mixed, or the load moves.
         """
         if not self._stamps:
             raise StaleLoadError("tare: no load estimate has arrived")
-        start = bisect.bisect_left(self._stamps, self._stamps[-1] - round(window_s * NANOSECONDS))
-        loads = self._loads[start:]
-        if len({load.on_platform for load in loads}) > 1:
+        last_ns = self._stamps[-1]
+        start = bisect.bisect_left(self._stamps, last_ns - round(window_s * NANOSECONDS))
+        rows = slice(self._first + start, self._first + len(self._stamps))
+        wrenches, on_platform = self._wrench[rows], self._on_platform[rows]
+        if on_platform.any() != on_platform.all():
             raise InputError("tare: loads in wrist_base and in wrist_platform are mixed")
-        wrenches = np.array([load.wrench for load in loads])
-        mean = Load(wrenches.mean(axis=0), loads[0].on_platform)
-        return Zero(mean, wrenches.std(axis=0))
+        mean = wrenches.mean(axis=0)
+        ages_s = (last_ns - np.array(self._stamps[start:])) / NANOSECONDS
+        force, moment = _moved(wrenches - mean, (ages_s // PART_S).astype(int))
+        if force > limit.force or moment > limit.moment:
+            raise InputError(
+                f"tare: the load moves by {force:.3g} N and {moment:.3g} N m within "
+                f"{window_s:g} s (limits {limit.force:g} N, {limit.moment:g} N m); let it rest"
+            )
+        return Zero(Load(mean, bool(on_platform[0])), wrenches.std(axis=0))
 
     def since(self, start_ns: int, stamp_ns: int) -> list[tuple[int, Load]]:
         """Return stamps [ns] and loads after one stamp and up to another."""
         first = bisect.bisect_right(self._stamps, start_ns)
         last = bisect.bisect_right(self._stamps, stamp_ns)
-        return list(zip(self._stamps[first:last], self._loads[first:last], strict=True))
-
-    @property
-    def _age_limit_ns(self) -> int:
-        return round(self.age_limit_s * NANOSECONDS)
+        return [(self._stamps[place], self._load(place)) for place in range(first, last)]
 
 
 class LoadIntake:
@@ -228,15 +286,9 @@ class LoadIntake:
         """Take in a wrench message (see `Frames.load` for its errors)."""
         self.history.add(stamp_ns, self.frames.load(frame_id, force, moment))
 
-    def measured_zero(self) -> Zero:
-        """Return the mean of the last second, for a tare.
-
-        Raises
-        ------
-        InputError
-            If no load has arrived or loads in F and in U are mixed.
-        """
-        return self.history.mean_since(TARE_WINDOW_S)
+    def measured_zero(self, limit: Thresholds) -> Zero:
+        """Return the mean of the last second, for a tare (see `LoadHistory.mean_since`)."""
+        return self.history.mean_since(TARE_WINDOW_S, limit)
 
     def add_block(
         self, stamps: NDArray[np.int64], frame_id: str, wrenches: NDArray[np.float64]
@@ -254,7 +306,7 @@ class LoadIntake:
         """
         finite = bool(np.isfinite(wrenches).all())
         if finite and self.history.rises_with(stamps) and self.frames.is_at_origin(frame_id):
-            self.history.extend(stamps, self.frames.loads(frame_id, wrenches))
+            self.history.extend(stamps, wrenches, self.frames.turns(frame_id))
             return []
         faults: list[WristError] = []
         for stamp_ns, wrench in zip(stamps.tolist(), wrenches.tolist(), strict=True):
@@ -264,18 +316,14 @@ class LoadIntake:
                 faults.append(error)
         return faults
 
-    def block_at(self, stamps: NDArray[np.int64]) -> list[Load | None]:
-        """Return the loads that belong to n stamps [ns], None where `at` refuses."""
-        places, kept = self.history.places(stamps)
-        tare = None if self.zero is None else self.zero.load
-        if tare is None:
-            return [None if place < 0 else kept[place] for place in places.tolist()]
-        return [
-            None
-            if place < 0 or kept[place].on_platform != tare.on_platform
-            else Load(kept[place].wrench - tare.wrench, tare.on_platform)
-            for place in places.tolist()
-        ]
+    def block_at(self, stamps: NDArray[np.int64]) -> tuple[Array, Flags, Flags]:
+        """Return the tared loads that belong to n stamps [ns] (see `LoadHistory.block_at`)."""
+        wrench, on_platform, known = self.history.block_at(stamps)
+        if self.zero is not None:
+            zero = self.zero.load
+            known &= on_platform == zero.on_platform
+            wrench[known] -= zero.wrench
+        return wrench, on_platform, known
 
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`).
@@ -300,3 +348,19 @@ class LoadIntake:
         if zero.on_platform != load.on_platform:
             raise InputError("load: the tare was taken in another frame than this load")
         return Load(load.wrench - zero.wrench, load.on_platform)
+
+
+def _moved(departures: Array, part: NDArray[np.int_]) -> tuple[float, float]:
+    """Return by how much means over parts of a time depart, above noise, force and moment [N, N m].
+
+    The noise is that of one reading after the other, for a swing hardly changes between these.
+    """
+    counts = np.bincount(part)
+    sums = np.array([np.bincount(part, column) for column in departures.T]).T
+    counts, sums = counts[counts > 0, None], sums[counts > 0]
+    variance = (
+        0.5 * np.mean(np.diff(departures, axis=0) ** 2, axis=0) if len(departures) > 1 else 0.0
+    )
+    above = np.maximum(np.abs(sums / counts) - SIGMAS * np.sqrt(variance / counts), 0.0)
+    force, moment = np.linalg.norm(above.reshape(-1, 2, 3), axis=2).max(axis=0).tolist()
+    return force, moment

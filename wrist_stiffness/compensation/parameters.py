@@ -11,18 +11,19 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
-from wrist_stiffness.compensation.intake import MotorNames
+from wrist_stiffness.compensation.intake import Frames, MotorNames
 from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.errors import InputError
 
 ParameterValue = bool | int | float | str
 
 COVARIATE = re.compile("[A-Za-z][A-Za-z0-9_]*")
+FRAME_PREFIX = re.compile("([A-Za-z0-9_][A-Za-z0-9_/]*)?")
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,13 @@ COMMON = (
         "",
         "frames of sensors (YAML): {FRAME_ID: {parent: wrist_base | wrist_platform, "
         "position_mm: [x, y, z], rpy_deg: [r, p, y], acts_on: platform | environment}}",
+    ),
+    ParameterEntry(
+        "frame_prefix",
+        "",
+        "before the names of all frames, on topics and in TF, so that wrists live side by side: "
+        "left/",
+        fixed=True,
     ),
     ParameterEntry(
         "covariates", "", "names of /covariates/NAME that the model uses, with blanks", fixed=True
@@ -212,6 +220,14 @@ CORRECTION = (
         "what is corrected for: judge: a payload that is recognised or told; follow: every load as "
         "it is measured, only where it cannot be a contact",
         choices=("judge", "follow"),
+    ),
+    ParameterEntry(
+        "model_doubt",
+        2.0,
+        "the wrist may be so many times stiffer or softer than the model; with load_policy judge "
+        "2/(x + 1/x) of the correction is applied, which leaves least in the worst case [-]",
+        lower=1.0,
+        upper=10.0,
     ),
     ParameterEntry(
         "contact_force_n",
@@ -330,9 +346,16 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
                 f"covariates: {name!r} cannot be the name of a topic: a letter, then letters, "
                 "digits and _"
             )
+    prefix = values["frame_prefix"]
+    if not FRAME_PREFIX.fullmatch(prefix):
+        raise InputError(
+            f"frame_prefix: {prefix!r} is not made of letters, digits, _ and, not at its start, /"
+        )
+    sensors = frames_from_yaml(values["frames"]).sensors
+    own = {name.removeprefix(prefix): sensor for name, sensor in sensors.items()}
     return StreamSettings(
         motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
-        frames=frames_from_yaml(values["frames"]),
+        frames=Frames(own, prefix),
         load_age_limit_s=values["load_age_limit_s"],
         signal_age_limit_s=values["signal_age_limit_s"],
     )
@@ -341,7 +364,12 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
 def prediction_settings(values: Mapping[str, Any]) -> StreamSettings:
     """Return the same of the predictor, from the parameters `COMMON` and `PREDICTION`."""
     noise = np.repeat([values["load_force_noise_n"], values["load_moment_noise_nm"]], 3)
-    return replace(stream_settings(values), load_noise=noise if noise.any() else None)
+    return replace(
+        stream_settings(values),
+        load_noise=noise if noise.any() else None,
+        marker_rate_hz=values["marker_rate_hz"],
+        marker_exaggeration=values["marker_exaggeration"],
+    )
 
 
 def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
@@ -365,6 +393,7 @@ def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
         ),
         supervisor=SupervisorSettings(
             Thresholds(values["contact_force_n"], values["contact_moment_nm"]),
+            values["model_doubt"],
             follow=values["load_policy"] == "follow",
         ),
     )

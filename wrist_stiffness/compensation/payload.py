@@ -19,17 +19,19 @@ from typing import NamedTuple
 import numpy as np
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.compiled import Flags, native
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.vectors import triad
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.error_model import IN_F, IN_U, Load
 
 SIGMAS = 3.0
 """A threshold is this many standard deviations of what one reading may be wrong by."""
 
-ENOUGH = 100
-"""After so many readings a direction counts as known and is learned no further, so that a contact
-that grows slowly is not learned as payload."""
+ENOUGH = 10.0
+"""After so many readings that are independent a direction counts as known and is learned no
+further, so that a contact that grows slowly is not learned as payload."""
 
 Row = tuple[float, float, float]
 
@@ -104,15 +106,24 @@ class Reading(NamedTuple):
     moments: Row
     rows: tuple[Row, Row]
 
+    @classmethod
+    def of_row(cls, row: list[float]) -> Reading:
+        """Return the reading of its 11 numbers in order."""
+        side, weight, u, v, down, a, b, c, d, e, f = row
+        return cls(side, weight, (u, v, down), ((a, b, c), (d, e, f)))
+
     def size(self, limit: Thresholds) -> float:
         """Return the load over the thresholds, the larger of force and moment [-]."""
         force = hypot(self.side, self.weight) / limit.force
         return max(force, hypot(*self.moments) / limit.moment)
 
+    def aside(self, limit: Thresholds) -> float:
+        """Return over the thresholds what no payload weighs: across gravity and about it [-]."""
+        return max(self.side / limit.force, abs(self.moments[2]) / limit.moment)
+
     def is_weight(self, limit: Thresholds) -> bool:
         """Tell whether some payload could weigh like this."""
-        aside = self.side <= limit.force and abs(self.moments[2]) <= limit.moment
-        return aside and self.weight > limit.force
+        return self.aside(limit) <= 1.0 and self.weight > limit.force
 
 
 class PayloadEstimate:
@@ -131,7 +142,7 @@ class PayloadEstimate:
     def __init__(self, weight: float, moments: Row, open_moment: float) -> None:
         variance = open_moment * open_moment
         self.weight, self.moments = weight, moments
-        self._readings = 0 if variance else ENOUGH
+        self._readings = 0.0 if variance else ENOUGH
         self._spread = (variance, 0.0, 0.0, variance, 0.0, variance)
 
     def rest(self, reading: Reading) -> Reading:
@@ -151,10 +162,10 @@ class PayloadEstimate:
         """Return how far its moments at a pose may be from what is known of them [N m]."""
         return SIGMAS * max(_quadratic(self._spread, row) for row in rows) ** 0.5
 
-    def explains(self, reading: Reading, limit: Thresholds) -> bool:
+    def explains(self, reading: Reading, limit: Thresholds, counts: float) -> bool:
         """Tell whether a load is the payload's, within thresholds and what poses left open.
 
-        If so, it is learned from.
+        If so, it is learned from, as so much of a reading that is independent of those before [-].
         """
         side, weight, (about_u, about_v, about_down), (row_u, row_v) = reading
         force = weight - self.weight
@@ -168,13 +179,15 @@ class PayloadEstimate:
         moment = left_u * left_u / (noise + of_u) + left_v * left_v / (noise + of_v)
         if moment + about_down * about_down / noise > SIGMAS * SIGMAS:
             return False
+        if not counts:
+            return True
         if self._readings < ENOUGH:
-            self._readings += 1
-            self.weight += force / self._readings
+            self._readings += counts
+            self.weight += counts * force / self._readings
         if ENOUGH * of_u > noise:
-            self._learn(row_u, about_u, noise)
+            self._learn(row_u, about_u, noise / counts)
         if ENOUGH * of_v > noise:
-            self._learn(row_v, about_v, noise)
+            self._learn(row_v, about_v, noise / counts)
         return True
 
     def _learn(self, row: Row, value: float, noise: float) -> None:
@@ -217,8 +230,63 @@ class Scales:
         down = geometry.gravity / self._g if self._g else np.array([0.0, 0.0, -1.0])
         frame = triad(down, np.eye(3)[np.argmin(np.abs(down))])
         self._axes: list[list[float]] = [*frame[:, 1:].T.tolist(), down.tolist()]
+        self._constants = np.append(self._axes, self._g)
 
-    def read(self, wrench: list[float], rotation: list[list[float]]) -> Reading:
+    def read(self, table: Table, theta: Array, load: Load) -> Reading:
+        """Read a load.
+
+        Parameters
+        ----------
+        table : Table
+            Its domain and range of loads.
+        theta : (2,) float
+            Motor angles [rad].
+        load : Load
+            On the platform there.
+
+        Raises
+        ------
+        WristError
+            If the pose or the load is out of range.
+        """
+        if native is not None:
+            rows, usable = self.rows_of(
+                table, theta, load.wrench, IN_U if load.on_platform else IN_F
+            )
+            if usable[0]:
+                return Reading.of_row(rows[0].tolist())
+        # A payload may stand in for it, but a load beyond the table is a fault in any case; turning
+        # a wrench changes neither of its sizes, so its frame does not matter.
+        table.check_load(load.wrench)
+        at = table.workspace.configuration(theta)
+        return self.reading(load.in_base(at).tolist(), at.platform.tolist())
+
+    def rows_of(
+        self, table: Table, theta: Array, wrench: Array, on_platform: Flags
+    ) -> tuple[Array, Flags]:
+        """Read many loads, compiled.
+
+        Parameters
+        ----------
+        table : Table
+            Its domain and range of loads.
+        theta, wrench : (n, 2), (n, 6) float
+            Motor angles [rad], loads at O [N, N m].
+        on_platform : (n,) bool
+            Which loads are in U, not in F.
+
+        Returns
+        -------
+        (n, 11) float, (n,) bool
+            What `Reading.of_row` takes, and where that could be had.
+        """
+        n = len(on_platform)
+        rows, status = np.empty((n, native.READING)), np.empty(n, dtype=np.uint8)
+        constants = table.workspace.constants
+        native.read_load(constants, self._constants, theta, wrench, on_platform, rows, status)
+        return rows, status == 0
+
+    def reading(self, wrench: list[float], rotation: list[list[float]]) -> Reading:
         """Return a load (6,) at O in F [N, N m] on the platform that is turned by (3, 3)."""
         force_u, force_v, weight = self.along(wrench[:3])
         side = hypot(force_u, force_v)
@@ -249,14 +317,22 @@ class Scales:
         (ux, uy, uz), (vx, vy, vz), (dx, dy, dz) = self._axes
         return ux * x + uy * y + uz * z, vx * x + vy * y + vz * z, dx * x + dy * y + dz * z
 
-    def load(self, payload: PayloadEstimate, rows: tuple[Row, Row], share: float) -> Load:
-        """Return a share of a payload's load at the pose of a reading's rows, in F."""
+    def load(
+        self, payload: PayloadEstimate, rows: tuple[Row, Row], share: float
+    ) -> tuple[float, ...]:
+        """Return a share of a payload's load at the pose of a reading's rows, (6,) in F."""
         (ux, uy, uz), (vx, vy, vz), (dx, dy, dz) = self._axes
         weight = share * payload.weight
-        first, second = (share * each for each in payload.shown(rows))
-        wrench = [weight * dx, weight * dy, weight * dz]
-        wrench += [ux * first + vx * second, uy * first + vy * second, uz * first + vz * second]
-        return Load(np.array(wrench))
+        first, second = payload.shown(rows)
+        first, second = share * first, share * second
+        return (
+            weight * dx,
+            weight * dy,
+            weight * dz,
+            ux * first + vx * second,
+            uy * first + vy * second,
+            uz * first + vz * second,
+        )
 
     def unknown(self, reading: Reading) -> PayloadEstimate:
         """Return the estimate of a payload of which a reading's weight is all that is known."""
@@ -287,7 +363,9 @@ class Held:
     share : float
         Part of the correction that is applied [-].
     valid : bool
-        Whether the load was known and corrected for in full, as `Supervision.valid`.
+        Whether the load was known and corrected for, as `Supervision.valid`.
+    threshold : float
+        A moment by which a load would be another one [N m].
     """
 
     scales: Scales | None
@@ -295,6 +373,7 @@ class Held:
     followed: Load | None
     share: float
     valid: bool
+    threshold: float
 
     def load(self, rotation: Array) -> Load:
         """Return the load on the platform that is turned by (3, 3), U -> F."""
@@ -302,4 +381,12 @@ class Held:
             return self.followed
         if self.scales is None or self.payload is None:
             return Load(np.zeros(6))
-        return self.scales.load(self.payload, self.scales.rows(rotation.tolist()), 1.0)
+        rows = self.scales.rows(rotation.tolist())
+        return Load(np.array(self.scales.load(self.payload, rows, 1.0)))
+
+    def known(self, rotation: Array) -> bool:
+        """Tell whether that load is known: one pose shows but a part of a payload's centre."""
+        if self.scales is None or self.payload is None:
+            return self.valid
+        open_moment = self.payload.open_moment(self.scales.rows(rotation.tolist()))
+        return self.valid and open_moment <= self.threshold

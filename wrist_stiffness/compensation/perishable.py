@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import degrees
 
+import numpy as np
+
 from wrist_stiffness.compensation.intake import MotorNames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError, StaleCommandError
@@ -40,8 +42,6 @@ def require_fresh(what: str, stamp_ns: int, now_ns: int, limit_s: float) -> None
 def require_within_limits(what: str, theta: Array, limits: Limits, motors: MotorNames) -> None:
     """Refuse angles beyond the joint limits by more than one encoder step.
 
-    Less than a step is the limit itself, as far as the drive can tell.
-
     Parameters
     ----------
     what : str
@@ -58,12 +58,17 @@ def require_within_limits(what: str, theta: Array, limits: Limits, motors: Motor
     InputError
         With the motor, its angle and its limits.
     """
-    names, lower, upper = (motors.motor_1, motors.motor_2), limits.joint_lower, limits.joint_upper
-    for name, angle, low, high in zip(
-        names, theta.tolist(), lower.tolist(), upper.tolist(), strict=True
-    ):
-        if not low - limits.encoder_step <= angle <= high + limits.encoder_step:
+    for motor, (angle, (low, high)) in enumerate(zip(theta.tolist(), limits.reach, strict=True)):
+        if not low <= angle <= high:
+            name = (motors.motor_1, motors.motor_2)[motor]
+            lower, upper = limits.joint_lower[motor], limits.joint_upper[motor]
             raise InputError(
                 f"{what}: {name} at {degrees(angle):.6g} deg is beyond its limits of "
-                f"{degrees(low):g} to {degrees(high):g} deg; not forwarded"
+                f"{degrees(lower):g} to {degrees(upper):g} deg; not forwarded"
             )
+
+
+def within_limits(theta: Array, limits: Limits) -> bool:
+    """Tell whether `require_within_limits` would refuse none of n pairs of angles (n, 2) [rad]."""
+    lowest, highest = np.transpose(limits.reach)
+    return bool(((lowest <= theta) & (theta <= highest)).all())

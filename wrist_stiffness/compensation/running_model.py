@@ -112,8 +112,13 @@ class RunningModel:
     def _predict(self, theta: Array, load: Load) -> Prediction:
         # The flanges that touched last are a good guess.  It saves time and leaves no trace: the
         # forces are solved for once more from the flanges that are found, whatever the guess was.
-        prediction = _told(lambda: self.model.predict(theta, load, self.contact))
-        self.contact = prediction.active
+        try:
+            prediction = self.model.predict(theta, load, self.contact)
+        except WristError:
+            raise
+        except Exception as error:
+            raise _fault(error) from error
+        self.contact[:] = prediction.active
         return prediction
 
     def _session_at(self, stamp_ns: int) -> Session | None:
@@ -133,10 +138,14 @@ class RunningModel:
 
 
 def _told(predict: Callable[[], Prediction]) -> Prediction:
-    """Predict; a user's own law may fail in any way, and that is a fault like others."""
     try:
         return predict()
     except WristError:
         raise
     except Exception as error:
-        raise InputError(f"the model fails: {type(error).__name__}: {error}") from error
+        raise _fault(error) from error
+
+
+def _fault(error: Exception) -> InputError:
+    """Return the fault that it is when a user's own law fails, in any way."""
+    return InputError(f"the model fails: {type(error).__name__}: {error}")

@@ -48,30 +48,30 @@ class SafetySettings:
 
 def guard_weight(
     workspace: Workspace, configuration: Configuration, settings: SafetySettings
-) -> float:
-    """Return how much of the correction is applied at a pose.
+) -> Array:
+    """Return how much of the correction is applied at poses.
 
     Parameters
     ----------
     workspace : Workspace
         The table's domain.
     configuration : Configuration
-        One pose inside it.
+        Poses inside it, or one.
     settings : SafetySettings
         Widths of the fades.
 
     Returns
     -------
-    float
+    (...) float
         1 well inside, 0 at the border, with a continuous slope in between.
     """
     lower, upper = workspace.rectangle
     theta = configuration.theta
-    to_border = np.minimum(theta - lower, upper - theta).min() / settings.domain_fade
-    determinant = abs(float(configuration.singularity))
+    to_border = np.minimum(theta - lower, upper - theta).min(axis=-1) / settings.domain_fade
+    determinant = np.abs(configuration.singularity)
     to_singular = (determinant - workspace.limits.singularity) / settings.singularity_fade
-    x = min(max(min(to_border, to_singular), 0.0), 1.0)
-    return float(x * x * (3.0 - 2.0 * x))
+    x = between(np.minimum(to_border, to_singular), 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
 
 
 def within_joint_limits(theta: Array, delta: Array, limits: Limits) -> Array:

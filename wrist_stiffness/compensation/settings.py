@@ -9,7 +9,7 @@ import numpy as np
 from wrist_stiffness.compensation.intake import Frames, MotorNames
 from wrist_stiffness.compensation.objective import ObjectiveName
 from wrist_stiffness.compensation.safety import SafetySettings
-from wrist_stiffness.compensation.supervisor import SupervisorSettings
+from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 
 
@@ -38,6 +38,8 @@ class StreamSettings:
         How the correction may change and where it fades.
     supervisor : SupervisorSettings
         What of the load is taken for a payload.
+    marker_rate_hz, marker_exaggeration : float
+        How often the wrist is drawn [1/s], and the factor on its error [-].
     """
 
     motors: MotorNames = field(default_factory=MotorNames)
@@ -49,3 +51,5 @@ class StreamSettings:
     correction_limit: float = float(np.radians(0.5))
     safety: SafetySettings = field(default_factory=SafetySettings)
     supervisor: SupervisorSettings = field(default_factory=SupervisorSettings)
+    marker_rate_hz: float = 10.0
+    marker_exaggeration: float = 1000.0

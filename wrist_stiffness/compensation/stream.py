@@ -22,7 +22,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
+from wrist_stiffness.model.error_model import ErrorModel, Prediction
 
 
 class Stream:
@@ -86,12 +86,16 @@ class Stream:
 
     def on_static_transforms(self, transforms: Sequence[StaticTransform]) -> None:
         """Learn frames that sensors may speak in; those of the settings go first."""
-        self._transforms |= {transform.child: transform for transform in transforms}
+        own = self._settings.frames.own_name
+        for each in transforms:
+            named = replace(each, parent=own(each.parent), child=own(each.child))
+            self._transforms[named.child] = named
         self._use_frames()
 
     def _use_frames(self) -> None:
         heard = sensor_frames(self._transforms.values())
-        self.loads.frames = Frames({**heard, **self._settings.frames.sensors})
+        own = self._settings.frames
+        self.loads.frames = Frames({**heard, **own.sensors}, own.prefix)
 
     @property
     def dropped_signals(self) -> tuple[str, ...]:
@@ -140,11 +144,14 @@ class PredictedBlock:
         At O in F [m, rad].
     covariance : (n, 6, 6) float
         Of the twist.
+    configuration : (n, 66) float
+        The rigid wrist, as `Configuration.of_row` takes it.
     """
 
     known: Flags
     twist: Array
     covariance: Array
+    configuration: Array
 
 
 class PredictionStream(Stream):
@@ -224,19 +231,9 @@ class PredictionStream(Stream):
         compiled = running.compiled
         if compiled is None:
             raise InputError("this model is predicted sample by sample")
-        loads = self.loads.block_at(stamps)
-        wrench, on_platform, known = as_rows(loads)
+        wrench, on_platform, known = self.loads.block_at(stamps)
         rows = compiled.predict(theta, wrench, on_platform, running.contact, known)
         known &= rows.status == 0
         at = Configuration.of_row(rows.configuration)
         covariance = running.model.table_covariance(at, rows.twist)
-        return PredictedBlock(known, rows.twist, covariance)
-
-
-def as_rows(loads: Sequence[Load | None]) -> tuple[Array, Flags, Flags]:
-    """Return wrenches (n, 6), which are in U (n,), and which are there at all (n,)."""
-    nothing = np.zeros(6)
-    wrench = np.array([nothing if load is None else load.wrench for load in loads])
-    on_platform = np.array([load is not None and load.on_platform for load in loads])
-    known = np.array([load is not None for load in loads])
-    return wrench.reshape(-1, 6), on_platform, known
+        return PredictedBlock(known, rows.twist, covariance, rows.configuration)

@@ -12,58 +12,46 @@ it does not change with the motion, so there is no loop.
                 where that is not known any more the correction fades out
     released    the payload's load is gone: corrected for no load
 
-A weight that stays the same for `SETTLE_S` becomes the payload, and its correction comes in over
-`RAMP_S`.  That is the experiment that tells it from a contact: a weight does not mind a correction,
-the load of a contact changes with it.  Then it is a contact, and no payload.
+A weight that stays the same for `SETTLE_S` becomes the payload, and its correction comes in slowly.
+That is the experiment that tells it from a contact: a weight does not mind a correction, the load
+of a contact changes with it.  Then it is a contact, and no payload.  Which part of the correction
+is applied says `applied_share.py`: less where a contact works against it, and all of it only as far
+as the model is trusted (`SupervisorSettings.trust`).
 
-In contact the correction yields: while the contact's moment works against the correction's turn,
-its share falls towards none.  It comes back when the command has left that place, never before, so
-that nothing can oscillate.
-
-For the nodes, on `CorrectionStream`: `declare_payload(Payload | None)` is what a gripper tells,
-`forget()` begins anew, `tare()` makes the present load zero, `supervision` is a `Supervision` to be
-shown and stored, `restore(payload)` expects a stored payload: it counts once the load agrees.
+For the nodes: `declare_payload(Payload | None)` is what a gripper tells, `forget()` begins anew,
+`supervision` is what is believed, to be shown and stored, `restore(payload)` expects a stored
+payload: it counts once the load agrees.
 """
 
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
-from enum import Enum
-from operator import mul
 
-import numpy as np
-
+from wrist_stiffness.compensation.applied_share import RAMP_S, AppliedShare, apart
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.payload import (
     Held,
     Payload,
     PayloadEstimate,
     Reading,
-    Row,
     Scales,
     Thresholds,
 )
+from wrist_stiffness.compensation.supervision import State, Supervision, SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.error_model import Load
 
 JUDGE_S = 0.1
-"""A contact, a release or a new weight is believed after this time [s] ..."""
+"""A contact, a release or a new weight that departs by one threshold is believed after this time,
+one that departs by more sooner in proportion, by two readings at least [s] ..."""
 
 SETTLE_S = 0.5
 """... and what allows more correction after this: no part swings or is being lifted then [s]."""
 
-RAMP_S = 1.0
-"""A correction comes in over this time, and goes where nobody knows what is carried [s]."""
-
 LATE_S = 0.2
 """So late a load may be, and the motors behind their command: as much as the platform turns in this
-time, a load may seem turned [s]."""
-
-YIELD_S = 0.1
-"""A correction that a contact works against is gone after this time, in which the default
-slew limit takes back 50 mdeg [s]."""
+time, a load may seem turned, and readings within it may all be wrong by the same [s]."""
 
 CALM = 0.5
 """A contact ends and a weight becomes the payload within this part of the thresholds, so that noise
@@ -82,69 +70,10 @@ NEW_WEIGHT = "a weight that was not there before is being judged"
 COMING_IN = "the correction is coming in"
 YIELDED = "the correction yielded to a contact, and comes back when the command leaves this place"
 
-
-class State(Enum):
-    """What is believed of the load, by the operators' names."""
-
-    UNSURE = "unsure"
-    FREE = "free"
-    HOLDING = "holding"
-    IN_CONTACT = "in contact"
-    RELEASED = "released"
-
-
 TRUSTED = (State.FREE, State.HOLDING)
+UNKNOWN = (State.UNSURE, State.IN_CONTACT)
 
 TEXTS = {State.UNSURE: NEW_WEIGHT, State.IN_CONTACT: NO_WEIGHT}
-
-
-@dataclass(frozen=True)
-class SupervisorSettings:
-    """What counts as another load.
-
-    Parameters
-    ----------
-    limit : Thresholds
-        A load that departs by less is the same load.  Never below five times the scatter that the
-        tare found.
-    follow : bool
-        Correct for every load as it is measured.  Only where it cannot be a contact.
-    """
-
-    limit: Thresholds = Thresholds(0.05, 0.002)
-    follow: bool = False
-
-
-@dataclass(frozen=True)
-class Supervision:
-    """What the supervisor believed at a moment.
-
-    Parameters
-    ----------
-    state : State
-        By the operators' names.
-    text : str
-        Why the correction is restricted; empty where it is not.
-    payload : Payload or None
-        What is corrected for.
-    told : bool
-        Whether the gripper told that payload.
-    share : float
-        Part of the correction that is applied; below 1 where it yielded to a contact [-].
-    valid : bool
-        Whether the load is known and corrected for in full, so that the residual holds.
-    stamp_ns, since_ns : int
-        Of the last command, and of the one at which the state began [ns].
-    """
-
-    state: State
-    text: str
-    payload: Payload | None
-    told: bool
-    share: float
-    valid: bool
-    stamp_ns: int
-    since_ns: int
 
 
 class Supervisor:
@@ -171,11 +100,11 @@ class Supervisor:
         self._seen_s = self._step_s = self._candidate_s = 0.0
         self._payload: PayloadEstimate | None = None
         self._candidate: PayloadEstimate | None = None
-        self._weight = self._share = 1.0
-        self._sure = False
-        self._touched: list[float] | None = None
+        self._weight = self._departure = self._trust = 1.0
+        self._share = AppliedShare()
         self._behind: list[float] | None = None
-        self._against: Row | None = None
+        self._place: list[float] | None = None
+        self._rest_s = self._counts = 0.0
         self._followed: Load | None = None
 
     def declare_payload(self, payload: Payload | None) -> None:
@@ -209,15 +138,15 @@ class Supervisor:
         payload, text = None, self._text
         if self._payload is not None and self._scales is not None:
             payload = self._scales.payload(self._payload)
-        if self._known:
-            coming = self._weight < 1.0 or self._share < 1.0
-            text = YIELDED if self._touched else COMING_IN if coming else ""
+        if self._state not in UNKNOWN:
+            coming = self._weight < 1.0 or self._share.value < 1.0
+            text = YIELDED if self._share.place else COMING_IN if coming else ""
         return Supervision(
             self._state,
             text,
             payload,
             self._told and payload is not None,
-            self._share,
+            self._share.value,
             self.valid,
             self._stamp_ns,
             self._since_ns,
@@ -230,23 +159,29 @@ class Supervisor:
 
     @property
     def valid(self) -> bool:
-        """Whether the load is known and corrected for in full."""
-        return self._known and self._share == 1.0 and self._weight == 1.0
+        """Whether the load is known and corrected for, all that the model is trusted with."""
+        return self._state not in UNKNOWN and self._share.value == 1.0 and self._weight == 1.0
 
-    @property
-    def _known(self) -> bool:
-        return self._state is not State.UNSURE and self._state is not State.IN_CONTACT
+    def scales(self, geometry: Geometry) -> Scales:
+        """Return what weighs on a wrist."""
+        if self._scales is None or self._scales.geometry is not geometry:
+            self._scales = Scales(geometry)
+        return self._scales
+
+    def follow(self, stamp_ns: int, measured: Load) -> None:
+        """Take a load as it is measured for the payload."""
+        self._begin(stamp_ns)
+        self._trust, self._followed = 1.0, measured
+        self._state, self._share.against, self._share.sure = State.FREE, None, True
 
     def judge(
         self,
         stamp_ns: int,
         theta: list[float],
-        measured: Load,
-        rotation: Array,
-        geometry: Geometry,
+        reading: Reading,
         settings: SupervisorSettings,
         reach: float,
-    ) -> Load:
+    ) -> tuple[float, ...] | None:
         """Return the load to correct for.
 
         Parameters
@@ -255,62 +190,63 @@ class Supervisor:
             Of the command [ns].
         theta : list of 2 float
             Commanded motor angles [rad].
-        measured : Load
-            Tared.
-        rotation : (3, 3) float
-            U -> F of the platform at the command.
-        geometry : Geometry
-            Of the wrist.
+        reading : Reading
+            Of the tared load, from `scales`.
         settings : SupervisorSettings
-            Thresholds.
+            Thresholds, and how far the model is trusted.
         reach : float
             A command that has moved by this has left the place of a contact: the largest
             correction [rad].
 
         Returns
         -------
-        Load
-            In F, or as measured where every load is followed.
+        (6,) float or None
+            At O in F [N, N m]; None for no load.
         """
-        last_ns, self._stamp_ns = self._stamp_ns or stamp_ns, stamp_ns
-        self._step_s = min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)
-        self._followed = measured if settings.follow else None
-        if self._followed is not None:
-            self._state, self._against, self._sure = State.FREE, None, True
-            return self._followed
-        scales = self._scales
-        if scales is None or scales.geometry is not geometry:
-            scales = self._scales = Scales(geometry)
-        wrench = measured.wrench
-        if measured.on_platform:
-            wrench = np.concatenate([rotation.dot(wrench[:3]), rotation.dot(wrench[3:])])
-        reading = scales.read(wrench.tolist(), rotation.tolist())
-        limit = Thresholds(
-            max(settings.limit.force, self.scatter.force),
-            max(settings.limit.moment, self.scatter.moment),
-        )
-        if self._touched is not None and _apart(theta, self._touched) > reach:
-            self._touched = None
+        self._begin(stamp_ns)
+        self._trust = settings.trust
+        self._share.leave(theta, reach)
+        self._rest(theta)
+        limit = self.limit(settings)
         known = limit.wider(reading, self._turned(theta))
+        # What a motion turns is turned by the same all along it: so much less it says anew.
+        self._counts = self._step_s / LATE_S * limit.moment / known.moment
         self._look(reading, known)
         if self._seen is State.IN_CONTACT:
             self._feel(theta, reading, known)
         elif self._seen is State.UNSURE and self._state is State.UNSURE:
-            self._weigh(reading, known, scales)
+            self._weigh(reading, known)
         elif self._seen is State.HOLDING and self._state is State.HOLDING:
             self._weight = min(1.0, self._weight + self._step_s / RAMP_S)
-        if self._payload is None:
-            return Load(np.zeros(6))
-        return scales.load(self._payload, reading.rows, self._weight)
+        if self._payload is None or self._scales is None:
+            return None
+        return self._scales.load(self._payload, reading.rows, self._weight)
 
-    def held(self) -> Held:
+    def _begin(self, stamp_ns: int) -> None:
+        last_ns, self._stamp_ns = self._stamp_ns or stamp_ns, stamp_ns
+        self._step_s = min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)
+        self._followed = None
+
+    def limit(self, settings: SupervisorSettings) -> Thresholds:
+        """Return by how much another load departs at least, at rest."""
+        force = max(settings.limit.force, self.scatter.force)
+        return Thresholds(force, max(settings.limit.moment, self.scatter.moment))
+
+    def held(self, settings: SupervisorSettings) -> Held:
         """Return what is held now, in full, for plans: it stays that, whatever is judged later."""
-        return Held(self._scales, copy(self._payload), self._followed, self._share, self.valid)
+        return Held(
+            self._scales,
+            copy(self._payload),
+            self._followed,
+            self._trust * self._share.value,
+            self.valid,
+            self.limit(settings).moment,
+        )
 
     @property
-    def undisturbed(self) -> bool:
-        """Whether `share` is 1 whatever the correction, and stays so."""
-        return self._against is None and self._share == 1.0
+    def settled(self) -> float | None:
+        """What `share` says whatever the correction, and goes on saying; else None."""
+        return self._trust if self._share.settled else None
 
     def share(self, turn: Array) -> float:
         """Return the part of a correction to apply.
@@ -322,27 +258,28 @@ class Supervisor:
         turn : (3,) float
             By which the correction turns the platform, in F [rad].
         """
-        if self._against is not None and self._scales is not None:
-            if sum(map(mul, self._against, self._scales.along(turn.tolist()))) < 0.0:
-                self._share = max(0.0, self._share - self._step_s / YIELD_S)
-        elif not self._sure:
-            self._share = max(0.0, self._share - self._step_s / RAMP_S)
-        elif self._touched is None:
-            self._share = min(1.0, self._share + self._step_s / RAMP_S)
-        return self._share
+        along = (0.0, 0.0, 0.0) if self._scales is None else self._scales.along(turn.tolist())
+        return self._trust * self._share.after(self._step_s, along)
+
+    def _rest(self, theta: list[float]) -> None:
+        """Note for how long the command has stayed where it is, to an encoder step."""
+        self._rest_s += self._step_s
+        step = self._scales.geometry.limits.encoder_step if self._scales else 0.0
+        if self._place is None or apart(theta, self._place) > step:
+            self._place, self._rest_s = theta, 0.0
 
     def _turned(self, theta: list[float]) -> float:
         """Return by how much the command has turned within about `LATE_S` [rad]."""
         first, second = self._behind or theta
         share = self._step_s / (LATE_S + self._step_s)
         self._behind = [first + share * (theta[0] - first), second + share * (theta[1] - second)]
-        return _apart(theta, self._behind)
+        return apart(theta, self._behind)
 
     def _look(self, reading: Reading, limit: Thresholds) -> None:
         """See what the load looks like, and believe it when it has looked like that for a while."""
         in_contact = self._state is State.IN_CONTACT
         seen = self._seeming(reading, limit.times(CALM) if in_contact else limit)
-        self._seen_s = self._seen_s + self._step_s if seen is self._seen else 0.0
+        self._seen_s = self._seen_s + self._step_s * self._departure if seen is self._seen else 0.0
         self._seen = seen
         patience = SETTLE_S if seen in TRUSTED else JUDGE_S
         if self._weight < 1.0 and seen is not State.HOLDING:
@@ -352,15 +289,24 @@ class Supervisor:
             self._enter(seen)
 
     def _seeming(self, reading: Reading, limit: Thresholds) -> State:
-        self._against = None
+        """Return what a load looks like, and by how many thresholds it is not what is believed."""
+        self._share.against, self._departure = None, 1.0
         payload = self._payload
-        if payload is not None and payload.explains(reading, limit):
+        if payload is not None and payload.explains(reading, limit, self._counts):
             return State.HOLDING
-        if reading.size(limit) <= 1.0:
-            return State.FREE if payload is None else State.RELEASED
+        nothing = reading.size(limit) <= 1.0
+        if nothing and payload is None:
+            return State.FREE
+        rest = reading if payload is None else payload.rest(reading)
+        if nothing or self._state not in UNKNOWN:
+            self._departure = max(1.0, rest.size(limit))
+        elif self._state is State.UNSURE:
+            self._departure = max(1.0, reading.aside(limit))
+        if nothing:
+            return State.RELEASED
         if reading.is_weight(limit) and self._weight == 1.0:
             return State.UNSURE
-        self._against = (reading if payload is None else payload.rest(reading)).moments
+        self._share.against = rest.moments
         return State.IN_CONTACT
 
     def _enter(self, state: State) -> None:
@@ -369,21 +315,24 @@ class Supervisor:
         if state is State.RELEASED:
             self._expected = None
         if state is not State.IN_CONTACT:
-            self._sure = state is not State.UNSURE
+            self._share.sure = state is not State.UNSURE
+        elif self._payload is not None and self._rest_s > LATE_S:
+            # A wall does not come by itself: something else than the motion changed.
+            self._payload, self._weight, self._share.sure = None, 1.0, False
         self._candidate = None
         self._state, self._since_ns = state, self._stamp_ns
         self._text = TEXTS.get(state, "")
 
     def _feel(self, theta: list[float], reading: Reading, limit: Thresholds) -> None:
         """Look again at what is held: whether the contact is its own, and it is still there."""
-        if self._share < 1.0 or self._weight < 1.0:
-            self._touched = theta
+        if self._share.value < 1.0 or self._weight < 1.0:
+            self._share.place = theta
         if self._state is State.IN_CONTACT and self._payload is not None:
             if self._weight < 1.0:
                 self._payload, self._weight, self._text = None, 1.0, CHANGES
             elif not self._stands(self._payload, reading, limit):
                 self._payload = None
-            self._sure = self._payload is not None
+            self._share.sure = self._payload is not None
 
     @staticmethod
     def _stands(payload: PayloadEstimate, reading: Reading, limit: Thresholds) -> bool:
@@ -394,17 +343,20 @@ class Supervisor:
         known = payload.open_moment(reading.rows) <= OPEN * limit.moment
         return known and payload.rest(reading).size(limit) < reading.size(limit)
 
-    def _weigh(self, reading: Reading, limit: Thresholds, scales: Scales) -> None:
+    def _weigh(self, reading: Reading, limit: Thresholds) -> None:
         """Make a weight that stays the payload, unless it was found to be a contact here."""
-        if self._candidate is None or not self._candidate.explains(reading, limit):
+        scales = self._scales
+        if scales is None:
+            return
+        if self._candidate is None or not self._candidate.explains(reading, limit, self._counts):
             self._candidate, self._candidate_s = scales.unknown(reading), 0.0
         self._candidate_s += self._step_s
         if self._candidate_s < SETTLE_S:
             return
         expected = None if self._expected is None else scales.estimate(self._expected)
-        if expected is not None and not expected.explains(reading, limit):
+        if expected is not None and not expected.explains(reading, limit, self._counts):
             expected = None
-        if self._touched is not None:
+        if self._share.place is not None:
             self._text = CHANGES
         elif not reading.is_weight(limit.times(CALM)):
             self._text = NO_WEIGHT
@@ -413,7 +365,3 @@ class Supervisor:
                 self._expected, self._told = None, False
             self._payload, self._weight = expected or self._candidate, 0.0
             self._enter(State.HOLDING)
-
-
-def _apart(theta: list[float], other: list[float]) -> float:
-    return max(abs(theta[0] - other[0]), abs(theta[1] - other[1]))

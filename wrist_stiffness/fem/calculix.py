@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
@@ -107,7 +108,6 @@ def _deck(
     # Two nodes per frame (shift at O, turn), one per passive joint (slide, turn), one per sector
     # (its gap): nodes of no element, whose degrees of freedom the equations give a meaning.
     own = int(first[-1])
-    columns = _columns(model, first, own)
     gap_node = own + 2 * len(FRAMES) + len(PASSIVE_JOINTS)
     platform = own + 2 * FRAMES.index("platform")
 
@@ -126,7 +126,7 @@ def _deck(
     yield from (f"{gap_node - len(PASSIVE_JOINTS) + k},3" for k in range(len(PASSIVE_JOINTS)))
     yield from (f"{gap_node + sector},2,3" for sector in range(len(closed)))
     yield from (f"{gap_node + sector},1" for sector in np.flatnonzero(~closed))
-    yield from _contact_equations(model, columns, gap_node, closed)
+    yield from _contact_equations(model, first, own, closed)
     yield "*NSET, NSET=PLATFORM"
     yield f"{platform},{platform + 1}"
     yield "*STEP"
@@ -176,57 +176,70 @@ def _right_handed(nodes: Array, elements: NDArray[np.int64]) -> NDArray[np.int64
 
 
 def _wall_equations(model: WristAtPose, first: NDArray[np.int64], own: int) -> Iterator[str]:
-    """Every node of a moving wall follows the frames: u - sum of coefficients x unknowns = 0."""
+    """Nodes of a moving wall follow the frames: n u - sum of coefficients x unknowns = 0."""
     for part, start in zip(model.placed, first, strict=False):
-        motion = rigid_motion(part.nodes * MILLIMETRES)
-        for wall, screw in (
-            (part.motor_wall, part.motor_screw),
-            (part.platform_wall, part.platform_screw),
+        # A wall that follows as a whole follows in x, y and z; one that slides, along its normals.
+        whole = sparse.csr_matrix(sparse.eye(3 * len(part.nodes)))
+        for wall, screw, axes in (
+            (part.motor_wall, part.motor_screw, whole),
+            (part.platform_wall, part.platform_screw, part.axes),
         ):
+            ways = sparse.csr_matrix(axes.T)
+            motion = ways @ rigid_motion(part.nodes * MILLIMETRES)
             for unknown, row in zip(wall, motion[wall] @ screw, strict=True):
                 masters = np.flatnonzero(np.abs(row) > NEGLIGIBLE)
                 if len(masters) == 0:
                     continue
-                terms = [(int(start) + unknown // 3, unknown % 3 + 1, 1.0)]
+                way = ways[unknown]
+                terms = [
+                    (int(start) + dof // 3, dof % 3 + 1, value)
+                    for dof, value in zip(way.indices, way.data, strict=True)
+                    if abs(value) > NEGLIGIBLE
+                ]
+                terms.sort(key=lambda term: -abs(term[2]))
                 terms += [(*_screw_dof(own, int(k)), -row[k]) for k in masters]
                 yield from _equation(terms)
 
 
 def _contact_equations(
-    model: WristAtPose, columns: NDArray[np.int64], gap_node: int, closed: NDArray[np.bool_]
+    model: WristAtPose, first: NDArray[np.int64], own: int, closed: NDArray[np.bool_]
 ) -> Iterator[str]:
     """Mean displacement of a closed sector against the hub = dof 1 of its gap node."""
-    openings = model.openings.tocsr()
-    inner = openings.shape[1] - SCREWS
-    shared = np.bincount(openings.indices, minlength=openings.shape[1])
+    gap_node = own + 2 * len(FRAMES) + len(PASSIVE_JOINTS)
+    inner = model.openings.shape[1] - SCREWS
+    by_node = [
+        (int(start), sparse.csr_matrix(model.openings[:, :inner] @ follow[:, :inner].T))
+        for follow, start in zip(model.follow, first, strict=False)
+    ]
+    on_walls = [np.concatenate([part.motor_wall, part.platform_wall]) // 3 for part in model.placed]
+    by_screw = model.openings[:, inner:].toarray()
+    # Rows are per metre and radian; the deck's shifts are in millimetres.
+    by_screw[:, [k for k in range(SCREWS) if _is_turn(k)]] *= MILLIMETRES
     for sector in np.flatnonzero(closed):
-        row = openings[sector].tocoo()
-        coefficients = row.data.copy()
-        # Rows are per metre and radian; the deck's shifts are in millimetres.
-        turns = (row.col >= inner) & (columns[row.col, 2] == 1)
-        coefficients[turns] *= MILLIMETRES
-        order = np.argsort(-np.abs(coefficients) * ((row.col < inner) & (shared[row.col] == 1)))
-        terms = [
-            (int(columns[row.col[k], 0]), int(columns[row.col[k], 1]), coefficients[k])
-            for k in order
-            if abs(coefficients[k]) > NEGLIGIBLE
-        ]
-        yield from _equation([*terms, (gap_node + int(sector), 1, -1.0)])
+        terms = []
+        for (start, rows), walls in zip(by_node, on_walls, strict=True):
+            row = rows[sector].tocoo()
+            # Dependent may be no node that another equation has a claim on.
+            shared = np.isin(row.col // 3, walls) | (np.diff(rows.tocsc().indptr)[row.col] > 1)
+            terms += [
+                (start + dof // 3, dof % 3 + 1, value, bool(taken))
+                for dof, value, taken in zip(row.col, row.data, shared, strict=True)
+                if abs(value) > NEGLIGIBLE
+            ]
+        terms.sort(key=lambda term: (term[3], -abs(term[2])))
+        masters = np.flatnonzero(np.abs(by_screw[sector]) > NEGLIGIBLE)
+        yield from _equation(
+            [term[:3] for term in terms]
+            + [(*_screw_dof(own, int(k)), by_screw[sector, k]) for k in masters]
+            + [(gap_node + int(sector), 1, -1.0)]
+        )
 
 
-def _columns(model: WristAtPose, first: NDArray[np.int64], own: int) -> NDArray[np.int64]:
-    """Node, direction and whether it is a turn, for each unknown of the model (u, 3)."""
-    count = model.openings.shape[1]
-    table = np.zeros((count, 3), dtype=np.int64)
-    for follow, start in zip(model.follow, first, strict=False):
-        of_nodes = follow[:, : count - SCREWS].tocoo()
-        table[of_nodes.col, 0] = start + of_nodes.row // 3
-        table[of_nodes.col, 1] = of_nodes.row % 3 + 1
-    for k in range(SCREWS):
-        in_frame = k < 6 * len(FRAMES)
-        is_turn = k // 3 % 2 if in_frame else (k - 6 * len(FRAMES)) % 2
-        table[count - SCREWS + k] = (*_screw_dof(own, k), is_turn)
-    return table
+def _is_turn(k: int) -> bool:
+    """Whether one of the frames' and joints' unknowns is an angle."""
+    if k < 6 * len(FRAMES):
+        return k // 3 % 2 == 1
+    return (k - 6 * len(FRAMES)) % 2 == 1
 
 
 def _screw_dof(own: int, k: int) -> tuple[int, int]:

@@ -46,7 +46,7 @@ class Provenance:
     Parameters
     ----------
     interface : str
-        `rigid` or `distributing`.
+        `rigid`, `distributing` or `sliding`.
     sizes : MeshSettings
         Element sizes [m].
     nodes, elements : dict of str to int
@@ -80,7 +80,7 @@ def elastic_components(
         The wrist.
     sizes : MeshSettings
         Element sizes.
-    interface : {"rigid", "distributing"}
+    interface : {"rigid", "distributing", "sliding"}
         How walls follow their frames.
     progress : callable, optional
         See `PartProgress`.

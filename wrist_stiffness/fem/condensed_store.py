@@ -51,7 +51,7 @@ def condense_solid(solid: Solid, sizes: MeshSettings, interface: Interface) -> C
         Its shape and walls.
     sizes : MeshSettings
         Element sizes [m].
-    interface : {"rigid", "distributing"}
+    interface : {"rigid", "distributing", "sliding"}
         How walls follow their frames.
 
     Returns

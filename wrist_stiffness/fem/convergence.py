@@ -81,7 +81,7 @@ def mesh_convergence(
         Reference element sizes.
     factors : tuple of float
         At least three multiples of them in a falling geometric sequence.
-    interface : {"rigid", "distributing"}
+    interface : {"rigid", "distributing", "sliding"}
         How walls follow their frames.
     condenser : callable
         `condense_solid`, or a `CondensedStore` that remembers.

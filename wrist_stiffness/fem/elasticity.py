@@ -148,3 +148,32 @@ def rigid_motion(points: Array) -> Array:
     spin = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
     shift = np.broadcast_to(np.eye(3), (len(points), 3, 3))
     return np.concatenate([shift, spin], axis=2).reshape(-1, 6)
+
+
+def cylindrical_axes(points: Array) -> sparse.csr_matrix:
+    """Return the axes along the radius, around and along z at each point off z.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Places [m].
+
+    Returns
+    -------
+    sparse.csr_matrix
+        (3 n, 3 n) orthogonal: x, y, z components from radial, tangential and axial ones.
+    """
+    cosine, sine = points[:, :2].T / np.hypot(points[:, 0], points[:, 1])
+    blocks = np.zeros((len(points), 3, 3))
+    blocks[:, 0, 0], blocks[:, 0, 1] = cosine, -sine
+    blocks[:, 1, 0], blocks[:, 1, 1] = sine, cosine
+    blocks[:, 2, 2] = 1.0
+    return block_axes(blocks)
+
+
+def block_axes(blocks: Array) -> sparse.csr_matrix:
+    """Return a block diagonal matrix (3 n, 3 n) of one 3 x 3 block for each node (n, 3, 3)."""
+    count = len(blocks)
+    return sparse.csr_matrix(
+        sparse.bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=(3 * count,) * 2)
+    )

@@ -20,7 +20,7 @@ class Factor:
     Parameters
     ----------
     order : (n,) int
-        Elimination order of the unknowns.
+        Elimination order of the unknowns; those that are not among them stay zero.
     lu : SuperLU
         Factors of the reordered matrix.
     """
@@ -34,7 +34,7 @@ class Factor:
             # SuperLU is four times slower on a block of columns than on one after the other.
             columns = [self.solve(column) for column in right.T]
             return np.column_stack(columns) if columns else np.zeros_like(right)
-        solution = np.empty_like(right)
+        solution = np.zeros_like(right)
         solution[self.order] = self.lu.solve(right[self.order])
         return solution
 

@@ -110,8 +110,10 @@ def _imposed(model: WristAtPose, part: PlacedBody, disturbance: Disturbance) -> 
     """Return the displacements of walls that do not come from the unknowns (3 n,)."""
     displacement = np.zeros(part.stiffness.shape[0])
     if part.name in disturbance.screws:
-        motion = rigid_motion(part.nodes)[part.motor_wall]
-        displacement[part.motor_wall] += motion @ disturbance.screws[part.name]
+        motion = part.axes.T @ (rigid_motion(part.nodes) @ disturbance.screws[part.name])
+        held = np.zeros_like(displacement)
+        held[part.motor_wall] = motion[part.motor_wall]
+        displacement += part.axes @ held
     if part.name in disturbance.warming:
         link = model.wrist.geometry.links[part.name]
         strain = link.material.expansion * disturbance.warming[part.name]

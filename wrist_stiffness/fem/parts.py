@@ -77,7 +77,8 @@ class Solid:
     angle : float
         Between a link's bores [rad]; zero for a bushing.
     motor_wall, platform_wall : str
-        Surfaces that follow the frames on the motor side and on the platform side.
+        Surfaces that follow the frames on the motor side and on the platform side; a bushing
+        turns, and at a passive joint slides, against what is on the platform side.
     flanges : tuple of str
         Flanges that take part in contact.
     """
@@ -92,6 +93,11 @@ class Solid:
     def material(self) -> Material:
         """What it is made of."""
         return self.dimensions.material
+
+    @property
+    def is_bushing(self) -> bool:
+        """Whether it is a bushing, about z, and not a link."""
+        return isinstance(self.dimensions, BushingDimensions)
 
     @property
     def sectors(self) -> list[str]:

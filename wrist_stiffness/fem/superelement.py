@@ -2,7 +2,12 @@
 
 A frame is a rigid body that holds a wall.  `rigid`: every node of the wall follows it.
 `distributing`: it is the wall's mean rigid motion (least squares over the surface), the wall may
-deform, and a wrench on the frame is spread over the surface accordingly.
+deform, and a wrench on the frame is spread over the surface accordingly.  `sliding`: of a bushing's
+wall that turns on a pin or in a bore, every node follows the frame along the wall's normal and is
+free along the wall: pressure without friction, of either sign, as where the fit has no clearance.
+All other walls are then rigid.  A sliding wall passes no force along and no moment about its axis:
+its flexibility there is zero, which multiplies nothing at a passive joint, and at a motor's says
+that the motor itself holds its shaft.
 """
 
 from __future__ import annotations
@@ -12,15 +17,24 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from wrist_stiffness.fem.cyclic import CyclicFactor, factorise_cyclic
-from wrist_stiffness.fem.elasticity import rigid_motion, surface_integrals
+from wrist_stiffness.fem.elasticity import cylindrical_axes, rigid_motion, surface_integrals
 from wrist_stiffness.fem.factor import Factor, factorise
 from wrist_stiffness.fem.parts import ElasticBody
 from wrist_stiffness.mechanism.components import Array
 
-Interface = Literal["rigid", "distributing"]
-INTERFACES: tuple[Interface, ...] = ("rigid", "distributing")
+Interface = Literal["rigid", "distributing", "sliding"]
+INTERFACES: tuple[Interface, ...] = ("rigid", "distributing", "sliding")
+
+ALL_WAYS = (0, 1, 2)
+RADIALLY = (0,)
+"""Directions at a node of a wall, in the axes of `wall_axes`, that follow the frame."""
+
+ALL = (0, 1, 2, 3, 4, 5)
+ACROSS = (0, 1, 3, 4)
+"""Components of a screw that move a wall, and those that move one about z along its normals."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +80,7 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
     ----------
     body : ElasticBody
         The solid's matrices.
-    interface : {"rigid", "distributing"}
+    interface : {"rigid", "distributing", "sliding"}
         How the walls follow the frames.
 
     Returns
@@ -75,8 +89,15 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
         At the solid's own origin.
     """
     loads = np.hstack([body.weight, body.pressure])
-    solve = _condense_rigid if interface == "rigid" else _condense_distributing
-    flexibility, on_motor, on_platform, inner = solve(body, loads)
+    if interface == "distributing":
+        flexibility, on_motor, on_platform, inner = _condense_distributing(body, loads)
+    else:
+        slides = interface == "sliding" and body.solid.is_bushing
+        stiffness, on_frames, inner = frame_stiffness(body, loads, slides)
+        carried = np.ix_(ACROSS, ACROSS) if slides else np.ix_(ALL, ALL)
+        flexibility = np.zeros((6, 6))
+        flexibility[carried] = _inverse(stiffness[6:, 6:][carried])
+        on_motor, on_platform = on_frames[:6], on_frames[6:]
     sector_screw = flexibility @ on_platform[:, 3:]
     return Superelement(
         flexibility=flexibility,
@@ -89,7 +110,9 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
     )
 
 
-def frame_stiffness(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array]:
+def frame_stiffness(
+    body: ElasticBody, loads: Array, slides: bool = False
+) -> tuple[Array, Array, Array]:
     """Guyan condensation onto the motor-side and the platform-side rigid frame.
 
     Parameters
@@ -98,6 +121,8 @@ def frame_stiffness(body: ElasticBody, loads: Array) -> tuple[Array, Array, Arra
         The solid's matrices.
     loads : (3 n, k) float
         Nodal forces.
+    slides : bool
+        Whether the wall on the platform side, about z, follows its frame along its normals only.
 
     Returns
     -------
@@ -108,33 +133,42 @@ def frame_stiffness(body: ElasticBody, loads: Array) -> tuple[Array, Array, Arra
     inner : (k, k) float
         Work of each load along each load's displacements with both frames held.
     """
-    nodes = body.mesh.nodes
-    motion = np.zeros((3 * len(nodes), 12))
-    held = np.zeros(3 * len(nodes), dtype=bool)
-    for side, wall in enumerate((body.solid.motor_wall, body.solid.platform_wall)):
-        on_wall = body.mesh.surface_nodes(wall)
-        unknowns = (3 * on_wall[:, None] + np.arange(3)).ravel()
-        motion[unknowns, 6 * side : 6 * side + 6] = rigid_motion(nodes[on_wall])
+    axes = _axes(body)
+    rigid = axes.T @ rigid_motion(body.mesh.nodes)
+    motion = np.zeros((len(rigid), 12))
+    held = np.zeros(len(rigid), dtype=bool)
+    walls = (
+        (body.solid.motor_wall, ALL_WAYS),
+        (body.solid.platform_wall, RADIALLY if slides else ALL_WAYS),
+    )
+    for side, (wall, ways) in enumerate(walls):
+        unknowns = (3 * body.mesh.surface_nodes(wall)[:, None] + np.array(ways)).ravel()
+        carried = np.array(ALL if ways == ALL_WAYS else ACROSS)
+        motion[np.ix_(unknowns, 6 * side + carried)] = rigid[np.ix_(unknowns, carried)]
         held[unknowns] = True
     free = np.flatnonzero(~held)
-    pull = body.stiffness @ motion
-    solution = _factorise_inside(body, free).solve(np.hstack([pull, loads])[free])
+    pull, loads = axes.T @ (body.stiffness @ (axes @ motion)), axes.T @ loads
+    solution = _factorise_inside(body, axes, free).solve(np.hstack([pull, loads])[free])
     by_frames, by_loads = solution[:, :12], solution[:, 12:]
     stiffness = _symmetric(motion.T @ pull - pull[free].T @ by_frames)
     on_frames = motion.T @ loads - pull[free].T @ by_loads
     return stiffness, on_frames, _symmetric(loads[free].T @ by_loads)
 
 
-def _factorise_inside(body: ElasticBody, free: NDArray[np.int64]) -> CyclicFactor | Factor:
-    if body.mesh.slices > 1:
-        return factorise_cyclic(body.stiffness, body.mesh.nodes, free, body.mesh.slices)
-    return factorise(body.stiffness[free][:, free], free)
+def _axes(body: ElasticBody) -> sparse.csr_matrix:
+    """Cylindrical axes at the nodes of a bushing, the solid's own at those of a link."""
+    if body.solid.is_bushing:
+        return cylindrical_axes(body.mesh.nodes)
+    return sparse.csr_matrix(sparse.eye(3 * len(body.mesh.nodes)))
 
 
-def _condense_rigid(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:
-    stiffness, on_frames, inner = frame_stiffness(body, loads)
-    flexibility = _inverse(stiffness[6:, 6:])
-    return flexibility, on_frames[:6], on_frames[6:], inner
+def _factorise_inside(
+    body: ElasticBody, axes: sparse.csr_matrix, free: NDArray[np.int64]
+) -> CyclicFactor | Factor:
+    mesh = body.mesh
+    if mesh.slices > 1:
+        return factorise_cyclic(body.stiffness, axes, mesh.nodes, free, mesh.slices)
+    return factorise((axes.T @ body.stiffness @ axes)[free][:, free], free)
 
 
 def _condense_distributing(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:

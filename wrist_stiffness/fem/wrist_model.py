@@ -2,7 +2,9 @@
 
 It shares meshes with the condensed parts and nothing else: no condensed matrix, no influence G.
 The unknowns are all inner nodes of all parts, the screws of the seven rigid frames and the slide
-and turn of each cylindrical joint, so the mechanism's statics come out of the equations.
+and turn of each cylindrical joint, so the mechanism's statics come out of the equations.  Where
+bushings slide (see `superelement.py`), the nodes of their sliding walls keep their two unknowns
+along the wall, and slides and turns have no equation of their own: nothing holds them.
 """
 
 from __future__ import annotations
@@ -14,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from wrist_stiffness.fem.elasticity import rigid_motion
+from wrist_stiffness.fem.elasticity import block_axes, cylindrical_axes, rigid_motion
 from wrist_stiffness.fem.factor import Factor, factorise
 from wrist_stiffness.fem.parts import ElasticBody, Part, Solid, assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
+from wrist_stiffness.fem.superelement import ALL_WAYS, RADIALLY
 from wrist_stiffness.mechanism.components import CARRIER, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -59,14 +62,18 @@ PLATFORM_FRAME = {
 SCREWS = 6 * len(FRAMES) + 2 * len(PASSIVE_JOINTS)
 """Unknowns besides the inner nodes: seven screws at O, then slide and turn of each joint."""
 
+DRIVEN = {"link_1_root": "joint_1", "link_2_root": "joint_5"}
+"""Frames whose slide along and turn about a motor's axis the motor holds if the bushings slide."""
+
 
 @dataclass(frozen=True)
 class WristBodies:
-    """The assembled bodies of a wrist at home, made once for all poses."""
+    """The assembled bodies of a wrist at home, made once for all poses; whether bushings slide."""
 
     geometry: Geometry
     parts: list[Part]
     bodies: dict[Solid, ElasticBody]
+    slides: bool
 
 
 @dataclass(frozen=True)
@@ -85,8 +92,11 @@ class PlacedBody:
         Places in F [m].
     stiffness : sparse.csr_matrix
         (3 n, 3 n) in F [N/m].
+    axes : sparse.csr_matrix
+        (3 n, 3 n) from the axes in which nodes are held or free to F: F itself, or radial,
+        tangential and axial ones of a sliding bushing.
     motor_wall, platform_wall : (k,) int
-        Unknowns of the nodes on the two walls.
+        Directions, in these axes, of nodes on the two walls that follow the frames.
     motor_screw, platform_screw : (6, SCREWS) float
         Screw of each wall as a combination of the frames' screws, slides and turns.
     """
@@ -96,6 +106,7 @@ class PlacedBody:
     turn: sparse.csr_matrix
     nodes: Array
     stiffness: sparse.csr_matrix
+    axes: sparse.csr_matrix
     motor_wall: NDArray[np.int64]
     platform_wall: NDArray[np.int64]
     motor_screw: Array
@@ -144,7 +155,7 @@ class WristAtPose:
         return self.factor.solve(self.openings.T.toarray())
 
 
-def build_wrist(geometry: Geometry, sizes: MeshSettings) -> WristBodies:
+def build_wrist(geometry: Geometry, sizes: MeshSettings, slides: bool = False) -> WristBodies:
     """Mesh and assemble all parts of a wrist.
 
     Parameters
@@ -153,6 +164,8 @@ def build_wrist(geometry: Geometry, sizes: MeshSettings) -> WristBodies:
         The wrist.
     sizes : MeshSettings
         Element sizes.
+    slides : bool
+        Whether bushings slide; all walls are rigid if not.
 
     Returns
     -------
@@ -161,7 +174,7 @@ def build_wrist(geometry: Geometry, sizes: MeshSettings) -> WristBodies:
     """
     parts = wrist_parts(geometry)
     bodies = {solid: assemble_body(solid, sizes) for solid in {part.solid for part in parts}}
-    return WristBodies(geometry, parts, bodies)
+    return WristBodies(geometry, parts, bodies, slides)
 
 
 def factor_pose(wrist: WristBodies, configuration: Configuration) -> WristAtPose:
@@ -190,8 +203,11 @@ def factor_pose(wrist: WristBodies, configuration: Configuration) -> WristAtPose
         follow.append(_follow(part, unknowns, start, inner))
         start += len(unknowns)
     stiffness = sum(t.T @ part.stiffness @ t for t, part in zip(follow, placed, strict=True))
-    openings, gaps = _gap_rows(wrist.geometry, placed, follow, inner)
-    factor = factorise(stiffness, np.arange(stiffness.shape[0]))
+    openings, gaps = _gap_rows(wrist, placed, follow, inner)
+    # What a motor holds, and what a sliding bushing leaves without an equation, has no stiffness.
+    stiff = np.flatnonzero(stiffness.diagonal())
+    inside = factorise(stiffness[stiff][:, stiff], stiff)
+    factor = Factor(stiff[inside.order], inside.lu)
     return WristAtPose(wrist, configuration, placed, follow, factor, openings, gaps)
 
 
@@ -203,10 +219,16 @@ def platform_weight(model: WristAtPose, gravity: Array) -> Array:
     return np.concatenate([force, np.cross(place, force)])
 
 
-def _frame_screw(frame: str) -> Array:
+def _frame_screw(wrist: WristBodies, frame: str) -> Array:
     screw = np.zeros((6, SCREWS))
     start = 6 * FRAMES.index(frame)
-    screw[:, start : start + 6] = np.eye(6)
+    if wrist.slides and frame in DRIVEN:
+        axis = wrist.geometry.axes[DRIVEN[frame]]
+        # Two directions across the axis; along it the motor holds its shaft.
+        across = np.linalg.svd(axis[None])[2][1:].T
+        screw[:3, start + 1 : start + 3] = screw[3:, start + 4 : start + 6] = across
+    else:
+        screw[:, start : start + 6] = np.eye(6)
     return screw
 
 
@@ -214,19 +236,26 @@ def _place(wrist: WristBodies, part: Part, configuration: Configuration) -> Plac
     body = wrist.bodies[part.solid]
     at = part.home.turned(configuration.rotations[CARRIER[part.name]])
     count = len(body.mesh.nodes)
-    turn = sparse.csr_matrix(sparse.kron(sparse.eye(count), at.rotation))
+    turn = block_axes(np.broadcast_to(at.rotation, (count, 3, 3)))
+    slides = wrist.slides and body.solid.is_bushing
+    axes = sparse.csr_matrix(sparse.eye(3 * count))
+    if slides:
+        axes = turn @ cylindrical_axes(body.mesh.nodes)
     motor_screw = platform_screw = np.zeros((6, SCREWS))
     if part.name in MOTOR_FRAME:
-        motor_screw = _frame_screw(MOTOR_FRAME[part.name])
-    platform_screw = _frame_screw(PLATFORM_FRAME[part.name])
-    if part.name in PASSIVE_JOINTS:
+        motor_screw = _frame_screw(wrist, MOTOR_FRAME[part.name])
+    platform_screw = _frame_screw(wrist, PLATFORM_FRAME[part.name])
+    if part.name in PASSIVE_JOINTS and not slides:
         column = 6 * len(FRAMES) + 2 * PASSIVE_JOINTS.index(part.name)
         axis = _joint_axis(configuration, part.name)
         platform_screw[:3, column] = -axis
         platform_screw[3:, column + 1] = -axis
     walls = [
-        (3 * body.mesh.surface_nodes(wall)[:, None] + np.arange(3)).ravel().astype(np.int64)
-        for wall in (part.solid.motor_wall, part.solid.platform_wall)
+        (3 * body.mesh.surface_nodes(wall)[:, None] + np.array(ways)).ravel().astype(np.int64)
+        for wall, ways in (
+            (part.solid.motor_wall, ALL_WAYS),
+            (part.solid.platform_wall, RADIALLY if slides else ALL_WAYS),
+        )
     ]
     return PlacedBody(
         name=part.name,
@@ -234,6 +263,7 @@ def _place(wrist: WristBodies, part: Part, configuration: Configuration) -> Plac
         turn=turn,
         nodes=body.mesh.nodes @ at.rotation.T + at.origin,
         stiffness=turn @ body.stiffness @ turn.T,
+        axes=axes,
         motor_wall=walls[0],
         platform_wall=walls[1],
         motor_screw=motor_screw,
@@ -248,18 +278,18 @@ def _joint_axis(configuration: Configuration, joint: str) -> Array:
 
 def _follow(part: PlacedBody, free: NDArray[np.int64], start: int, inner: int) -> sparse.csr_matrix:
     size = part.stiffness.shape[0]
-    motion = rigid_motion(part.nodes)
+    motion = part.axes.T @ rigid_motion(part.nodes)
     by_screws = np.zeros((size, SCREWS))
     by_screws[part.motor_wall] = motion[part.motor_wall] @ part.motor_screw
     by_screws[part.platform_wall] = motion[part.platform_wall] @ part.platform_screw
     own = sparse.csr_matrix(
         (np.ones(len(free)), (free, start + np.arange(len(free)))), shape=(size, inner)
     )
-    return sparse.csr_matrix(sparse.hstack([own, sparse.csr_matrix(by_screws)]))
+    return part.axes @ sparse.csr_matrix(sparse.hstack([own, sparse.csr_matrix(by_screws)]))
 
 
 def _gap_rows(
-    geometry: Geometry, placed: list[PlacedBody], follow: list[sparse.csr_matrix], inner: int
+    wrist: WristBodies, placed: list[PlacedBody], follow: list[sparse.csr_matrix], inner: int
 ) -> tuple[sparse.csr_matrix, Array]:
     """Return the opening of every flange gap by the unknowns, and the gaps themselves."""
     rows, gaps = [sparse.csr_matrix((0, inner + SCREWS))], []
@@ -272,11 +302,11 @@ def _gap_rows(
         by_hub = sparse.hstack(
             [
                 sparse.csr_matrix((len(sectors), inner)),
-                sparse.csr_matrix(on_hub.T @ _frame_screw(HUB[part.name])),
+                sparse.csr_matrix(on_hub.T @ _frame_screw(wrist, HUB[part.name])),
             ]
         )
         rows.append(sparse.csr_matrix(by_hub + sparse.csr_matrix(pressure.T) @ t))
-        bushing = geometry.bushings[part.name]
+        bushing = wrist.geometry.bushings[part.name]
         of_flange = dict(zip(FLANGES, (bushing.inner_gap, bushing.outer_gap), strict=True))
         gaps += [of_flange[sector.rsplit("_", 1)[0]] for sector in sectors]
     return sparse.csr_matrix(sparse.vstack(rows)), np.array(gaps, dtype=float)

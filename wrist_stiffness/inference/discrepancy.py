@@ -22,6 +22,14 @@ DRIFT_S = (20.0, 200.0)
 DRIFT_RANK = 12
 """Columns of the drift of one component in one session."""
 
+PASSING = 0.3
+"""What an instrument drifts within seconds, as a share of what it drifts slowly (assumed)."""
+
+WIDER = 4
+"""So many times the columns of a kernel are found before the largest of them are kept."""
+
+SLOW_DRIFT = "slow drift of the instrument"
+
 LEAST = 1e-3
 """Share of a kernel's trace that its columns may leave out."""
 
@@ -38,18 +46,24 @@ class Question:
         Conditions by name -> (u, u) float, or None where nothing of it was recorded.
     rank : int
         Most columns of it.
+    conditions : tuple of str
+        Names of those that the kernel looks at.
     """
 
     name: str
     kernel: Callable[[Mapping[str, Array]], Array | None]
     rank: int
+    conditions: tuple[str, ...] = ()
 
     def features(self, conditions: Mapping[str, Array]) -> Array | None:
         """Return columns (u, k) of mean square 1 together; None where there is nothing to ask."""
         kernel = self.kernel(conditions)
         if kernel is None or np.trace(kernel) <= 1e-9 * len(kernel):
             return None
-        return low_rank(kernel * len(kernel) / np.trace(kernel), self.rank)
+        columns = low_rank(kernel * len(kernel) / np.trace(kernel), WIDER * self.rank)
+        # Of these the directions that hold most of the kernel.
+        left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(left[:, : self.rank] * sizes[: self.rank])
 
 
 class Asked(Protocol):
@@ -123,6 +137,7 @@ def background(
     drift: Array | None,
     noise_width: float,
     wander: Array | None = None,
+    drifts: Sequence[Asked] = (),
 ) -> Background:
     """Put together what has no name.
 
@@ -142,6 +157,8 @@ def background(
         See `Background`.
     wander : (u, k) float, optional
         Columns of that drift; by default those of `drift_features`.
+    drifts : sequence of Question, optional
+        Other ways in which the instrument may drift, within seconds.
     """
     groups: list[Group] = []
 
@@ -153,11 +170,15 @@ def background(
                 spread[:, component, :, number] = features * size[component]
             columns = whiten(spread.reshape(*table.values.shape, -1))
             if np.any(columns):
-                groups.append(Group(name, quantity.name, columns, expected))
+                own = np.zeros(table.n_components)
+                own[at] = size[at]
+                groups.append(
+                    Group(name, quantity.name, columns, expected, features=features, size=own)
+                )
 
     if drift is not None and table.time_s is not None:
         add(
-            "slow drift of the instrument",
+            SLOW_DRIFT,
             drift_features(table) if wander is None else wander,
             drift,
             1.0,
@@ -166,4 +187,9 @@ def background(
         features = question.features(table.covariates)
         if features is not None:
             add(question.name, features, scatter, 0.0)
+    if drift is not None:
+        for question in drifts:
+            features = question.features(table.covariates)
+            if features is not None:
+                add(question.name, features, PASSING * drift, 1.0)
     return Background(tuple(groups), noise_width)

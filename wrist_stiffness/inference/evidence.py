@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotri, dtrtri
 from scipy.special import gammaln
 
 Array = NDArray[np.float64]
@@ -71,6 +71,10 @@ class Group:
         absent.
     width : float
         Standard deviation of the logarithm of the amplitude about the expected one.
+    features : (u, k / c) float, optional
+        The same of each unit, before it changed the c components of the quantity.
+    size : (m,) float, optional
+        What that is of each component; 0 for those of other quantities.
     """
 
     name: str
@@ -78,6 +82,15 @@ class Group:
     columns: Array
     expected: float = 0.0
     width: float = 1.0
+    features: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    size: Array = field(default_factory=lambda: np.zeros(0))
+
+    def change(self, values: Array) -> Array:
+        """Return what values (k,) of the columns change, (u, m)."""
+        at = np.flatnonzero(self.size)
+        out = np.zeros((len(self.features), len(self.size)))
+        out[:, at] = self.features @ values.reshape(-1, len(at)) * self.size[at]
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +103,13 @@ class Background:
         None where nothing but the noise is without a name.
     noise_width : float
         Standard deviation of the logarithm of the noise's variance about the known one.
+    asked : int
+        Groups of the discrepancy that might have been there; 0 for those that are listed.
     """
 
     groups: tuple[Group, ...]
     noise_width: float
+    asked: int = 0
 
     @cached_property
     def columns(self) -> Array:
@@ -118,7 +134,7 @@ class Background:
     @cached_property
     def log_odds(self) -> float:
         """Log prior odds of one group of the discrepancy to be there."""
-        chance = OUTSIDE / max(int(np.count_nonzero(self.optional)), 1)
+        chance = OUTSIDE / (self.asked or max(int(np.count_nonzero(self.optional)), 1))
         return float(np.log(chance / (1.0 - chance)))
 
     @cached_property
@@ -151,6 +167,8 @@ class Point:
         What each effect would add if its size changed with the conditions by its own size.
     linear : bool
         Whether the slopes hold everywhere: then the unknowns follow the amplitudes.
+    numbers : int
+        Numbers that were measured, where the rows only sum them up; 0 where each is a row.
     """
 
     left: Array
@@ -161,7 +179,13 @@ class Point:
     inexact: Array
     varied: Mapping[str, Array] = field(default_factory=dict)
     linear: bool = False
+    numbers: int = 0
     _beside: dict[int, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+
+    @property
+    def count(self) -> int:
+        """How many numbers were measured, N."""
+        return self.numbers or len(self.left)
 
     def moved(self, step: Array) -> Point:
         """Return the point a step (p,) further on, as the slopes tell."""
@@ -264,15 +288,58 @@ class Evidence:
         """Natural logarithm of the evidence, up to what all sets of a table share."""
         factor, scale, step, slope = self._solved
         precision, offset, correction = self._priors
-        n, ground = len(self.point.left), self.background
+        n, ground = self.point.count, self.background
         cost = self._known[3] / self.excess + float(precision @ offset**2 + slope @ step)
         volume = 2.0 * float(np.sum(np.log(np.diag(factor))) - np.sum(np.log(scale)))
         log = -0.5 * (n * np.log(self.excess) + cost + volume - np.sum(np.log(self.precision)))
         log += correction + _log_excess(np.array([self.excess]), ground.noise_width)[0]
         for size, group, count in zip(self.amplitude, ground.groups, ground.sizes, strict=True):
-            log += _log_amplitude(float(size), group, int(count))
+            log += log_amplitude(float(size), group, int(count))
         log += ground.log_odds * np.count_nonzero(ground.optional & (self.amplitude > OFF))
         return float(log)
+
+    def cost(self, point: Point) -> float:
+        """Return minus twice the log posterior of a point, up to what all points share.
+
+        What has no name is integrated, at the amplitudes and with the law errors of this set.
+
+        Parameters
+        ----------
+        point : Point
+            Like this one's, anywhere.
+        """
+        p = len(self.point.z)
+        beside = self._known[0][:, p:]
+        information = beside.T @ beside / self.excess + np.diag(self.precision[p:])
+        target = beside.T @ point.left / self.excess
+        cost = float(point.left @ point.left) / self.excess
+        cost += float(np.sum((point.weight * point.z) ** 2))
+        cost -= float(target @ np.linalg.solve(information, target))
+        for places in point.effects.values():
+            square = float(np.sum(point.z[places] ** 2))
+            cost -= float(np.sum((point.weight[places] * point.z[places]) ** 2))
+            cost -= 2.0 * log_size_prior(square, len(places))
+        return cost
+
+    @cached_property
+    def covariance_of_fit(self) -> Array:
+        """Covariance (p, p) of unknowns that were fitted beside noise and drift as they are known.
+
+        What is known of them once all amplitudes are found, a discrepancy included (White 1980).
+        """
+        p, known = len(self.point.z), known_noise(self.point, self.background)
+        columns = self._known[0]
+        named, beside = columns[:, :p], columns[:, p:]
+        # Columns by the inverse of the known covariance (Woodbury).
+        own = known._known[0][:, p:]
+        inner = own.T @ own + np.diag(known.precision[p:])
+        weighted = named - own @ np.linalg.solve(inner, own.T @ named)
+        prior = np.diag(self.precision[:p])
+        bread = np.linalg.inv(named.T @ weighted + prior)
+        mixed = weighted.T @ beside
+        filling = self.excess * weighted.T @ weighted + prior
+        filling += (mixed / self.precision[p:]) @ mixed.T
+        return np.asarray(bread @ filling @ bread)
 
     @property
     def step(self) -> Array:
@@ -293,6 +360,15 @@ class Evidence:
         lower, _ = dpotri(factor, lower=1)
         whole = np.tril(lower) + np.tril(lower, -1).T
         return np.asarray(whole * scale[:, None] * scale)
+
+    @cached_property
+    def variances(self) -> Array:
+        """Diagonal of that covariance, in half the time."""
+        factor, scale, _, _ = self._solved
+        if not len(scale):
+            return np.zeros(0)
+        inverse, _ = dtrtri(factor, lower=1)
+        return np.asarray(np.sum(np.tril(inverse) ** 2, axis=0) * scale**2)
 
     @cached_property
     def square(self) -> float:
@@ -333,7 +409,7 @@ class Evidence:
                 found.append(np.log(size / group.expected) > SURPRISE * group.width)
             else:
                 found.append(size > OFF)
-        return np.array(found)
+        return np.array(found, dtype=bool)
 
     @cached_property
     def unexplained(self) -> float:
@@ -346,7 +422,7 @@ class Evidence:
         on = self.discrepant[ground.group]
         b = np.where(on, self.unnamed, 0.0)
         smooth = max(float(b @ self._beyond @ b), 0.0) if on.any() else 0.0
-        return smooth + self._misfit * len(self.point.left)
+        return smooth + self.misfit * self.point.count
 
     def left_of(self, quantity: str, count: int) -> float:
         """Return the variance of a quantity that is not explained, in units of its known noise.
@@ -361,11 +437,11 @@ class Evidence:
         own = [each.quantity == quantity for each in self.background.groups]
         parts = self.energies * self.discrepant
         share = float(parts[own].sum() / parts.sum()) if parts.any() else 0.0
-        smooth = self.unexplained - self._misfit * len(self.point.left)
-        return smooth * share / count + self._misfit
+        smooth = self.unexplained - self.misfit * self.point.count
+        return smooth * share / count + self.misfit
 
     @property
-    def _misfit(self) -> float:
+    def misfit(self) -> float:
         """Excess of the scatter that no wrongly known noise explains."""
         known = 3.0 * self.background.noise_width
         return self.excess - 1.0 if np.log(self.excess) > known else 0.0
@@ -392,9 +468,12 @@ class Evidence:
 
     def without_discrepancy(self) -> Evidence:
         """Return the set as if all that it leaves were noise."""
-        amplitude = np.where(self.background.optional, OFF, self.amplitude)
+        usual = np.array([each.expected or OFF for each in self.background.groups])
+        amplitude = np.where(self.discrepant | self.background.optional, usual, self.amplitude)
         left = self.point.left
-        return replace(self, amplitude=amplitude, excess=max(1.0, float(left @ left) / len(left)))
+        return replace(
+            self, amplitude=amplitude, excess=max(1.0, float(left @ left) / self.point.count)
+        )
 
     def strength(self, columns: Array) -> float:
         """Return how many standard deviations unknowns of typical size leave beyond the rest.
@@ -440,6 +519,38 @@ class Evidence:
             found.append(_gain(information, slope[first:end]))
         return found
 
+    def scores(
+        self, mixed: Array, target: Array, blocks: Sequence[Array]
+    ) -> list[tuple[Array, Array]]:
+        """Return information (k, k) and slope (k,) of blocks of further columns, where they are 0.
+
+        Parameters
+        ----------
+        mixed : (K, q) float
+            Products of all columns of the set with the q further ones.
+        target : (q,) float
+            Products of these with what the fit left.
+        blocks : sequence of (k, k) arrays
+            Products of the columns of each block, q in all.
+        """
+        factor, scale, step, _ = self._solved
+        beside = solve_triangular(factor, scale[:, None] * mixed, lower=True, check_finite=False)
+        slope = -(target + mixed.T @ step) / self.excess
+        ends = np.cumsum([len(each) for each in blocks])
+        return [
+            (
+                (
+                    own
+                    - beside[:, end - len(own) : end].T
+                    @ beside[:, end - len(own) : end]
+                    / self.excess
+                )
+                / self.excess,
+                slope[end - len(own) : end],
+            )
+            for own, end in zip(blocks, ends, strict=True)
+        ]
+
 
 def _gain(information: Array, slope: Array) -> tuple[float, Array]:
     """Return the gain of an effect and its unknowns: Laplace's method at the better of two modes.
@@ -460,7 +571,16 @@ def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array
     return fits + prior - 0.5 * float(np.linalg.slogdet(whole)[1]), np.asarray(z)
 
 
-def evidence(point: Point, background: Background, near: Evidence | None = None) -> Evidence:
+def known_noise(point: Point, background: Background) -> Evidence:
+    """Return a fitted set beside noise and drift as they are known, and nothing else."""
+    usual = np.array([each.expected or OFF for each in background.groups], dtype=float)
+    exact = replace(point, inexact=OFF * point.inexact, _beside={})
+    return Evidence(exact, background, usual, 1.0)
+
+
+def evidence(
+    point: Point, background: Background, near: Evidence | None = None, drop: bool = True
+) -> Evidence:
     """Return a fitted set at the amplitudes of its largest evidence.
 
     Parameters
@@ -471,6 +591,8 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
         Of the table.
     near : Evidence, optional
         Of a set like it: where the search for the amplitudes begins.
+    drop : bool
+        Whether groups of the discrepancy that do not pay are left out.
     """
     if near is None:
         amplitude = np.array([each.expected or 1.0 for each in background.groups], dtype=float)
@@ -484,7 +606,8 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
         best = trial if gained > 0.0 else best
         if gained < ENOUGH:
             break
-    for number in np.flatnonzero(background.optional & (best.amplitude > OFF)):
+    there = background.optional & (best.amplitude > OFF)
+    for number in np.flatnonzero(there) if drop else ():
         amplitude = best.amplitude.copy()
         amplitude[number] = OFF
         absent = replace(best, amplitude=amplitude)
@@ -497,16 +620,15 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
 def _improved(at: Evidence) -> Evidence:
     """Return fixed points of the evidence's slope, one step on (MacKay 1992)."""
     ground = at.background
-    covariance, names = at.covariance, len(at.covariance) - len(ground.group)
-    b = at.unnamed
-    second = b**2 + np.diag(covariance)[names:]
+    second = at.unnamed**2 + at.variances[len(at.variances) - len(ground.group) :]
     squares = np.bincount(ground.group, second, minlength=len(ground.groups))
     amplitude = [
         _amplitude(float(square), int(count), group)
         for square, count, group in zip(squares, ground.sizes, ground.groups, strict=True)
     ]
-    trace = float(np.sum(at._known[1] * covariance))
-    excess = _excess(at.square + trace, len(at.point.left), ground.noise_width)
+    # Of the products times the covariance, the inverse of products over excess plus precision.
+    trace = at.excess * float(np.sum(1.0 - at.precision * at.variances))
+    excess = _excess(at.square + trace, at.point.count, ground.noise_width)
     return replace(at, amplitude=np.array(amplitude), excess=excess)
 
 
@@ -522,7 +644,7 @@ def _amplitude(square: float, count: int, group: Group) -> float:
     return max(size, OFF)
 
 
-def _log_amplitude(size: float, group: Group, count: int) -> float:
+def log_amplitude(size: float, group: Group, count: int) -> float:
     """Return the log prior of an amplitude, with the width at which the data know it."""
     if group.expected:
         return -0.5 * float(np.log(size / group.expected) / group.width) ** 2

@@ -23,15 +23,18 @@ NEGLIGIBLE = 3.0
 """Log odds against a set, beside the best one so far, below which it is not fitted: 1 in 20."""
 
 CLOSE = 0.6
-"""Share of the leader's gain to first order below which, once the leader leaves nothing, a
-candidate is not fitted: nothing that leaves more than noise comes near."""
+"""Share of the leader's gain to first order below which a candidate whose slopes show what it does
+is not fitted; and none at all once the leader leaves no more than noise."""
 
 FALLS = 0.8
 """Share of what was left before that an effect may leave if the search is to go on beside it: what
 explains less than a fifth stands in for something that nobody named."""
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 3
 """Effects of a set: more are hardly told apart in one recording."""
+
+MOST_FITS = 48
+"""Whole fits of a search; most end after a dozen."""
 
 Names = frozenset[str]
 
@@ -166,11 +169,12 @@ class Search:
         falls: float = FALLS,
     ) -> None:
         self._problem, self._tell, self._most = problem, tell, most_effects
-        self._falls = falls
+        self._falls, self._costly = falls, falls < np.inf
         self._end = time.monotonic() + seconds
         self.states: dict[Names, State] = {}
         self.first_order: dict[str, Ranked] = {}
         self.in_time = True
+        self._fits = 0
         self._catalogue = 0
         tell("fitting the nominal model with its tolerances")
         self.base = self._known(problem.begin(), None)
@@ -210,7 +214,7 @@ class Search:
                 break
             fell = best.evidence.unexplained < self._falls * state.evidence.unexplained
             state = best
-            if self._falls < np.inf and not (fell and best.rough):
+            if self._costly and not (fell and best.rough):
                 break
         return self.best
 
@@ -219,8 +223,8 @@ class Search:
         self._tell(f"asking every candidate{_beside(state.names)}")
         trials = [each for each in self._problem.trials(state.fit) if each.name not in not_again]
         self._catalogue = max(self._catalogue, len(trials) + len(state.names))
-        as_noise = _ranked(state.evidence.without_discrepancy(), trials)
-        beyond = _ranked(state.evidence, trials)
+        as_noise = ranked(state.evidence.without_discrepancy(), trials)
+        beyond = ranked(state.evidence, trials)
         if not state.names:
             for each in (*as_noise, *beyond):
                 known = self.first_order.get(each.trial.name)
@@ -230,10 +234,12 @@ class Search:
         found: list[State] = []
         settled = False
         for each in chosen:
-            if time.monotonic() > self._end:
+            if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
                 self.in_time = False
                 break
-            if settled and each.gain < CLOSE * chosen[0].gain:
+            self._fits += 1
+            far_behind = each.gain < CLOSE * chosen[0].gain
+            if far_behind and (settled or (each.trial.smooth and self._costly)):
                 continue
             self._tell(f"fitting {each.trial.name}{_beside(state.names)}")
             fit = self._problem.added(state.fit, each)
@@ -290,7 +296,7 @@ def _beside(names: Collection[str]) -> str:
     return f" beside {', '.join(sorted(names))}" if names else ""
 
 
-def _ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
+def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     """Return what each trial gains at its best shape, largest first."""
     flat = [(each, shape, columns) for each in trials for shape, columns in each.blocks]
     best: dict[str, Ranked] = {}

@@ -8,7 +8,7 @@ counts would both drown what a load does and make the mean look too good.
 import numpy as np
 from scipy.sparse import csr_array
 
-from wrist_stiffness.inference.observations import Array, Observations
+from wrist_stiffness.inference.observations import Array, Mask, Observations
 
 
 def own_covariance(observations: Observations, covariance: Array) -> Array:
@@ -72,3 +72,32 @@ class Apart:
             flat = white.reshape(len(white) * white.shape[1], white.shape[2])
             flat -= self._directions @ (self._shrink * (self._directions.T @ flat))
         return white
+
+
+def stated_covariance(observations: Observations) -> Array:
+    """Return the covariance that a table states of each unit, (n, m, m); zero where none."""
+    n, m = observations.values.shape
+    if observations.covariance is None:
+        return np.zeros((n, m, m))
+    return np.broadcast_to(observations.covariance, (n, m, m))
+
+
+def component_factors(covariance: Array, measured: Mask) -> Array:
+    """Inverse Cholesky factors of each unit's covariance over its measured components.
+
+    Parameters
+    ----------
+    covariance : (n, m, m) array
+        Covariance of each unit.
+    measured : (n, m) array of bool
+        Unmeasured components get a unit diagonal and no coupling.
+
+    Returns
+    -------
+    (n, m, m) array
+        L^-1 with L L^T = covariance.
+    """
+    m = covariance.shape[1]
+    both = measured[:, :, None] & measured[:, None, :]
+    safe = np.where(both, covariance, np.eye(m))
+    return np.linalg.inv(np.linalg.cholesky(safe)).astype(np.float64)

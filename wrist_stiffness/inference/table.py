@@ -16,9 +16,13 @@ from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.outliers import lost_units
 from wrist_stiffness.inference.projection import orthonormal
 from wrist_stiffness.inference.settings import FEWEST_UNITS, OUTLIER_LIMIT
-from wrist_stiffness.inference.shared import Apart, own_covariance
+from wrist_stiffness.inference.shared import (
+    Apart,
+    component_factors,
+    own_covariance,
+    stated_covariance,
+)
 from wrist_stiffness.inference.smooth import alike, questions, wander
-from wrist_stiffness.inference.whitening import component_factors, stated_covariance
 
 STATED, ESTIMATED = 0.2, 0.7
 """Standard deviation of the logarithm of the noise's variance where the table states it, and where

@@ -39,7 +39,7 @@ class TableHeader:
     geometry : dict
         The values of the geometry file.
     interface : str
-        Interface model of the condensation: `rigid` or `distributing`.
+        Interface model of the condensation: `rigid`, `distributing` or `sliding`.
     evaluation : str
         `closed_form` or `spline`: what the nodes use.
     kernel : str

@@ -1,31 +1,97 @@
-"""How well a table's splines interpolate, at poses that they never saw."""
+"""How well a table's splines interpolate, at poses and loads that they never saw."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
 
-UNSEEN_POSES = 400
+UNSEEN_POSES = 2000
 UNSEEN_SEED = 20150226
 
+STATED = 0.99
+"""Share of the unseen poses and loads whose error a table's stated one covers; what is left are
+creases, where a flange lifts off between two nodes."""
 
-def unseen_poses(workspace: Workspace) -> Array:
-    """Return `UNSEEN_POSES` random poses in the map domain that no grid contains, (n, 2) [rad]."""
-    rng = np.random.default_rng(UNSEEN_SEED)
+COVERED = 0.95
+"""Share of fresh ones that it must cover."""
+
+HALVES = {"s": slice(0, 3), "phi": slice(3, 6)}
+
+
+def unseen_poses(workspace: Workspace, rng: np.random.Generator | None = None) -> Array:
+    """Return `UNSEEN_POSES` random poses in the map domain that no grid contains, (n, 2) [rad].
+
+    The same ones unless a generator is given.
+    """
+    rng = rng or np.random.default_rng(UNSEEN_SEED)
     lower, upper = workspace.rectangle
-    poses = rng.uniform(lower, upper, (4 * UNSEEN_POSES, 2))
+    poses = rng.uniform(lower, upper, (8 * UNSEEN_POSES, 2))
     return poses[workspace.domain(poses)][:UNSEEN_POSES]
 
 
+def random_loads(limits: Limits, count: int, rng: np.random.Generator) -> Array:
+    """Return loads of any direction and of any size within a table's range, (n, 6) [N, N m]."""
+    loads = rng.normal(size=(count, 6))
+    for half, most in zip(HALVES.values(), (limits.force, limits.moment), strict=True):
+        size = np.linalg.norm(loads[:, half], axis=1, keepdims=True)
+        loads[:, half] *= rng.uniform(0.0, most, (count, 1)) / size
+    return loads
+
+
+def relative_misses(twist: Array, exact: Array) -> Array:
+    """Return the lengths of the errors of s and phi over those of s and phi, (n, 2)."""
+    return np.column_stack(
+        [
+            np.linalg.norm((twist - exact)[:, half], axis=1)
+            / np.linalg.norm(exact[:, half], axis=1)
+            for half in HALVES.values()
+        ]
+    )
+
+
+def spline_misses(
+    table: Table, rng: np.random.Generator | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Compare splines and closed form at random poses under own weight and random loads.
+
+    Parameters
+    ----------
+    table : Table
+        With its grid.
+    rng : Generator, optional
+        Draws them; the same ones every time if None.
+
+    Returns
+    -------
+    (n, 2) float
+        Errors of s and phi as vectors, relative to their lengths.
+    (n,) bool
+        Whether the pose is in the operative workspace.
+    """
+    poses = unseen_poses(table.workspace, rng)
+    loads = random_loads(
+        table.geometry.limits, len(poses), rng or np.random.default_rng(UNSEEN_SEED)
+    )
+    configuration = table.mechanism.forward(poses)
+    exact, splined = (
+        respond(table.operators_at(configuration, way), loads).twist
+        for way in ("closed_form", "spline")
+    )
+    return relative_misses(splined, exact), table.workspace.operative(poses)
+
+
 def interpolation_errors(table: Table) -> dict[str, Any]:
-    """Compare the table's splines with the closed form at poses they never saw.
+    """State how well the table's splines follow the closed form at poses that they never saw.
 
     Parameters
     ----------
@@ -35,39 +101,36 @@ def interpolation_errors(table: Table) -> dict[str, Any]:
     Returns
     -------
     dict
-        Largest error relative to the local value, by region and quantity: `predicted` through the
-        spline of the operators with contact solved, `map` through the spline of s and phi itself
-        (the paper's way), and the leave-one-out error of the map.
+        By region and quantity, relative to the local value: `predicted` covers all but one in a
+        hundred of the errors, as vectors, of the splines of the operators with contact solved under
+        random loads; `map` is the largest one of the splines of the rated load's s and phi
+        themselves (the paper's way), `leave_one_out` their leave-one-out error.
     """
     workspace = table.workspace
+    misses, operative = spline_misses(table)
     poses = unseen_poses(workspace)
     configuration = table.mechanism.forward(poses)
     # Columns 3 and 4 of the map are |s| and phi.
-    exact = rated_map(
-        configuration, table.operators_at(configuration, "closed_form"), table.geometry
-    )[:, 3:]
-    predicted = rated_map(
-        configuration, table.operators_at(configuration, "spline"), table.geometry
-    )[:, 3:]
     load_only = rated_map(
         configuration,
         contact_operators(configuration, table.components, np.zeros(3)),
         table.geometry,
     )[:, 3:]
-    mapped = table.map_spline(poses)[:, 3:]
-    operative = workspace.operative(poses)
+    mapped = np.abs(table.map_spline(poses)[:, 3:] - load_only) / load_only
     leave_one_out = np.abs(table.map_spline.leave_one_out()[:, 3:]) / table.map_values[:, 3:]
     inside = workspace.operative(table.nodes)
     return {
         "unseen_poses": len(poses),
-        "predicted": _by_region(np.abs(predicted - exact) / exact, operative),
-        "map": _by_region(np.abs(mapped - load_only) / load_only, operative),
-        "leave_one_out": _by_region(leave_one_out, inside),
+        "predicted": _by_region(misses, operative, STATED),
+        "map": _by_region(mapped, operative, 1.0),
+        "leave_one_out": _by_region(leave_one_out, inside, 1.0),
     }
 
 
-def _by_region(relative: Array, operative: np.ndarray) -> dict[str, dict[str, float]]:
+def _by_region(
+    relative: Array, operative: NDArray[np.bool_], share: float
+) -> dict[str, dict[str, float]]:
     return {
-        region: {name: float(np.max(rows[:, i])) for i, name in enumerate(("s", "phi"))}
+        region: {name: float(np.quantile(rows[:, i], share)) for i, name in enumerate(HALVES)}
         for region, rows in (("operative", relative[operative]), ("domain", relative))
     }

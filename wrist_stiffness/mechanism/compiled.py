@@ -8,7 +8,6 @@ same code in a loop, so live nodes and replay agree to the bit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -16,14 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, Array, ElasticComponents
-from wrist_stiffness.mechanism.cones import GRAM_ROUNDING
-from wrist_stiffness.mechanism.configuration import BODIES, Configuration
+from wrist_stiffness.mechanism.compiled_constants import parts_constants
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contact import NOT_DEFINITE
-from wrist_stiffness.mechanism.geometry import Limits
-from wrist_stiffness.mechanism.influence import LIMB_1, LIMB_2
-from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.vectors import skew
 
 
 def _native() -> Any:
@@ -38,92 +33,8 @@ native: Any = _native()
 
 Flags = NDArray[np.bool_]
 
-GROUPS = tuple(
-    tuple(name for name in limb if CARRIER[name] == body)
-    for limb, body in (
-        (LIMB_1, "frame"),
-        (LIMB_1, "link_1"),
-        (LIMB_2, "frame"),
-        (LIMB_2, "link_2"),
-        (LIMB_2, "link_3"),
-    )
-)
-"""Elastic components that lie in one limb and turn with one body."""
 
-
-def mechanism_constants(
-    mechanism: Mechanism, rectangle: tuple[Array, Array], limits: Limits
-) -> Array:
-    """Return what `native` must know of a kinematic scheme and its domain."""
-    turn = np.zeros((24, 5))
-    driven = np.stack([mechanism.b0, mechanism.d0])
-    axes = np.stack([mechanism.a1, mechanism.a2])
-    for i in range(2):
-        along = np.outer(axes[i], axes[i])
-        parts = np.stack([along, np.eye(3) - along, skew(axes[i])], axis=-1)
-        columns = [0, 1 + 2 * i, 2 + 2 * i]
-        turn[9 * i : 9 * i + 9, columns] = np.swapaxes(parts, 0, 1).reshape(9, 3)
-        turn[18 + 3 * i : 21 + 3 * i, columns] = np.swapaxes(parts, 1, 2) @ driven[i]
-    homes = [np.stack([each, mechanism.c0, np.cross(each, mechanism.c0)]) for each in driven]
-    return np.concatenate(
-        [
-            turn.ravel(),
-            np.linalg.inv(homes).ravel(),
-            axes.ravel(),
-            [mechanism.b0 @ mechanism.c0, mechanism.c0 @ mechanism.d0],
-            [mechanism.assembly_mode, GRAM_ROUNDING],
-            np.transpose(rectangle).ravel(),
-            [limits.singularity, limits.force, limits.moment],
-        ]
-    )
-
-
-def parts_constants(
-    components: ElasticComponents,
-    gravity: Array,
-    screws: Array | None,
-    opening: Array | None,
-    load_scale: float,
-    load_added: Array | None,
-) -> Array:
-    """Return what `native` must know of the elastic parts and of what is constant."""
-    sectors = components.sectors
-    m, bodies = len(sectors.gap), len(BODIES)
-    flexibility, weight_screw = np.zeros((len(GROUPS), 6, 6)), np.zeros((len(GROUPS), 6, 3))
-    group_of, weight_gap = np.zeros((m, 1)), np.zeros((m, 3))
-    weight = np.zeros((bodies, 6, 3))
-    for group, names in enumerate(GROUPS):
-        carried = np.zeros((6, 3))
-        for name in reversed(names):
-            k = ELASTIC.index(name)
-            own = sectors.component == k
-            here = carried + components.weight_platform_side[k]
-            flexibility[group] += components.flexibility[k]
-            weight_screw[group] += components.flexibility[k] @ here
-            group_of[own] = group
-            weight_gap[own] = sectors.weight_approach[own] + sectors.screw[own] @ here
-            carried = here + components.weight_motor_side[k]
-        weight[BODIES.index(CARRIER[names[0]])] = carried
-    weight[BODIES.index("platform")] = components.platform_weight
-    gap = sectors.gap if opening is None else sectors.gap + opening
-    rows = [group_of, sectors.slide, sectors.screw, weight_gap, gap[:, None]]
-    return np.concatenate(
-        [
-            gravity,
-            [load_scale],
-            np.zeros(6) if load_added is None else load_added,
-            flexibility.ravel(),
-            weight_screw.ravel(),
-            np.zeros(6 * len(GROUPS)) if screws is None else screws.ravel(),
-            weight.ravel(),
-            np.hstack(rows).ravel(),
-            sectors.approach.ravel(),
-        ]
-    )
-
-
-@dataclass(frozen=True)
-class PredictedRows:
+class PredictedRows(NamedTuple):
     """What a wrist does at n samples.
 
     Parameters
@@ -153,7 +64,7 @@ class CompiledCommands(NamedTuple):
     """Commands with the loads to correct for.
 
     Stamps (n,) [ns], angles (n, 2) [rad], loads at O (n, 6) [N, N m], which of these are in U (n,),
-    and which commands shall be corrected (n,).
+    which commands shall be corrected (n,), and how much of each correction is applied (n,) [-].
     """
 
     stamp_ns: NDArray[np.int64]
@@ -161,41 +72,55 @@ class CompiledCommands(NamedTuple):
     load: Array
     on_platform: Flags
     wanted: Flags
+    share: Array
+
+
+class CorrectorState(NamedTuple):
+    """What is kept from command to command.
+
+    The correction found before (2,) [rad], a first guess of the contact state (m,), the correction
+    applied before (2,) [rad] and its stamp (1,) [ns].
+    """
+
+    held: Array
+    closed: Flags
+    applied: Array
+    stamp_ns: NDArray[np.int64]
 
 
 NEVER_NS = np.iinfo(np.int64).min
 """Stamp of no command."""
 
 
-@dataclass(frozen=True)
-class CorrectedRows:
+class CorrectedRows(NamedTuple):
     """Corrections of n commands.
 
     Parameters
     ----------
     rows : (n, 86) float
-        What the properties give.
-    applied : (n, 2) float
-        To be added to the commands, also where no correction was wanted [rad].
+        What the properties give, and from 14 on the Jacobian (3, 2) of the platform's angular
+        velocity at the command.
     active : (n, m) bool
         Sectors in contact at the corrected angles.
     """
 
     rows: Array
-    applied: Array
     active: Flags
 
     @classmethod
     def room(cls, n: int, sectors: int) -> CorrectedRows:
         """Return what is to be filled for n commands and a wrist's flange sectors."""
-        rows, applied = np.empty((n, native.CORRECTED)), np.empty((n, 2))
-        return cls(rows, applied, np.empty((n, sectors), dtype=bool))
+        return cls(np.empty((n, native.CORRECTED)), np.empty((n, sectors), dtype=bool))
 
     def put(self, place: int, after: Array, twist: Array, configuration: Configuration) -> None:
         """Write what another search found for one command, as it is applied."""
         row = self.rows[place]
-        row[:2], row[2:8], row[8:14] = self.applied[place], after, twist
-        row[20:] = configuration.row
+        row[2:8], row[8:14], row[20:] = after, twist, configuration.row
+
+    @property
+    def applied(self) -> Array:
+        """To be added to the commands, also where no correction was wanted, (n, 2) [rad]."""
+        return self.rows[:, :2]
 
     @property
     def after(self) -> Array:
@@ -203,10 +128,14 @@ class CorrectedRows:
         return self.rows[:, 2:8]
 
     @property
-    def predicted(self) -> PredictedRows:
-        """What the wrist does at the corrected angles."""
-        status = np.zeros(len(self.rows), dtype=np.uint8)
-        return PredictedRows(self.rows[:, 8:14], self.rows[:, 20:], self.active, status)
+    def twist(self) -> Array:
+        """Predicted twist at the corrected angles, (n, 6) [m, rad]."""
+        return self.rows[:, 8:14]
+
+    @property
+    def configuration(self) -> Array:
+        """The wrist there, (n, 66), as `Configuration.of_row` takes it."""
+        return self.rows[:, 20:]
 
 
 class CompiledWrist:
@@ -346,26 +275,27 @@ class CompiledWrist:
 
     def correct(
         self,
-        task: Array,
+        task: Array | None,
+        safety: Array | None,
         commands: CompiledCommands,
-        held: Array,
-        closed: Flags,
+        state: CorrectorState,
         found: CorrectedRows,
         begin: int = 0,
         end: int | None = None,
-    ) -> tuple[int, int]:
-        """Correct commands in their order (see `compensation.correction.correct`).
+    ) -> int:
+        """Correct commands in their order (see `compensation.correction.correct` and `safety`).
 
         Parameters
         ----------
-        task : (11,) float
-            What to make right and how far (see `compensation.corrector`).
+        task : (11,) float, optional
+            What to make right and how far (see `compensation.corrector`); None where `found` was
+            searched before.
+        safety : (8,) float, optional
+            From `SafetySettings.compiled`; None where nothing is to be applied yet.
         commands : CompiledCommands
             n of them.
-        held : (2,) float
-            The correction found before; afterwards that of the last command done [rad].
-        closed : (m,) bool
-            First guess of the contact state; afterwards that of the last command.
+        state : CorrectorState
+            Of the command before; afterwards that of the last command done.
         found : CorrectedRows
             To be filled.
         begin, end : int
@@ -373,67 +303,25 @@ class CompiledWrist:
 
         Returns
         -------
-        int, int
-            Which command comes next, and why it cannot be done; 0 where all are.
+        int
+            Which command comes next: the first that cannot be done here, else the end.
         """
-        return native.correct(
+        done: int = native.correct(
             self._mechanism,
             self._parts,
             task,
+            safety,
             commands.theta,
+            commands.stamp_ns,
             commands.load,
             commands.on_platform,
             commands.wanted,
-            held,
-            closed,
+            commands.share,
+            *state,
             found.rows,
             found.active,
             self.sectors,
             begin,
             len(commands.wanted) if end is None else end,
         )
-
-    def apply(
-        self,
-        safety: Array,
-        commands: CompiledCommands,
-        share: Array,
-        applied: Array,
-        stamp_ns: NDArray[np.int64],
-        found: CorrectedRows,
-        begin: int = 0,
-        end: int | None = None,
-    ) -> None:
-        """Let corrections through the guards (see `compensation.safety`).
-
-        Parameters
-        ----------
-        safety : (8,) float
-            From `SafetySettings.compiled`.
-        commands : CompiledCommands
-            n of them.
-        share : (n,) float
-            Of the correction [-].
-        applied : (2,) float
-            To the command before; afterwards to the last one [rad].
-        stamp_ns : (1,) int
-            Its stamp [ns].
-        found : CorrectedRows
-            From `correct`; afterwards as it is applied.
-        begin, end : int
-            Which of the commands.
-        """
-        native.apply(
-            self._mechanism,
-            safety,
-            commands.theta,
-            commands.stamp_ns,
-            share,
-            commands.wanted,
-            applied,
-            stamp_ns,
-            found.rows,
-            found.applied,
-            begin,
-            len(commands.wanted) if end is None else end,
-        )
+        return done

@@ -6,6 +6,7 @@ Reading the file is `geometry_file.py`; here are the values and what follows fro
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -157,6 +158,16 @@ class Limits:
     force: float
     moment: float
     encoder_step: float
+
+    @cached_property
+    def reach(self) -> tuple[tuple[float, float], ...]:
+        """Lowest and highest angle that a drive may be told, of each motor [rad].
+
+        Less than an encoder step beyond a limit is the limit itself, as far as the drive can tell.
+        """
+        lowest = (self.joint_lower - self.encoder_step).tolist()
+        highest = (self.joint_upper + self.encoder_step).tolist()
+        return tuple(zip(lowest, highest, strict=True))
 
 
 @dataclass(frozen=True)

@@ -49,11 +49,12 @@ READOUT_SPREAD = 0.1
 
 LENGTH = Quantity(number(above=0.0))
 
+# From soft rubber and light foam to beyond diamond and osmium: what lies outside is another unit.
 MATERIAL = record(
     {
-        "young_GPa": Quantity(number(above=0.0)),
+        "young_GPa": Quantity(number(above=1e-4, below=2000.0)),
         "poisson": number(above=-1.0, below=0.5),
-        "density_kg_m3": Quantity(number(above=0.0)),
+        "density_kg_m3": Quantity(number(above=10.0, below=25000.0)),
         "expansion_1e-6_K": Quantity(number()),
     },
     sources=SOURCES,

@@ -16,7 +16,6 @@ from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.compiled import (
     CompiledWrist,
     Flags,
-    PredictedRows,
     compilable,
     native,
 )
@@ -160,9 +159,10 @@ class ErrorModel:
         errors = self.table.header.errors
         if self.evaluation == "closed_form":
             return float(errors["stated_relative"])
-        return float(errors["mesh_relative"] + max(errors["predicted"]["domain"].values()))
+        parts = errors["mesh_relative"] + errors.get("walls_relative", 0.0)
+        return float(parts + max(errors["predicted"]["domain"].values()))
 
-    @property
+    @cached_property
     def certain(self) -> bool:
         """Whether no parameter adds to the covariance."""
         return self.joint is None and not self.variations
@@ -200,46 +200,57 @@ class ErrorModel:
         """
         if not self.stateless:
             return self.session().advance(Sample(0.0, theta, load))
-        theta, compiled = np.array(theta, dtype=float), self.compiled
+        theta, compiled = np.asarray(theta, dtype=float), self.compiled
         if compiled is not None:
             closed = np.zeros(compiled.sectors, dtype=bool) if active is None else active.copy()
             in_u = IN_U if load.on_platform else IN_F
-            rows = compiled.predict(
-                theta, np.ascontiguousarray(load.wrench, float), in_u, closed, None
-            )
+            wrench = np.asarray(load.wrench, dtype=float, order="C")
+            rows = compiled.predict(theta, wrench, in_u, closed, None)
             if not rows.status[0]:
-                return self.prediction_of(rows, 0, load)
+                twist, row, states, _ = rows
+                return self.prediction_of(twist[0], row[0], states[0], load)
         # The formulas for blocks say what is wrong.
         configuration = self.table.workspace.configuration(theta)
         self.table.check_load(load.wrench)
         found = evaluate(self, Sample(0.0, theta, load).block, None)
         return self._prediction(load, found.twist[0], configuration, found.active[0])
 
-    def prediction_of(self, rows: PredictedRows, place: int, load: Load) -> Prediction:
-        """Return the prediction of one of n samples under its load."""
-        return self._prediction(
-            load,
-            rows.twist[place],
-            Configuration.of_row(rows.configuration[place]),
-            rows.active[place],
-        )
+    def prediction_of(self, twist: Array, row: Array, active: Flags, load: Load) -> Prediction:
+        """Return a compiled prediction.
+
+        Parameters
+        ----------
+        twist : (6,) float
+            Of the platform at O in F [m, rad].
+        row : (66,) float
+            As `Configuration.of_row` takes it.
+        active : (m,) bool
+            Sectors in contact.
+        load : Load
+            On the platform.
+        """
+        return self._prediction(load, twist, Configuration.of_row(row), active)
 
     def _prediction(
         self, load: Load, twist: Array, configuration: Configuration, active: Flags
     ) -> Prediction:
-        def of_parameters() -> Array:
-            theta = configuration.theta
-            moved = [other.predict(theta, load, active).twist for other in self.variations]
-            return self.parameter_covariance(twist, moved)
+        of_parameters = None
+        if not self.certain:
 
+            def of_parameters() -> Array:
+                theta = configuration.theta
+                moved = [other.predict(theta, load, active).twist for other in self.variations]
+                return self.parameter_covariance(twist, moved)
+
+        constants = self.constants
         return Prediction(
             twist,
             configuration,
             active,
             self.table_covariance,
-            self.constants.sensor(configuration),
-            None if self.certain else of_parameters,
-            warnings=self.constants.warnings,
+            constants.sensor(configuration),
+            of_parameters,
+            warnings=constants.warnings,
         )
 
     @cached_property

@@ -283,9 +283,10 @@ class Situation:
             bent = (self.statics.turned_flexibility @ added.through[..., None])[..., 0]
             twist += _halves(projectors.of_components(), bent).sum(axis=-2)
             gap += slides(projectors, bent) @ sectors.slide.T
-            for sector, k in enumerate(sectors.component):
+            for k in np.unique(sectors.component).tolist():
+                own = sectors.component == k
                 home = self.at_home(ELASTIC[k], added.through[:, k])
-                gap[:, sector] += home @ sectors.screw[sector]
+                gap[:, own] += home @ sectors.screw[own].T
         if added.gap is not None:
             gap += added.gap
         return twist, gap

@@ -33,8 +33,10 @@ ENCAPSULATION_SIZE = 4
 PRIMITIVES = {
     "bool": struct.Struct("?"),
     "byte": struct.Struct("B"),
+    "uint8": struct.Struct("B"),
     "int32": struct.Struct("i"),
     "uint32": struct.Struct("I"),
+    "float32": struct.Struct("f"),
     "float64": struct.Struct("d"),
 }
 _NANOSECONDS = 1_000_000_000

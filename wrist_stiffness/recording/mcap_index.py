@@ -205,6 +205,8 @@ class _Walk:
                 self.flaws.append(f"damaged from byte {position} to {following} ({error})")
                 position = following
                 continue
+            if position == len(MCAP0_MAGIC) and opcode != Opcode.HEADER:
+                self.flaws.append(f"it begins with a record of kind {opcode}, not with its header")
             if opcode == Opcode.FOOTER:
                 if end + len(MCAP0_MAGIC) != size or self.stream.read(8) != MCAP0_MAGIC:
                     self.flaws.append(f"closing magic missing at byte {end}")

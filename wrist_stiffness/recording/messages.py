@@ -9,37 +9,10 @@ nanoseconds (attribute ``stamp_ns`` for the field ``stamp``), and sequences are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, ClassVar
 
-MSG_LINE = "msg_line"
-
-
-def line(text: str, default: Any) -> Any:
-    """Declare one field of a message.
-
-    Parameters
-    ----------
-    text : str
-        Line of the ``.msg`` file: type, name and, where the file has one, the default value.
-    default : Any
-        Value in Python where none is given; immutable.
-
-    Returns
-    -------
-    Any
-        The dataclass field.
-    """
-    return field(default=default, metadata={MSG_LINE: text})
-
-
-class Message:
-    """Base of all messages; `ros_type` is the full type name, ``package/msg/Type``."""
-
-    __slots__ = ()
-    ros_type: ClassVar[str]
-    constants: ClassVar[tuple[str, ...]] = ()
+from wrist_stiffness.recording.message import Message, line
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,36 +292,98 @@ class DiagnosticArray(Message):
     status: tuple[DiagnosticStatus, ...] = line("DiagnosticStatus[] status", ())
 
 
+@dataclass(frozen=True, slots=True)
+class ColorRGBA(Message):
+    """A colour, 0 to 1."""
+
+    ros_type = "std_msgs/msg/ColorRGBA"
+    r: float = line("float32 r", 0.0)
+    g: float = line("float32 g", 0.0)
+    b: float = line("float32 b", 0.0)
+    a: float = line("float32 a", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CompressedImage(Message):
+    """A picture; none in a marker here."""
+
+    ros_type = "sensor_msgs/msg/CompressedImage"
+    header: Header = line("std_msgs/Header header", Header())
+    format: str = line("string format", "")
+    data: tuple[int, ...] = line("uint8[] data", ())
+
+
+@dataclass(frozen=True, slots=True)
+class UVCoordinate(Message):
+    """Where a point is in a marker's picture."""
+
+    ros_type = "visualization_msgs/msg/UVCoordinate"
+    u: float = line("float32 u", 0.0)
+    v: float = line("float32 v", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFile(Message):
+    """A mesh; none in a marker here."""
+
+    ros_type = "visualization_msgs/msg/MeshFile"
+    filename: str = line("string filename", "")
+    data: tuple[int, ...] = line("uint8[] data", ())
+
+
+_OF_MARKERS = (
+    "ARROW=0 CUBE=1 SPHERE=2 CYLINDER=3 LINE_STRIP=4 LINE_LIST=5 CUBE_LIST=6 SPHERE_LIST=7 "
+    "POINTS=8 TEXT_VIEW_FACING=9 MESH_RESOURCE=10 TRIANGLE_LIST=11 ARROW_STRIP=12 "
+    "ADD=0 MODIFY=0 DELETE=2 DELETEALL=3"
+)
+
+
+class MarkerShape(IntEnum):
+    """What a marker draws; names and values of visualization_msgs/msg/Marker."""
+
+    ARROW = 0
+    CYLINDER = 3
+    LINE_STRIP = 4
+    TEXT_VIEW_FACING = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Marker(Message):
+    """Something to be drawn, `type` as in `MarkerShape`; sizes [m]."""
+
+    ros_type = "visualization_msgs/msg/Marker"
+    constants = tuple(f"int32 {each}" for each in _OF_MARKERS.split())
+    header: Header = line("std_msgs/Header header", Header())
+    ns: str = line("string ns", "")
+    id: int = line("int32 id", 0)
+    type: int = line("int32 type", 0)
+    action: int = line("int32 action", 0)
+    pose: Pose = line("geometry_msgs/Pose pose", Pose())
+    scale: Vector3 = line("geometry_msgs/Vector3 scale", Vector3())
+    color: ColorRGBA = line("std_msgs/ColorRGBA color", ColorRGBA())
+    lifetime_ns: int = line("builtin_interfaces/Duration lifetime", 0)
+    frame_locked: bool = line("bool frame_locked", False)
+    points: tuple[Point, ...] = line("geometry_msgs/Point[] points", ())
+    colors: tuple[ColorRGBA, ...] = line("std_msgs/ColorRGBA[] colors", ())
+    texture_resource: str = line("string texture_resource", "")
+    texture: CompressedImage = line("sensor_msgs/CompressedImage texture", CompressedImage())
+    uv_coordinates: tuple[UVCoordinate, ...] = line("UVCoordinate[] uv_coordinates", ())
+    text: str = line("string text", "")
+    mesh_resource: str = line("string mesh_resource", "")
+    mesh_file: MeshFile = line("MeshFile mesh_file", MeshFile())
+    mesh_use_embedded_materials: bool = line("bool mesh_use_embedded_materials", False)
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerArray(Message):
+    """Things to be drawn at once."""
+
+    ros_type = "visualization_msgs/msg/MarkerArray"
+    markers: tuple[Marker, ...] = line("Marker[] markers", ())
+
+
 MESSAGE_TYPES: dict[str, type[Message]] = {
-    message_type.ros_type: message_type
-    for message_type in (
-        Header,
-        Vector3Stamped,
-        String,
-        Bool,
-        Float64,
-        MultiArrayDimension,
-        MultiArrayLayout,
-        Float64MultiArray,
-        JointState,
-        Temperature,
-        Vector3,
-        Point,
-        Quaternion,
-        Pose,
-        PoseWithCovariance,
-        Wrench,
-        WrenchStamped,
-        PoseStamped,
-        PoseWithCovarianceStamped,
-        PoseArray,
-        Transform,
-        TransformStamped,
-        TFMessage,
-        JointTrajectoryPoint,
-        JointTrajectory,
-        KeyValue,
-        DiagnosticStatus,
-        DiagnosticArray,
-    )
+    each.ros_type: each
+    for each in tuple(globals().values())
+    if isinstance(each, type) and issubclass(each, Message) and each is not Message
 }

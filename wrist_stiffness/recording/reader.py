@@ -6,7 +6,6 @@ import heapq
 import os
 from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from itertools import islice, pairwise
 from os import PathLike
 from pathlib import Path
@@ -17,9 +16,9 @@ from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.bag_folder import METADATA_FILE, Bag, bag_of
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.mcap_chunk import (
+    Chunk,
     Contents,
     Payloads,
-    Span,
     StoredMessage,
     Times,
     contents_of,
@@ -27,9 +26,13 @@ from wrist_stiffness.recording.mcap_chunk import (
 from wrist_stiffness.recording.mcap_index import McapIndex, index_mcap
 from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.raw_block import Integers, RawBlock, RawMessage
+from wrist_stiffness.recording.topic_info import TopicInfo, topics_of
 
 MOST_OPENED_BYTES = 256 << 20
 """Of chunks that overlap in time.  A recorder's overlap by as much as a message is late."""
+
+RECENT_BYTES = 3 << 20
+"""Of chunks that stay unpacked: more than two of the usual size."""
 
 MESSAGES_AT_A_TIME = 4096
 """A block of messages: enough that a step for all of them costs little for each one."""
@@ -37,30 +40,6 @@ MESSAGES_AT_A_TIME = 4096
 PAYLOADS_AT_A_TIME = 10_000
 """So many of one topic are given together: a chunk has some hundred, and each step of decoding them
 costs as much for a hundred as for a thousand."""
-
-
-@dataclass(frozen=True)
-class TopicInfo:
-    """One topic of a recording.
-
-    Attributes
-    ----------
-    name, ros_type : str
-        Topic and ``package/msg/Type``.
-    count : int
-        Number of messages.
-    first_ns, last_ns : int or None
-        Log time of the first and last message; None without messages.
-    is_readable : bool
-        Whether the type is one that this project decodes.
-    """
-
-    name: str
-    ros_type: str
-    count: int
-    first_ns: int | None
-    last_ns: int | None
-    is_readable: bool
 
 
 class Recording:
@@ -83,7 +62,8 @@ class Recording:
         # Texts in order of discovery; a second reading meets the same flaws again.
         self._flaws: dict[str, None] = {}
         self._undecodable: Counter[str] = Counter()
-        self.topics = _topics_of(indices)
+        self._recent: dict[Chunk, Contents] = {}
+        self.topics = topics_of(indices)
         flaws = [flaw for index in indices for flaw in index.flaws]
         for flaw in [*bag.flaws, *flaws, *_check_counts(self.topics, bag.counts)]:
             self._report(flaw)
@@ -328,14 +308,23 @@ class Recording:
         return contents.messages([*orphans, *unwanted])
 
     def _contents(self, index: McapIndex, position: int) -> Contents | None:
-        """Unpack a chunk; report what is wrong with it, None where it cannot be read."""
+        """Unpack a chunk; report what is wrong with it, None where it cannot be read.
+
+        Those of late stay at hand: a replay reads the loads of a chunk some time before the rest.
+        """
+        chunk = index.chunks[position]
+        if (contents := self._recent.get(chunk)) is not None:
+            return contents
         try:
-            contents = contents_of(index.chunks[position])
+            contents = contents_of(chunk)
             if flaw := index.disagreement(contents, position):
                 self._report(flaw)
         except RecordingError as error:
             self._report(f"{error}, left out: {index.told(index.chunk_spans[position])}")
             return None
+        self._recent[chunk] = contents
+        while sum(kept.uncompressed_size for kept in self._recent) > RECENT_BYTES:
+            del self._recent[next(iter(self._recent))]
         return contents
 
     def _report(self, flaw: str) -> None:
@@ -400,23 +389,3 @@ def _check_counts(topics: tuple[TopicInfo, ...], stated: dict[str, int]) -> Iter
     for name, count in stated.items():
         if (there := found.get(name, 0)) != count:
             yield f"{METADATA_FILE} states {count} messages of {name}, {there} found"
-
-
-def _topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:
-    spans: dict[tuple[str, str, bool], Span | None] = {}
-    for index in indices:
-        for channel_id, channel in index.channels.items():
-            key = (channel.topic, channel.ros_type, channel.message_type is not None)
-            span, known = index.spans.get(channel_id), spans.get(key)
-            spans[key] = span.joined(known) if span and known else span or known
-    return tuple(
-        TopicInfo(
-            name=name,
-            ros_type=ros_type,
-            count=span.count if span else 0,
-            first_ns=span.first_ns if span else None,
-            last_ns=span.last_ns if span else None,
-            is_readable=is_readable,
-        )
-        for (name, ros_type, is_readable), span in sorted(spans.items(), key=lambda item: item[0])
-    )

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from wrist_stiffness.recording.messages import MESSAGE_TYPES, MSG_LINE
+from wrist_stiffness.recording.message import MSG_LINE
+from wrist_stiffness.recording.messages import MESSAGE_TYPES
 
 SECONDS_NANOSECONDS = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 """Types that the dataclasses hold as one integer of nanoseconds."""
@@ -18,7 +19,16 @@ SECONDS_NANOSECONDS = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Du
 # Numbers of rosidl's type description (type_description_interfaces/msg/FieldType): element
 # types, and what is added for a fixed-size array and an unbounded sequence.
 _NESTED_ID = 1
-_ELEMENT_IDS = {"int32": 6, "uint32": 7, "float64": 11, "bool": 15, "byte": 16, "string": 17}
+_ELEMENT_IDS = {
+    "uint8": 3,
+    "int32": 6,
+    "uint32": 7,
+    "float32": 10,
+    "float64": 11,
+    "bool": 15,
+    "byte": 16,
+    "string": 17,
+}
 _ARRAY_ID = 48
 _SEQUENCE_ID = 144
 

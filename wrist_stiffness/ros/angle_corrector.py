@@ -66,6 +66,7 @@ class AngleCorrector(WristNode):
         self._residual = self.say(PoseWithCovarianceStamped, POSE_ERROR_RESIDUAL)
         self._task_residual = self.say(PoseWithCovarianceStamped, POSE_ERROR_RESIDUAL_TASK)
         self._plans = SlicedWork(self, self.on_fault)
+        self._plan_known = "none"
         self._paused_s = time.monotonic()
         for action, kind in (("tare", Trigger), ("reload_model", Trigger), ("enable", SetBool)):
             self.serve(kind, f"{action}_all", partial(self._on_all, action, kind))
@@ -127,7 +128,7 @@ class AngleCorrector(WristNode):
             self.left_out = command.correction.prediction.warnings
         publishers = (self._residual, self._task_residual)
         for publisher, residual in zip(publishers, self.stream.residuals(command), strict=False):
-            publisher.publish(error_payload(stamp_ns, *residual))
+            publisher.publish(error_payload(stamp_ns, *residual, self.base_frame))
         self.health.good()
 
     def _on_trajectory(self, payload: bytes) -> None:
@@ -143,6 +144,7 @@ class AngleCorrector(WristNode):
         )
         answer = yield from plan_payload(plan, done.frame_id, done.points)
         self._trajectory.publish(answer)
+        self._plan_known = str(done.valid).lower()
         if done.fault is not None:
             self.on_fault(done.fault)
         else:
@@ -181,7 +183,7 @@ class AngleCorrector(WristNode):
         if inertia.m != 0.0:
             centre = frames.on_platform(message.header.frame_id, three(inertia.com), "payload")
             payload = Payload(inertia.m, centre)
-        self.stream.declare_payload(payload)
+        self.stream.supervisor.declare_payload(payload)
 
     # Services
 
@@ -206,6 +208,7 @@ class AngleCorrector(WristNode):
         """Return what is done with commands, and what is believed of the load."""
         supervision = self.stream.supervision
         payload = supervision.payload
+        limit = self.stream.supervisor.limit(self.stream.settings.supervisor)
         first, second = (MILLIDEGREES * self.stream.applied).tolist()
         return {
             "mode": self.mode,
@@ -214,8 +217,10 @@ class AngleCorrector(WristNode):
             "load": supervision.state.value,
             "payload [kg]": "none" if payload is None else f"{payload.mass_kg:.4f}",
             "payload told by the gripper": str(supervision.told).lower(),
+            "another load departs by [N, N m]": f"{limit.force:.3g}, {limit.moment:.3g}",
             "residual holds": str(supervision.valid).lower(),
             "trajectories under way": str(len(self._plans)),
+            "load known all along the last trajectory": self._plan_known,
         }
 
     def restriction(self) -> str:

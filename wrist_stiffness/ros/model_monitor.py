@@ -116,7 +116,7 @@ class ModelMonitor(WristNode):
         # What is not measured is sent as zero with a huge variance: poses cannot carry a NaN.
         residual = np.nan_to_num(judged.residual)
         covariance = judged.covariance + np.diag(NOT_MEASURED * np.isnan(judged.residual))
-        self._residual.publish(error_payload(stamp_ns, residual, covariance))
+        self._residual.publish(error_payload(stamp_ns, residual, covariance, self.base_frame))
         self._alarm.publish(Bool(data=self.stream.monitor.alarm))
         self.health.good()
 

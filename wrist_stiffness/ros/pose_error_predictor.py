@@ -13,16 +13,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import PREDICTION, prediction_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.urdf import urdf
 from wrist_stiffness.model.error_model import Prediction
+from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.ros import static_transforms
+from wrist_stiffness.ros.body_transforms import body_transforms
 from wrist_stiffness.ros.load_wait import LoadWait
-from wrist_stiffness.ros.markers import body_transforms, wrist_markers
 from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import (
@@ -41,6 +41,7 @@ from wrist_stiffness.topics import (
     TF,
     WRIST_MARKERS,
 )
+from wrist_stiffness.workflows.wrist_drawing import Pace, WristDrawing
 
 MICROMETRES = 1e6
 MILLIDEGREES = 1e3 * float(np.degrees(1.0))
@@ -56,7 +57,7 @@ class PoseErrorPredictor(WristNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
-        self._drawn_ns = -NANOSECONDS
+        self._pace = Pace()
         self._error = self.say(PoseWithCovarianceStamped, POSE_ERROR_PREDICTED)
         self._s_um = self.say(Vector3Stamped, POSE_ERROR_S_UM)
         self._phi_mdeg = self.say(Vector3Stamped, POSE_ERROR_PHI_MDEG)
@@ -116,30 +117,32 @@ class PoseErrorPredictor(WristNode):
         prediction = self.stream.on_joint_state(
             stamp_ns, joints.names, joints.positions, joints.velocities
         ).prediction
-        self._error.publish(error_payload(stamp_ns, prediction.twist, prediction.covariance))
+        frame, twist = self.base_frame, prediction.twist
+        self._error.publish(error_payload(stamp_ns, twist, prediction.covariance, frame))
         if self._s_um.get_subscription_count():
-            self._s_um.publish(vector_payload(stamp_ns, MICROMETRES * prediction.twist[:3]))
+            self._s_um.publish(vector_payload(stamp_ns, MICROMETRES * twist[:3], frame))
         if self._phi_mdeg.get_subscription_count():
-            self._phi_mdeg.publish(vector_payload(stamp_ns, MILLIDEGREES * prediction.twist[3:]))
+            self._phi_mdeg.publish(vector_payload(stamp_ns, MILLIDEGREES * twist[3:], frame))
         self.health.good()
         self.left_out = prediction.warnings
         self._draw(stamp_ns, prediction)
 
     def _draw(self, stamp_ns: int, prediction: Prediction) -> None:
         rate_hz = self.get_parameter("marker_rate_hz").value
-        # A stamp before the last one drawn says that the clock jumped back.
-        since_s = (stamp_ns - self._drawn_ns) / NANOSECONDS
-        if rate_hz == 0.0 or 0.0 <= since_s < 1.0 / rate_hz:
+        if not self._pace.takes(stamp_ns, rate_hz):
             return
-        self._drawn_ns = stamp_ns
         if self._transforms_type is not None:
-            poses = body_transforms(stamp_ns, prediction.configuration)
+            poses = body_transforms(
+                stamp_ns, prediction.configuration, self.stream.settings.frames.prefix
+            )
             self._transforms.publish(self._transforms_type(transforms=poses))
         if not self._markers.get_subscription_count():
             return
         exaggeration = self.get_parameter("marker_exaggeration").value
-        table = self.stream.running_model().model.table
-        self._markers.publish(wrist_markers(stamp_ns, table, prediction, exaggeration))
+        geometry = self.stream.running_model().model.table.geometry
+        drawing = WristDrawing(geometry, exaggeration, self.base_frame)
+        markers = drawing.message(stamp_ns, prediction.configuration, prediction.twist)
+        self._markers.publish(encode(markers))
 
 
 def main() -> NoReturn:

@@ -89,8 +89,10 @@ def joint_payload(sample: JointSample) -> bytes:
     return layout.payload(*divmod(sample.stamp_ns, NANOSECONDS), *positions, *velocities, *efforts)
 
 
-def error_payload(stamp_ns: int, twist: Array, covariance: Array) -> bytes:
-    """Return a pose error in `wrist_base` as geometry_msgs/PoseWithCovarianceStamped.
+def error_payload(
+    stamp_ns: int, twist: Array, covariance: Array, frame_id: str = BASE_FRAME
+) -> bytes:
+    """Return a pose error as geometry_msgs/PoseWithCovarianceStamped.
 
     Parameters
     ----------
@@ -100,9 +102,11 @@ def error_payload(stamp_ns: int, twist: Array, covariance: Array) -> bytes:
         Of the error, at O in F [m, rad].
     covariance : (6, 6) float
         Of the twist.
+    frame_id : str
+        Name of F.
     """
     place, turn = pose_of_twist(twist)
-    return POSE_ERROR.payload(
+    return _in_frame(PoseWithCovarianceStamped, frame_id).payload(
         *divmod(stamp_ns, NANOSECONDS),
         *place.tolist(),
         *turn.tolist(),
@@ -115,16 +119,20 @@ def angles_payload(theta: Array) -> bytes:
     return TWO_NUMBERS.payload(NO_OFFSET, *theta.tolist())
 
 
-def vector_payload(stamp_ns: int, vector: Array) -> bytes:
-    """Return a vector (3,) in `wrist_base` as geometry_msgs/Vector3Stamped."""
-    return VECTOR.payload(*divmod(stamp_ns, NANOSECONDS), *vector.tolist())
+def vector_payload(stamp_ns: int, vector: Array, frame_id: str = BASE_FRAME) -> bytes:
+    """Return a vector (3,) in a frame as geometry_msgs/Vector3Stamped."""
+    layout = _in_frame(Vector3Stamped, frame_id)
+    return layout.payload(*divmod(stamp_ns, NANOSECONDS), *vector.tolist())
 
 
-POSE_ERROR = FixedLayout.of(PoseWithCovarianceStamped(Header(frame_id=BASE_FRAME)))
 TWO_NUMBERS = FixedLayout.of(Float64MultiArray(data=(0.0, 0.0)))
-VECTOR = FixedLayout.of(Vector3Stamped(Header(frame_id=BASE_FRAME)))
 NO_OFFSET = 0
 """`data_offset` of the array's layout."""
+
+
+@lru_cache(maxsize=8)
+def _in_frame(kind: type, frame_id: str) -> FixedLayout:
+    return FixedLayout.of(kind(Header(frame_id=frame_id)))
 
 
 @lru_cache(maxsize=8)

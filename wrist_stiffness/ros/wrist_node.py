@@ -39,6 +39,7 @@ from wrist_stiffness.ros.parameters import declare, model_path, values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS, STATE_QOS, STATIC_QOS
 from wrist_stiffness.ros.stream_messages import WrenchSample, wrench_reader
 from wrist_stiffness.topics import (
+    BASE_FRAME,
     COVARIATES,
     DIAGNOSTICS,
     LOAD_ESTIMATE,
@@ -69,6 +70,8 @@ class WristNode(GuardedNode, ABC):
     ----------
     stream : Stream
         Of the core.
+    base_frame : str
+        Name of F on topics.
     left_out : tuple of str
         Effects that the model left out of its last prediction, and why.
 
@@ -87,6 +90,7 @@ class WristNode(GuardedNode, ABC):
         self._entries = (*COMMON, *entries)
         declare(self, self._entries)
         self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
+        self.base_frame = self.stream.settings.frames.prefix + BASE_FRAME
         self.left_out: tuple[str, ...] = ()
         self._fault = ""
         self._load_heard_s: float | None = None
@@ -228,7 +232,7 @@ class WristNode(GuardedNode, ABC):
 
     def _tare_change(self) -> Change:
         self.require_configured()
-        zero = self.stream.loads.measured_zero()
+        zero = self.stream.loads.measured_zero(self.stream.settings.supervisor.limit)
         frames = self.get_parameter("frames").value
         new = Tare(zero, time.time(), frames)
 

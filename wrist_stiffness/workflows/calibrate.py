@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.campaign.comparing.compare import suspicion_in
 from wrist_stiffness.campaign.comparing.wiring import told_mistake
 from wrist_stiffness.campaign.comparing.wrong_load import doubts_load, wrong_load
-from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
-from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.calibrate import Calibration, calibrate
+from wrist_stiffness.campaign.searching.free_effects import unfitted
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model, save_model
@@ -35,9 +33,6 @@ from wrist_stiffness.workflows.read_sessions import (
     read_sessions,
     was_fitted_to,
 )
-
-SEED = 0
-"""Of the noise floor beside which a mistake shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +61,14 @@ class Calibrated:
         """Before and after."""
         found = self.calibration
         rows = {"model as it stands": found.before, "calibrated": found.after}
-        return Errors(rows, found.floor.rms(found.judged.observations), found.floor.source)
+        return Errors(rows, found.fit)
 
     def lines(self) -> list[str]:
         """Return what a technician reads."""
         found = self.calibration
         parameters = found.parameters
         lines = used_lines(self.sessions, found.fit)
-        lines += ["", *self.errors.lines(), *left_lines(self.errors, found.judged)]
+        lines += ["", *self.errors.lines(), *left_lines(found.fit, found.judged_by)]
         lines += [self.mistake] if self.mistake else []
         for session in self.sessions:
             own = told_lines(each for each in parameters if each.session == session.name)
@@ -93,7 +88,7 @@ class Calibrated:
         """Return what programs read, with units in the names."""
         found = self.calibration
         return {
-            **fit_values(self.errors, found.judged, self.sessions, found.fit),
+            **fit_values(self.errors, found.judged_by, self.sessions, found.fit),
             "set_up_mistake": self.mistake,
             "calibrated_otherwise": list(found.calibrated),
             "parameters": parameter_values(found.parameters),
@@ -105,7 +100,6 @@ def calibrate_model(
     recordings: Recordings,
     output: str | Path,
     run: Run,
-    hold_out: bool = False,
     progress: Progress = silent,
     asking: Progress = silent,
 ) -> Calibrated:
@@ -121,8 +115,6 @@ def calibrate_model(
         Model file to write.
     run : Run
         For the lineage.
-    hold_out : bool
-        Whether to judge by a part that a first fit has not seen.
     progress : callable
         Told steps done and steps at most.
     asking : callable
@@ -143,29 +135,26 @@ def calibrate_model(
     sessions = read_sessions(recordings, [parent], progress)
     step = run.step(model, sessions)
     again = was_fitted_to(parent, sessions)
-    found = calibrate(parent, tuple(sessions.values()), hold_out, progress, again)
+    found = calibrate(parent, tuple(sessions.values()), progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
     calibrated = Calibrated(found, tuple(sessions.values()), output, "")
     start = unfitted(parent) if again else parent
-    calibrated = replace(calibrated, mistake=_mistake(start, child, calibrated, hold_out, asking))
+    calibrated = replace(calibrated, mistake=_mistake(start, child, calibrated, asking))
     save_model(child, output)
     return calibrated
 
 
-def _mistake(
-    start: ErrorModel, child: ErrorModel, calibrated: Calibrated, hold_out: bool, asking: Progress
-) -> str:
+def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, asking: Progress) -> str:
     """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
 
     What is wrong with positions or angles shows in the model as it was; what is wrong with the load
     hides there behind axes that are a little off their drawing.
     """
-    sessions, mistake, much = calibrated.sessions, "", not calibrated.errors.at_floor
+    sessions, mistake, much = calibrated.sessions, "", calibrated.calibration.fit.rough
     if much:
-        mistake = told_mistake(suspicion_in(start, sessions, np.random.default_rng(SEED)))
+        mistake = told_mistake(suspicion_in(start, sessions))
     if not mistake and (much or doubts_load(calibrated.calibration)):
-        rng, found = np.random.default_rng(SEED), calibrated.calibration
-        mistake = wrong_load(start, child, sessions, rng, found, hold_out, asking)
+        mistake = wrong_load(start, child, sessions, calibrated.calibration, asking)
     return mistake
 
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import compare_models
 from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, Size
+from wrist_stiffness.campaign.comparing.sentences import sentences
 from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING
 from wrist_stiffness.campaign.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.noise_floor import SOURCES
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
@@ -27,9 +27,6 @@ from wrist_stiffness.workflows.read_sessions import (
     sha256_by_name,
     was_fitted_to,
 )
-
-SEED = 0
-"""Of what chance gives: the same recordings give the same answer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +59,7 @@ class Compared:
     def worst(self, model: ComparedModel) -> tuple[WorstPose, ...]:
         """Return the poses at which a model fails worst."""
         found = self.comparison
-        return worst_poses(model.refitted, found.floor, found.sessions)
+        return worst_poses(model.refitted, found.noise, found.sessions)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -72,7 +69,7 @@ class Compared:
             for name in self.fitted_here
         )
         last, found = self.comparison.models[-1], self.comparison
-        if not self.as_drawn or found.over_floor(last) < WORTH_ASKING:
+        if not self.as_drawn or found.over_noise(last) < WORTH_ASKING:
             return (*self.remarks, *fitted)
         drawn = (
             f"{last.name} was never fitted to a wrist, and each is built a little off its drawing: "
@@ -86,7 +83,7 @@ class Compared:
         out = [*found.verdict, "", *self._table()]
         last = found.models[-1]
         out += ["", f"{last.name}: on what the error depends"]
-        out += [f"  - {sentence}" for sentence in last.told.sentences]
+        out += [f"  - {sentence}" for sentence in sentences(last.explained)]
         out += ["", f"{last.name}: worst poses", *self._worst_lines(last)]
         if self.notes:
             out += ["", *(f"note: {note}" for note in self.notes)]
@@ -94,7 +91,7 @@ class Compared:
 
     def _table(self) -> list[str]:
         found = self.comparison
-        wide = max(34, *(len(model.name) + 4 for model in found.models))
+        wide = max(38, *(len(model.name) + 4 for model in found.models))
         keys = [q.key for q in found.quantities]
         heads = "".join(f"{f'{q.name} [{q.unit}]':>29}" for q in found.quantities)
         out = [" " * wide + heads, " " * wide + f"{'mean':>11}{'RMS':>9}{'max':>9}" * len(keys)]
@@ -114,18 +111,21 @@ class Compared:
         for title, level in self.levels():
             cells = "".join(f"{'':11}{_shown(level[k], 4):>9}{'':9}" for k in keys)
             out.append(f"{title:{wide}}{cells}".rstrip())
-        out.append(f"noise floor from: {SOURCES[found.noise.source]}")
         return out
 
     def levels(self) -> list[tuple[str, dict[str, float]]]:
         """Return what the errors are to be compared with, by name."""
-        found = self.comparison
-        levels = [("noise floor", found.floor)]
+        found, last = self.comparison, self.comparison.models[-1].explained
+        levels = [
+            ("above noise and drift", last.above),
+            ("instrument noise", last.noise),
+            ("drift of the instrument", last.drift),
+        ]
         if found.repeated_by_side:
             levels.append(("repeatability, from the same side", found.repeated_by_side))
         if found.repeated:
             levels.append(("repeatability, from any side", found.repeated))
-        return [*levels, ("Gaussian process on unseen blocks", found.process)]
+        return [*levels, ("laws of the conditions, unseen part", found.reachable)]
 
     def _worst_lines(self, model: ComparedModel) -> list[str]:
         keys = [q.key for q in self.comparison.quantities]
@@ -172,7 +172,7 @@ def compare(
     Returns
     -------
     Compared
-        Errors, contrasts, worst poses.
+        Errors, on what they depend, worst poses.
 
     Raises
     ------
@@ -183,9 +183,7 @@ def compare(
     loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]
     table = loaded[0][1].table
     sessions = read_sessions(recordings, [model for _, model in loaded], progress("reading"))
-    comparison = compare_models(
-        loaded, list(sessions.values()), np.random.default_rng(SEED), progress("comparing")
-    )
+    comparison = compare_models(loaded, list(sessions.values()), progress("comparing"))
     hashes = sha256_by_name(sessions)
     fitted_here = tuple(name for name, model in loaded if was_fitted_to(model, sessions))
     files = {name: file_sha256(path) for name, path in zip(names, models, strict=True)}

@@ -32,7 +32,7 @@ class FleetComparison:
     def lines(self) -> list[str]:
         """Return one table for a terminal."""
         models = {row.result["models"][-1]["model"] for row in self.rows if row.result is not None}
-        titles = f"{'s [um]':>10}{'floor':>8}{'phi [mdeg]':>12}{'floor':>8}  strongest dependence"
+        titles = f"{'s [um]':>10}{'noise':>8}{'phi [mdeg]':>12}{'noise':>8}  strongest dependence"
         return [
             *(f"{name}, RMS with registrations, zeros, tare refitted" for name in models),
             *table_lines(self.rows, titles, _cells, "compared", _mistakes),
@@ -54,10 +54,10 @@ def _cells(values: dict[str, Any]) -> str:
         size = model["after_registration"].get(key)
         # A recording may lack a quantity.
         rms = "-" if size is None else f"{size['rms']:.3g}"
-        floor = "-" if size is None else f"{values['noise_floor'][key]:.3g}"
-        out += f"{rms:>{width}}{floor:>8}"
+        noise = "-" if size is None else f"{values['instrument_noise'][key]:.3g}"
+        out += f"{rms:>{width}}{noise:>8}"
     depends = model["depends_on"]
-    return f"{out}  {depends[0]['condition'] if depends else 'none beyond chance'}"
+    return f"{out}  {depends[0]['condition'] if depends else 'nothing beyond chance'}"
 
 
 def compare_each(

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.compare import suspicion_in
+from wrist_stiffness.campaign.comparing.sentences import percent
 from wrist_stiffness.campaign.comparing.wiring import WORTH_ASKING, told_mistake
 from wrist_stiffness.campaign.comparing.wrong_load import wrong_load
-from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import ANSWERS_LOAD
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
+from wrist_stiffness.campaign.searching.free_effects import unfitted
 from wrist_stiffness.campaign.searching.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import NAMING
@@ -31,14 +32,11 @@ from wrist_stiffness.workflows.read_sessions import (
     sha256_by_name,
     was_fitted_to,
 )
-from wrist_stiffness.workflows.verdict import class_of, correction_of, percent, verdict_lines
+from wrist_stiffness.workflows.verdict import class_of, correction_of, verdict_lines
 
 if TYPE_CHECKING:
     from wrist_stiffness.workflows.report.page import Page
 
-
-SEED = 0
-"""Of what chance gives: the same recordings give the same answer."""
 
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""
@@ -123,7 +121,7 @@ class Diagnosed:
         )
 
         explained = self.answer.fitted.residual if self.result.findings else None
-        shown = shown_by(self.answer.observations, np.random.default_rng(SEED), explained)
+        shown = shown_by(self.answer.nominal, explained)
         return report_of_diagnosis(
             self.result, shown, self.recordings, self.mistake, self.remarks, self.provenance
         )
@@ -170,9 +168,8 @@ def diagnose_recordings(
     loaded = load_model(model)
     sessions = read_sessions(recordings, [loaded], progress("reading"))
     known = unfitted(loaded) if was_fitted_to(loaded, sessions) else loaded
-    rng = np.random.default_rng(SEED)
     answer = diagnose_sessions(known, list(sessions.values()), naming, seconds, tell)
-    mistake = mistake_beside(known, answer, list(sessions.values()), rng, tell)
+    mistake = mistake_beside(known, answer, list(sessions.values()), tell)
     hashes = sha256_by_name(sessions)
     return Diagnosed(
         answer,
@@ -187,7 +184,6 @@ def mistake_beside(
     known: ErrorModel,
     answer: WristDiagnosis,
     sessions: Sequence[MeasuredSession],
-    rng: np.random.Generator,
     tell: Callable[[str], None] = lambda text: None,
 ) -> str:
     """Return the mistake of signs, units or names that an answer makes likely; empty for none.
@@ -200,21 +196,19 @@ def mistake_beside(
         What was found.
     sessions : sequence of MeasuredSession
         In which.
-    rng : numpy.random.Generator
-        For the noise floor.
     tell : callable, optional
         Told what is being done.
     """
     mistake = ""
     if _leaves_much(answer.diagnosis):
         tell("asking for wrong signs, units and names")
-        mistake = told_mistake(suspicion_in(known, sessions, rng))
+        mistake = told_mistake(suspicion_in(known, sessions))
     if not mistake and _doubts_load(answer):
         # Axes that are off their drawing hide a wrong load, and so do parts that it made as stiff
         # as they can be: so it is asked with the axes as fitted and the stiffness of before.
         tell("asking for a wrong load")
         fitted = known.with_effects(*answer.fitted.effects(0))
-        mistake = wrong_load(known, fitted, sessions, rng)
+        mistake = wrong_load(known, fitted, sessions)
     return mistake
 
 

@@ -11,9 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.extend import Extension, extend
-from wrist_stiffness.campaign.fitting.free_effects import unfitted
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.extend import Extension, extend
+from wrist_stiffness.campaign.searching.free_effects import unfitted
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import names_in
@@ -206,19 +206,21 @@ class Extended:
     def errors(self) -> Errors:
         """Before and after on the unseen part."""
         found = self.extension
-        floor = found.floor.rms(found.after.observations)
         rows = {
-            "without the effect": found.before.rms,
-            f"with {found.effect.name}": found.after.rms,
+            name: {q.key: left.rmse(q) for q in found.quantities}
+            for name, left in (
+                ("without the effect", found.before),
+                (f"with {found.effect.name}", found.after),
+            )
         }
-        return Errors(rows, floor, found.floor.source)
+        return Errors(rows, found.fit)
 
     def lines(self) -> list[str]:
         """Return what a technician reads."""
         found = self.extension
         sentence = found.effect.law.sentence.format(place=found.effect.component)
         lines = [*used_lines(self.sessions, found.fit), ""]
-        lines += [*self.errors.lines(), *left_lines(self.errors, found.after)]
+        lines += [*self.errors.lines(), *left_lines(found.fit, found.judged_by)]
         lines += ["", f"{found.effect.name}: {sentence}"]
         usual = all(np.isfinite(parameter.scale) for parameter in found.effect.parameters)
         lines += told_lines(found.own, all_of_them=True, usual=usual)
@@ -244,7 +246,7 @@ class Extended:
         """Return what programs read, with units in the names."""
         found = self.extension
         return {
-            **fit_values(self.errors, found.after, self.sessions, found.fit),
+            **fit_values(self.errors, found.judged_by, self.sessions, found.fit),
             "buys": {key: list(gain) for key, gain in found.bought.items()},
             "effect": found.effect.law.id,
             "component": found.effect.component,

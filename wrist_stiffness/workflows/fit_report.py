@@ -8,25 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.judge import SEEN, THIS_SESSION, Judged
-from wrist_stiffness.campaign.fitting.result import Fit, FittedParameter
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.noise_floor import against_floor, is_at_floor, over_floor
+from wrist_stiffness.campaign.searching.held_out import ANOTHER_SESSION, THIS_SESSION
+from wrist_stiffness.campaign.searching.result import Fit, FittedParameter
 
 TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
 
 NOT_AT_THE_FLOOR = (
-    "not at the floor: an effect is missing ('wrist-stiffness diagnose' finds out which), or the "
-    "fit was caught where other flanges touch than on the wrist; then more poses and loads help"
+    "an effect is missing ('wrist-stiffness diagnose' finds out which), or the fit was caught "
+    "where other flanges touch than on the wrist; then more poses and loads help"
 )
 
-OR_WANDER = "or the instrument wanders slowly, which poses that are visited again would tell"
-
 JUDGED_BY = {
-    SEEN: "on the recordings of the fit; --hold-out judges by a part that the fit has not seen",
-    THIS_SESSION: "on the end of the session, which the fit has not seen; valid for this session "
-    "only",
-    "another session": "on the last session, which the fit has not seen",
+    THIS_SESSION: "on the end of the session, by a fit that has not seen it; valid for this "
+    "session only",
+    ANOTHER_SESSION: "on the last session, by a fit that has not seen it",
 }
 
 
@@ -38,32 +34,18 @@ class Errors:
     ----------
     rows : dict of str to dict
         Errors by what they are of.
-    floor : dict
-        What noise alone gives.
-    floor_source : str
-        Where that is known from.
+    fit : Fit
+        What noise alone gives, and what a model leaves above it.
     """
 
     rows: Mapping[str, Mapping[str, float]]
-    floor: Mapping[str, float]
-    floor_source: str
-
-    @property
-    def over_floor(self) -> float:
-        """Last error over the noise floor, the larger of the quantities'."""
-        return over_floor(list(self.rows.values())[-1], self.floor)
-
-    @property
-    def at_floor(self) -> bool:
-        """Whether no more than noise is left."""
-        return is_at_floor(self.over_floor, self.floor_source)
+    fit: Fit
 
     def lines(self) -> list[str]:
         """Return a table for people."""
-        keys = list(self.floor)
+        keys = list(self.fit.noise)
         out = [" " * 28 + "".join(f"{TITLES.get(key, key):>12}" for key in keys)]
-        noise = f"noise alone ({self.floor_source})"
-        for name, row in {**self.rows, noise: self.floor}.items():
+        for name, row in {**self.rows, "noise and drift alone": self.fit.noise}.items():
             out.append(f"{name:28}" + "".join(f"{row[key]:12.3f}" for key in keys))
         return out
 
@@ -73,7 +55,7 @@ class Errors:
             name: {f"rmse_{key}": value for key, value in row.items()}
             for name, row in zip(names, self.rows.values(), strict=True)
         }
-        return {"noise_floor": dict(self.floor), **rows}
+        return {"noise": dict(self.fit.noise), "discrepancy": dict(self.fit.discrepancy), **rows}
 
 
 def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
@@ -92,17 +74,17 @@ def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
     return lines
 
 
-def left_lines(errors: Errors, judged: Judged) -> list[str]:
-    """Tell how much is left, and how that was judged."""
-    ratio = errors.over_floor
-    lines = [
-        f"judged {JUDGED_BY[judged.by]}",
-        f"what is left is {against_floor(ratio, errors.floor_source)}",
-    ]
-    if not errors.at_floor:
-        wanders = f"; {OR_WANDER}" if errors.floor_source == "instrument" else ""
-        lines.append(f"{NOT_AT_THE_FLOOR}{wanders}")
-    return lines
+def left_lines(found: Fit, judged_by: str) -> list[str]:
+    """Tell how an error was judged, and how much more than noise is left."""
+    lines = [f"judged {JUDGED_BY[judged_by]}"]
+    if not found.rough:
+        return [*lines, "what is left is no more than the noise"]
+    above = " and ".join(
+        f"{found.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
+        for q in found.problem.table.reported
+        if found.discrepancy[q.key] > 0.0
+    )
+    return [*lines, f"left above the noise: {above}: {NOT_AT_THE_FLOOR}"]
 
 
 def told_lines(
@@ -189,18 +171,17 @@ def parameter_values(parameters: Iterable[FittedParameter]) -> list[dict[str, An
 
 
 def fit_values(
-    errors: Errors, judged: Judged, sessions: Iterable[MeasuredSession], found: Fit
+    errors: Errors, judged_by: str, sessions: Iterable[MeasuredSession], found: Fit
 ) -> dict[str, Any]:
     """Return what programs read of any fit, with units in the names."""
     return {
-        "schema": 1,
+        "schema": 2,
         **errors.as_values(("before", "after")),
-        "judged_by": judged.by,
+        "judged_by": judged_by,
         "sessions": [
             {"name": session.name, "remarks": list(session.remarks)} for session in sessions
         ],
         "lost": found.lost,
-        "misfit": found.misfit,
         "settled": found.arrived,
     }
 

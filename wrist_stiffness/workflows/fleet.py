@@ -1,4 +1,4 @@
-"""One function over many recordings, on the processors of this machine or of a Dask cluster.
+"""One function over many recordings or other items: processors of this machine, or Dask's.
 
 For a command that takes a folder of recordings, each of a wrist of its own::
 
@@ -25,16 +25,24 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from itertools import islice
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.progress import Progress, silent
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 CONNECT_S = 10.0
 
 NAME = "wrist_stiffness"
+
+
+class Answer(NamedTuple, Generic[Result]):
+    """What a function returned, None where it failed, and why it did, in one line."""
+
+    result: Result | None
+    error: str
 
 
 @dataclass(frozen=True)
@@ -139,45 +147,65 @@ def map_recordings(
     ModuleNotFoundError
         Without the extra `fleet`, where more than one recording is given or a scheduler.
     """
-    if len(paths) <= 1 and scheduler_address is None:
-        return [attempt(function, path) for path in paths]
+    answers = spread(function, paths, scheduler_address, workers, progress)
+    return [FleetRow(path, *answer) for path, answer in zip(paths, answers, strict=True)]
+
+
+def spread(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    scheduler_address: str | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> list[Answer[Result]]:
+    """Call a function of one item for each of many, as `map_recordings` does for paths.
+
+    A worker that dies loses nothing: what it had in hand goes to another one, up to three times.
+
+    Returns
+    -------
+    list of Answer
+        In the order of the items.
+    """
+    if len(items) <= 1 and scheduler_address is None:
+        return [attempt(function, item) for item in items]
     import cloudpickle
     from distributed import as_completed
 
-    rows: list[FleetRow[Result]] = [FleetRow(path, None) for path in paths]
+    answers: list[Answer[Result]] = [Answer(None, "") for _ in items]
     # As bytes: a worker that cannot load the function says so instead of dying over it.
     pickled = cloudpickle.dumps(function)
-    with _client(scheduler_address, workers or _processors(len(paths))) as client:
-        waiting = iter(range(len(paths)))
+    with _client(scheduler_address, workers or _processors(len(items))) as client:
+        waiting = iter(range(len(items)))
         number: dict[Any, int] = {}
 
         def submitted(count: int) -> list[Any]:
             new = {
-                client.submit(_answer, pickled, paths[i], pure=False): i
+                client.submit(_answer, pickled, items[i], pure=False): i
                 for i in islice(waiting, count)
             }
             number.update(new)
             return list(new)
 
-        # One recording for each thread at a time: a worker that dies over one takes no other along.
+        # One item for each thread at a time: a worker that dies over one takes no other along.
         running = as_completed(submitted(sum(client.nthreads().values())))
         for done, future in enumerate(running, 1):
             i = number.pop(future)
-            rows[i] = _row(paths[i], future)
-            progress(done, len(paths))
+            answers[i] = _answered(future)
+            progress(done, len(items))
             running.update(submitted(1))
-    return rows
+    return answers
 
 
-def attempt(function: Callable[[Path], Result], path: Path) -> FleetRow[Result]:
-    """Call a function of one recording; whatever goes wrong becomes the row's error."""
+def attempt(function: Callable[[Item], Result], item: Item) -> Answer[Result]:
+    """Call a function of one item; whatever goes wrong becomes the answer's error."""
     try:
-        return FleetRow(path, function(path))
+        return Answer(function(item), "")
     except WristError as error:
-        return FleetRow(path, None, " ".join(str(error).split()))
+        return Answer(None, " ".join(str(error).split()))
     except Exception as error:
         # A fault of one wrist's code path must not take the rest of the fleet's table with it.
-        return FleetRow(path, None, f"{type(error).__name__}: {' '.join(str(error).split())}")
+        return Answer(None, f"{type(error).__name__}: {' '.join(str(error).split())}")
 
 
 def _processors(most: int) -> int:
@@ -239,14 +267,13 @@ def _require_same_version(client: Any, scheduler_address: str) -> None:
         )
 
 
-def _answer(pickled: bytes, path: Path) -> FleetRow[Any]:
-    return attempt(lambda one: pickle.loads(pickled)(one), path)
+def _answer(pickled: bytes, item: Any) -> Answer[Any]:
+    return attempt(lambda one: pickle.loads(pickled)(one), item)
 
 
-def _row(path: Path, future: Any) -> FleetRow[Any]:
-    """Return what a worker answered; one that died took the recording's row with it."""
+def _answered(future: Any) -> Answer[Any]:
+    """Return what a worker answered; one item that workers die over is its error."""
     if future.status == "finished":
-        row: FleetRow[Any] = future.result()
-        return row
-    reason = " ".join(str(future.exception()).split())
-    return FleetRow(path, None, f"the worker died: {reason}")
+        answer: Answer[Any] = future.result()
+        return answer
+    return Answer(None, f"the worker died: {' '.join(str(future.exception()).split())}")

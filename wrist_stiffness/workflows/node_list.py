@@ -65,6 +65,7 @@ LAUNCH_ARGUMENTS = {
     "model_file": ("", "model of all nodes; empty for that of the parameters, or the shipped one"),
     "params_file": ("", "ROS 2 parameter file for all nodes"),
     "namespace": ("", "of the nodes and their topics, so that wrists live side by side"),
+    "frame_prefix": ("", "before the names of frames; empty for NAMESPACE/ where there is one"),
     "use_sim_time": ("false", "take the time from /clock"),
     "respawn": ("false", "start a node again that ended"),
     "cell": ("false", "start the virtual wrist as well"),

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.calibrate import CALIBRATED
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.campaign.refitted import BUILT, SET_UP
+from wrist_stiffness.campaign.searching.calibrate import CALIBRATED
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.model.contribution import LEFT_OUT
 from wrist_stiffness.model.error_model import ErrorModel

@@ -57,11 +57,13 @@ from wrist_stiffness.topics import (
     POSE_ERROR_S_UM,
     TEMPERATURES,
     TF_STATIC,
+    WRIST_MARKERS,
 )
 from wrist_stiffness.workflows.parameter_file import node_settings
 from wrist_stiffness.workflows.replay_block import BlockReplay
 from wrist_stiffness.workflows.replay_summary import MICROMETRES, MILLIDEGREES, ReplaySummary
 from wrist_stiffness.workflows.signals_ahead import SignalsAhead
+from wrist_stiffness.workflows.wrist_drawing import Drawings
 
 OUTPUTS = (
     POSE_ERROR_PREDICTED,
@@ -72,8 +74,9 @@ OUTPUTS = (
     MOTOR_TRAJECTORY_CORRECTED,
 )
 
-LEFT_OUT = frozenset({*OUTPUTS, POSE_ERROR_S_UM, POSE_ERROR_PHI_MDEG})
-"""What an earlier run left in the input; s and phi follow from the pose and need no comparing."""
+LEFT_OUT = frozenset({*OUTPUTS, POSE_ERROR_S_UM, POSE_ERROR_PHI_MDEG, WRIST_MARKERS})
+"""What an earlier run left in the input; s, phi and the drawing follow from the pose and need no
+comparing."""
 
 TYPES: dict[str, type[Message]] = {
     JOINT_STATES: JointState,
@@ -141,7 +144,10 @@ def replay(
     ahead = SignalsAhead(source, signals, (predicting, correcting), summary.refuse)
     total = sum(topic.count for topic in source.topics)
     with RecordingWriter(output, overwrite=overwrite) as writer:
-        blocks = BlockReplay(writer, predicting, correcting, ahead, sampled, LEFT_OUT, summary)
+        drawings = Drawings(error_model.table.geometry, prediction)
+        blocks = BlockReplay(
+            writer, predicting, correcting, ahead, sampled, LEFT_OUT, drawings, summary
+        )
         done = 0
         for block in source.blocks():
             progress(done, total)
@@ -158,7 +164,8 @@ def replay(
                     continue
                 ahead.read_for(raw.log_time_ns)
                 try:
-                    for name, message in _answers(standard, raw, predicting, correcting, summary):
+                    answers = _answers(standard, raw, predicting, correcting, drawings, summary)
+                    for name, message in answers:
                         writer.write(name, message, raw.log_time_ns)
                 except WristError as error:
                     summary.refuse(raw.channel.topic, error)
@@ -178,6 +185,7 @@ def _answers(
     raw: RawMessage,
     predicting: PredictionStream,
     correcting: CorrectionStream,
+    drawings: Drawings,
     summary: ReplaySummary,
 ) -> Iterator[tuple[str, Message]]:
     if standard == MOTOR_TRAJECTORY:
@@ -186,7 +194,7 @@ def _answers(
     state = decode(JointState, raw.payload)
     if standard == MOTOR_COMMANDS:
         return _correct(state, correcting, summary)
-    return _predict(state, predicting, summary)
+    return _predict(state, predicting, drawings, summary)
 
 
 def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str]:
@@ -220,7 +228,10 @@ def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str
 
 
 def _predict(
-    state: JointState, predicting: PredictionStream, summary: ReplaySummary
+    state: JointState,
+    predicting: PredictionStream,
+    drawings: Drawings,
+    summary: ReplaySummary,
 ) -> Iterator[tuple[str, Message]]:
     summary.joint_states += 1
     sample = predicting.on_joint_state(
@@ -238,6 +249,9 @@ def _predict(
         (POSE_ERROR_PHI_MDEG, MILLIDEGREES * prediction.twist[3:]),
     ):
         yield topic, Vector3Stamped(header, Vector3(*vector.tolist()))
+    if drawings.take(state.header.stamp_ns):
+        drawn = drawings.message(state.header.stamp_ns, prediction.configuration, prediction.twist)
+        yield WRIST_MARKERS, drawn
 
 
 def _correct(

@@ -7,7 +7,7 @@ payload of another layout) goes message by message.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.pose import pose_of_twist
-from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.stream import PredictedBlock, PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.chunk_writer import Messages
 from wrist_stiffness.recording.fixed_layout import FixedLayout
@@ -27,6 +29,7 @@ from wrist_stiffness.recording.messages import (
     Float64MultiArray,
     Header,
     JointState,
+    MarkerArray,
     Message,
     PoseWithCovarianceStamped,
     Vector3Stamped,
@@ -46,6 +49,7 @@ from wrist_stiffness.topics import (
     POSE_ERROR_RESIDUAL,
     POSE_ERROR_RESIDUAL_TASK,
     POSE_ERROR_S_UM,
+    WRIST_MARKERS,
 )
 from wrist_stiffness.workflows.replay_summary import (
     MICROMETRES,
@@ -53,6 +57,7 @@ from wrist_stiffness.workflows.replay_summary import (
     ReplaySummary,
 )
 from wrist_stiffness.workflows.signals_ahead import SignalsAhead
+from wrist_stiffness.workflows.wrist_drawing import Drawings
 
 ROOM = 8
 """Places for a message and its answers, so that each answer follows its message."""
@@ -96,6 +101,8 @@ class BlockReplay:
         Standard by actual name of the topics that are answered.
     left_out : collection of str
         Topics of an earlier run.
+    drawings : Drawings
+        Draws some of the samples.
     summary : ReplaySummary
         Counts.
     """
@@ -108,6 +115,7 @@ class BlockReplay:
         ahead: SignalsAhead,
         sampled: Mapping[str, str],
         left_out: frozenset[str],
+        drawings: Drawings,
         summary: ReplaySummary,
     ) -> None:
         self._writer = writer
@@ -116,6 +124,7 @@ class BlockReplay:
         self._ahead = ahead
         self._sampled = sampled
         self._left_out = left_out
+        self._drawings = drawings
         self._summary = summary
 
     def answer(self, block: RawBlock) -> bool:
@@ -213,6 +222,25 @@ class BlockReplay:
         ):
             rows = VECTOR.rows(joints.stamps[known], *vectors.T)
             self._add(out, topic, Vector3Stamped, rank, *answers, rows)
+        self._draw(joints, predicted, known, out)
+
+    def _draw(
+        self, joints: _Joints, predicted: PredictedBlock, known: Integers, out: Messages
+    ) -> None:
+        drawings, stamps = self._drawings, joints.stamps.tolist()
+        drawn = [place for place in known.tolist() if drawings.take(stamps[place])]
+        payloads = [
+            encode(
+                drawings.message(
+                    stamps[place],
+                    Configuration.of_row(predicted.configuration[place]),
+                    predicted.twist[place],
+                )
+            )
+            for place in drawn
+        ]
+        rows, times = joints.rows[drawn], joints.time_ns[drawn]
+        self._add(out, WRIST_MARKERS, MarkerArray, 4, rows, times, payloads)
 
     def _correct(self, joints: _Joints, out: Messages) -> None:
         summary, correcting = self._summary, self._correcting
@@ -242,7 +270,7 @@ class BlockReplay:
         own = np.flatnonzero(block.corrected)
         answers = joints.rows[own], joints.time_ns[own]
         topics = (POSE_ERROR_RESIDUAL, POSE_ERROR_RESIDUAL_TASK)
-        residuals = correcting.block_residuals(block)
+        residuals = correcting.residuals(block)
         for rank, (topic, residual) in enumerate(zip(topics, residuals, strict=False), start=3):
             rows = _pose_rows(joints.stamps[own], *residual)
             self._add(out, topic, PoseWithCovarianceStamped, rank, *answers, rows)
@@ -255,7 +283,7 @@ class BlockReplay:
         rank: int,
         rows: Integers,
         time_ns: Integers,
-        payloads: NDArray[np.uint8],
+        payloads: NDArray[np.uint8] | Sequence[bytes],
     ) -> None:
         if len(rows):
             number = self._writer.channel_id(channel_of(topic, kind))

@@ -51,7 +51,7 @@ def build(
     evaluation : str
         What the nodes shall use, `closed_form` or `spline`.
     interface : str
-        `rigid` or `distributing` walls.
+        `rigid`, `distributing` or `sliding` walls.
     tolerance : float
         Largest relative interpolation error in the operative workspace.
     per_axis : int or None
@@ -225,9 +225,16 @@ def facts(table: Table) -> Iterable[tuple[str, str]]:
         f"s {100 * errors['mesh']['s']:.2f} %, phi {100 * errors['mesh']['phi']:.2f} % "
         "(extrapolated from three meshes)",
     )
+    if errors.get("walls"):
+        walls = errors["walls"]
+        yield (
+            "wall error",
+            f"s {100 * walls['s']:.0f} %, phi {100 * walls['phi']:.0f} % "
+            "(walls that lift off against two-sided ones)",
+        )
     for region in ("operative", "domain"):
         worst = errors["predicted"][region]
         yield (
             f"spline error, {region}",
-            f"s {100 * worst['s']:.3f} %, phi {100 * worst['phi']:.3f} % at unseen poses",
+            f"s {100 * worst['s']:.3f} %, phi {100 * worst['phi']:.3f} % at 99 of 100 unseen poses",
         )

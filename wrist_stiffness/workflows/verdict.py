@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
+from wrist_stiffness.campaign.comparing.sentences import percent
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.model.registry import find_law
-
-
-def percent(share: float) -> str:
-    """Return a probability or share with as many digits as it needs: 7 %, 99 %, 99.9 %."""
-    value = 100.0 * share
-    if value > 99.0:
-        # Not rounded up: nothing is certain.
-        return "over 99.9 %" if value > 99.9 else f"{value:.1f} %"
-    return f"{value:.0f} %" if value >= 1.0 else "under 1 %"
 
 
 def verdict_lines(result: Diagnosis) -> list[str]:

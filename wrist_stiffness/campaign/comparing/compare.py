@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison, sizes
-from wrist_stiffness.campaign.comparing.headroom import held_out_process
-from wrist_stiffness.campaign.comparing.sentences import tell
-from wrist_stiffness.campaign.comparing.set_up import without_set_up
+from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.campaign.comparing.explained import Explained, explain
+from wrist_stiffness.campaign.comparing.set_up import FREE, without_set_up
 from wrist_stiffness.campaign.comparing.wiring import (
     MISTAKES,
     Mistake,
@@ -17,24 +16,22 @@ from wrist_stiffness.campaign.comparing.wiring import (
     suspected,
     told_mistake,
 )
-from wrist_stiffness.campaign.fitting.calibrate import said_calibrated
 from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.noise_floor import by_side, noise_floor, repeatability
 from wrist_stiffness.campaign.observing import Observed
+from wrist_stiffness.campaign.repeatability import by_side, repeatability
+from wrist_stiffness.campaign.searching.calibrate import said_calibrated
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 
-Prepared = tuple[Observed, Observations, tuple[str, ...]]
+Prepared = tuple[Observed, Explained, tuple[str, ...]]
 
 
 def compare_models(
     models: Sequence[tuple[str, ErrorModel]],
     sessions: Sequence[MeasuredSession],
-    rng: np.random.Generator,
     progress: Progress = silent,
 ) -> Comparison:
     """Say how far models are off from measured sessions, where and under which condition.
@@ -45,8 +42,6 @@ def compare_models(
         Name of each for the report, and the model; all of one wrist.
     sessions : sequence of MeasuredSession
         In the order of time.
-    rng : numpy.random.Generator
-        For what chance gives.
     progress : callable, optional
         Told steps done and in all.
 
@@ -60,45 +55,34 @@ def compare_models(
     InputError
         If there is too little to compare, or the models are not of one wrist.
     """
-    steps = 2 * len(models) + 2
+    steps = len(models) + 1
     progress(0, steps)
     first = models[0][1]
     cuts = tuple(as_units(first, session) for session in sessions)
     calibrated = said_calibrated(sessions)
-    tables: list[Prepared] = []
-    for number, (name, model) in enumerate(models):
+    compared = []
+    for name, model in models:
         if not _same_wrist(model, first):
             raise InputError(
                 f"model {name} is of another wrist than {models[0][0]}: its axes differ"
             )
-        tables.append(_prepared(model, sessions, cuts, calibrated))
-        progress(number + 1, steps)
-    left = tables[0][1].with_values(held_out_process(tables[0][1], rng))
-    floor = noise_floor(left)
-    best, (observed, refitted, _) = models[-1][1], tables[-1]
-    suspicion = suspected(best, observed, calibrated, refitted, floor.rms(refitted))
-    progress(len(models) + 1, steps)
-    compared = []
-    for (name, _), (observed, refitted, absorbed) in zip(models, tables, strict=True):
-        told = tell(refitted, floor, rng)
-        compared.append(ComparedModel(name, observed.observations, refitted, absorbed, told))
-        progress(len(models) + 1 + len(compared), steps)
+        observed, left, absorbed = _prepared(model, sessions, cuts, calibrated)
+        compared.append(ComparedModel(name, observed.observations, left, absorbed))
+        progress(len(compared), steps)
+    suspicion = suspected(model, observed, calibrated, left.observations, left.noise)
+    progress(steps, steps)
+    table = compared[0].refitted
     return Comparison(
         tuple(each.name for each in cuts),
         tuple(compared),
-        floor,
-        repeatability(tables[0][1]),
-        repeatability(by_side(tables[0][1])),
-        {key: size.rms for key, size in sizes(left).items()},
+        repeatability(table),
+        repeatability(by_side(table)),
         told_mistake(suspicion),
     )
 
 
 def suspicion_in(
-    model: ErrorModel,
-    sessions: Sequence[MeasuredSession],
-    rng: np.random.Generator,
-    mistakes: Sequence[Mistake] = MISTAKES,
+    model: ErrorModel, sessions: Sequence[MeasuredSession], mistakes: Sequence[Mistake] = MISTAKES
 ) -> Suspicion | None:
     """Return the mistake of signs, units or names that explains most of an error; None for none.
 
@@ -108,8 +92,6 @@ def suspicion_in(
         With which the sessions are compared.
     sessions : sequence of MeasuredSession
         In the order of time.
-    rng : numpy.random.Generator
-        For the noise floor.
     mistakes : sequence of Mistake, optional
         Those that are tried.
 
@@ -120,9 +102,8 @@ def suspicion_in(
     """
     cuts = tuple(as_units(model, session) for session in sessions)
     calibrated = said_calibrated(sessions)
-    observed, refitted, _ = _prepared(model, sessions, cuts, calibrated)
-    floor = noise_floor(refitted.with_values(held_out_process(refitted, rng)))
-    return suspected(model, observed, calibrated, refitted, floor.rms(refitted), mistakes)
+    observed, left, _ = _prepared(model, sessions, cuts, calibrated)
+    return suspected(model, observed, calibrated, left.observations, left.noise, mistakes)
 
 
 def _prepared(
@@ -141,7 +122,17 @@ def _prepared(
             f"{names}: {refitted.n_units} dwells and moments are too few to compare with, it needs "
             f"{FEWEST_UNITS}{why}"
         )
-    return observed, refitted, tuple(each.sentence for each in set_ups)
+    used = np.concatenate([each.measured for each in cuts])
+    columns = np.concatenate(
+        [
+            np.pad(each.columns, ((0, 0), (0, 0), (n * FREE, (len(cuts) - 1 - n) * FREE)))
+            for n, each in enumerate(set_ups)
+        ]
+    )[used]
+    z = np.concatenate([each.moved for each in set_ups])
+    weights = np.concatenate([each.weights for each in set_ups])[used]
+    left = explain(refitted, cuts, columns, z, weights)
+    return observed, left, tuple(each.sentence for each in set_ups)
 
 
 def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparing.sentences import Told
-from wrist_stiffness.campaign.noise_floor import NoiseFloor, against_floor, over_floor
+from wrist_stiffness.campaign.comparing.explained import Explained
+from wrist_stiffness.campaign.comparing.sentences import as_values, percent
 from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.inference.blocks import time_blocks
 from wrist_stiffness.mechanism.components import Array
@@ -79,19 +79,22 @@ class ComparedModel:
         Of the model.
     raw : Observations
         Residual as it stands, with the registrations that the model has.
-    refitted : Observations
-        Residual after registrations, zeros and tare of every session were fitted again.
+    explained : Explained
+        Residual after registrations, zeros and tare of every session were fitted again, and on what
+        it depends.
     absorbed : tuple of str
         What those took up.
-    told : Told
-        On what the refitted residual depends.
     """
 
     name: str
     raw: Observations
-    refitted: Observations
+    explained: Explained
     absorbed: tuple[str, ...]
-    told: Told
+
+    @property
+    def refitted(self) -> Observations:
+        """Residual after registrations, zeros and tare were fitted again."""
+        return self.explained.observations
 
     @cached_property
     def before(self) -> dict[str, Size]:
@@ -114,29 +117,28 @@ class Comparison:
         Names, in the order of time.
     models : tuple of ComparedModel
         In the order in which they were named.
-    noise : NoiseFloor
-        Scatter of the units.
     repeated, repeated_by_side : dict of str to float
         Repeatability of the measured pose from any side, and from the same side; empty where no
         dwell was repeated.
-    process : dict of str to float
-        What a Gaussian process over the conditions leaves of the first model's error.
     mistake : str
         A sentence on a sign, unit or name that may be wrong in the recordings; empty for none.
     """
 
     sessions: tuple[str, ...]
     models: tuple[ComparedModel, ...]
-    noise: NoiseFloor
     repeated: dict[str, float]
     repeated_by_side: dict[str, float]
-    process: dict[str, float]
     mistake: str = ""
 
-    @cached_property
-    def floor(self) -> dict[str, float]:
-        """What noise alone gives each quantity."""
-        return self.noise.rms(self.models[0].refitted)
+    @property
+    def noise(self) -> dict[str, float]:
+        """Instrument noise of each quantity, as what the last model leaves tells it."""
+        return self.models[-1].explained.noise
+
+    @property
+    def reachable(self) -> dict[str, float]:
+        """What the laws of the conditions leave of the first model's error, on unseen stretches."""
+        return self.models[0].explained.reachable
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -146,31 +148,42 @@ class Comparison:
     def headroom(self, model: ComparedModel, key: str) -> float | None:
         """Share of what could be explained that a model explains; None where nothing could.
 
-        (before - after) / (before - Gaussian process), before being the first model.
+        (before - after) / (before - reachable), before being the first model.
         """
         before = self.models[0].after[key]
-        possible = before.rms - self.process[key]
+        possible = before.rms - self.reachable[key]
         if possible <= 2.0 * before.uncertainty:
             return None
         return (before.rms - model.after[key].rms) / possible
 
-    def over_floor(self, model: ComparedModel) -> float:
-        """Error of a model over the noise floor, the larger of the quantities'."""
-        return over_floor({q.key: model.after[q.key].rms for q in self.quantities}, self.floor)
+    def over_noise(self, model: ComparedModel) -> float:
+        """Error of a model over the instrument's noise, the larger of the quantities'."""
+        over = [model.after[key].rms / max(size, 1e-12) for key, size in self.noise.items()]
+        return max(over)
 
     @property
     def verdict(self) -> tuple[str, ...]:
         """The answer in a few sentences."""
-        lines = []
-        for model in self.models:
-            parts = [f"{model.after[q.key].rms:.3g} {q.unit} of {q.name}" for q in self.quantities]
-            means = against_floor(self.over_floor(model), self.noise.source)
-            lines.append(f"{model.name} is off by {' and '.join(parts)} (RMS): {means}.")
+        lines = [
+            f"{each.name} is off by {self._sizes(each.explained.error)} (RMS): "
+            f"{self._means(each.explained)}."
+            for each in self.models
+        ]
         if len(self.models) > 1:
             lines += [self._fall(q) for q in self.quantities]
         if self.mistake:
             lines.append(self.mistake)
         return tuple(lines)
+
+    def _sizes(self, rms: dict[str, float]) -> str:
+        return " and ".join(f"{rms[q.key]:.3g} {q.unit} of {q.name}" for q in self.quantities)
+
+    def _means(self, found: Explained) -> str:
+        state = found.answer.state
+        if not (state.discrepant.any() or state.misfit):
+            sure = percent(found.answer.nothing)
+            return f"noise and drift of the instrument, no more ({sure} sure)"
+        return f"{self._sizes(found.above)} are above noise and drift of the instrument"
 
     def _fall(self, quantity: Quantity) -> str:
         first, last = self.models[0], self.models[-1]
@@ -182,26 +195,26 @@ class Comparison:
         text = f"From {first.name} to {last.name} {quantity.name} {moves} {quantity.unit}"
         share = self.headroom(last, quantity.key)
         if share is None:
-            left = f"{self.process[quantity.key]:.3g} {quantity.unit}"
-            return f"{text} (a curve over the conditions alone reaches {left})."
+            left = f"{self.reachable[quantity.key]:.3g} {quantity.unit}"
+            return f"{text} (laws of the conditions alone reach {left})."
         if share >= 1.0:
-            # A process over the conditions of a moment knows nothing of where the wrist came from.
+            # Laws of the conditions of a moment know nothing of where the wrist came from.
             return f"{text}: all that the conditions could explain."
         return f"{text}: {100.0 * share:.0f} % of what the conditions could explain."
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""
         return {
-            "schema": 1,
+            "schema": 2,
             "sessions": list(self.sessions),
             "verdict": list(self.verdict),
             "units": self.models[0].refitted.n_units,
-            "noise_floor": {**self.floor, "source": self.noise.source},
+            "instrument_noise": self.noise,
             "repeatability": {
                 "from_any_side": self.repeated,
                 "from_the_same_side": self.repeated_by_side,
             },
-            "gaussian_process": self.process,
+            "reachable": self.reachable,
             "models": [self._model_values(model) for model in self.models],
         }
 
@@ -212,5 +225,5 @@ class Comparison:
             "after_registration": {k: size.as_values() for k, size in model.after.items()},
             "absorbed": list(model.absorbed),
             "explained_headroom": {q.key: self.headroom(model, q.key) for q in self.quantities},
-            **model.told.as_values(),
+            **as_values(model.explained),
         }

@@ -36,6 +36,9 @@ PLAUSIBLE = np.concatenate(
 """Standard deviations of the priors [m, rad, N, N m]: directions that the units hardly tell
 apart stay small by them."""
 
+FREE = len(PLAUSIBLE)
+"""Numbers of one session's set-up."""
+
 ROUNDS = 4
 
 REACH = 4.0
@@ -65,11 +68,22 @@ class SetUp:
         [m, rad, rad, N, N m].
     residual : (u, 6) float
         What it leaves of all units of the session [m, rad].
+    columns : (u, 6, 20) float
+        Change of that by one `PLAUSIBLE` of each; 0 for what stays.
+    weights : (u, 6) float
+        What the squares of that counted in the fit, where the priors count 1; 0 where not measured.
     """
 
     session: str
     values: Array
     residual: Array
+    columns: Array
+    weights: Array
+
+    @property
+    def moved(self) -> Array:
+        """Where it stands, in standard deviations of the priors, (20,)."""
+        return self.values / PLAUSIBLE
 
     @property
     def sentence(self) -> str:
@@ -178,8 +192,8 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
         twist = log_motion(error @ np.swapaxes(home.platform, -1, -2), shift + bow[:, :3])
         return session.residual(twist), turn, shift
 
-    for _ in range(ROUNDS):
-        residual, turn, shift = left()
+    def slopes(turn: Array, shift: Array) -> Array:
+        """Change of the prediction by each unknown, in its `PLAUSIBLE`; 0 for what stays."""
         columns = np.zeros((len(theta), 6, len(PLAUSIBLE)))
         columns[:, :, :6] = np.eye(6)
         columns[:, :3, 6:9] = columns[:, 3:, 9:12] = turn
@@ -191,15 +205,19 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
         lever[:, :, 12:] -= instrument[1][:, None]
         carried = np.cross(columns[:, 3:], lever, axis=1)
         columns[:, :3] += np.where(pointed[:, None, None], 0.0, carried)
-        step = np.zeros(len(PLAUSIBLE))
-        scale = PLAUSIBLE[free]
-        step[free] = scale * _solved(columns[:, :, free] * scale, residual, taken[free] / scale)
+        return columns * np.where(free, PLAUSIBLE, 0.0)
+
+    for _ in range(ROUNDS):
+        residual, turn, shift = left()
+        moved, weights = _solved(slopes(turn, shift), residual, taken / PLAUSIBLE)
+        step = PLAUSIBLE * moved
         taken += step
         instrument = _composed(exp_twist(step[:6]), instrument)
         target = _composed(target, exp_twist(step[6:12]))
         zero, tare = zero + step[12:14], tare + step[14:]
     values = np.concatenate([log_motion(*instrument), log_motion(*target), zero, tare])
-    return SetUp(session.name, values, left()[0])
+    residual, turn, shift = left()
+    return SetUp(session.name, values, residual, -slopes(turn, shift), weights)
 
 
 def _bow(
@@ -240,8 +258,8 @@ def _softness(model: ErrorModel, session: UnitSession, theta: Array) -> Array:
     return np.nan_to_num((twist[:, :, 1:] - twist[:, :, :1]) / step[:, None])
 
 
-def _solved(columns: Array, residual: Array, taken: Array) -> Array:
-    """Least squares that lost beams do not pull, with a prior of unit scatter, (p,).
+def _solved(columns: Array, residual: Array, taken: Array) -> tuple[Array, Array]:
+    """Least squares that lost beams do not pull, with a prior of unit scatter: (p,), and weights.
 
     Parameters
     ----------
@@ -267,4 +285,4 @@ def _solved(columns: Array, residual: Array, taken: Array) -> Array:
         white = (factor[:, :, None] * rows).reshape(-1, columns.shape[2])
         moment = white.T @ (factor * values).reshape(-1) - taken
         parameters = np.linalg.solve(white.T @ white + np.eye(len(moment)), moment)
-    return np.asarray(parameters)
+    return np.asarray(parameters), np.where(known, factor**2, 0.0)

@@ -26,7 +26,7 @@ LOOK_FIRST = "Look at the set-up first"
 """How the sentence begins that tells a mistake."""
 
 WORTH_ASKING = 2.0
-"""Error over the noise floor from which a mistake is looked for."""
+"""Error over the instrument's noise from which a mistake is looked for."""
 
 CLEAR = 0.5
 """A mistake is told if s or phi without it is less than this share of what it is with it."""
@@ -149,7 +149,7 @@ def suspected(
     observed: Observed,
     calibrated: Sequence[str],
     left: Observations,
-    floor: dict[str, float],
+    noise: dict[str, float],
     mistakes: Sequence[Mistake] = MISTAKES,
 ) -> Suspicion | None:
     """Return the mistake that explains most of the error, None if none explains any of it.
@@ -164,13 +164,13 @@ def suspected(
         Effects of the set-up that are not refitted.
     left : Observations
         Residuals of the units after the refit.
-    floor : dict of str to float
-        Noise floor by the key of the quantity.
+    noise : dict of str to float
+        Of the instrument, by the key of the quantity.
     mistakes : sequence of Mistake, optional
         Those that are tried.
     """
     before = {key: size.rms for key, size in sizes(left).items()}
-    over = _over(before, floor)
+    over = _over(before, noise)
     if max(over.values(), default=0.0) < WORTH_ASKING:
         return None
     best = None
@@ -178,7 +178,7 @@ def suspected(
         after = _without(mistake, model, observed, calibrated)
         if any(after[key] > LARGER * before[key] for key in after):
             continue
-        over_after = _over(after, floor, mistake.shift_factor)
+        over_after = _over(after, noise, mistake.shift_factor)
         share = _share(over, over_after)
         if share < (best.share if best else HINTED):
             fall = " and ".join(

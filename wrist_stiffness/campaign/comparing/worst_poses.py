@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import lengths
-from wrist_stiffness.campaign.comparing.conditions import FORCES, MOMENTS
+from wrist_stiffness.campaign.searching.questions import LOAD
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.mechanism.components import Array
 
@@ -56,15 +56,15 @@ class WorstPose:
 
 
 def worst_poses(
-    observations: Observations, floor: dict[str, float], sessions: Sequence[str], most: int = 8
+    observations: Observations, noise: dict[str, float], sessions: Sequence[str], most: int = 8
 ) -> tuple[WorstPose, ...]:
-    """Return the units with the largest errors against the noise floor, worst first.
+    """Return the units with the largest errors against the noise, worst first.
 
     Parameters
     ----------
     observations : Observations
         Residuals with the covariates of `observing.observe`.
-    floor : dict of str to float
+    noise : dict of str to float
         What noise alone gives each quantity.
     sessions : sequence of str
         Names.
@@ -72,10 +72,10 @@ def worst_poses(
         How many at most.
     """
     errors = {q.key: lengths(observations, q) for q in observations.reported}
-    relative = [np.nan_to_num(error) / (floor[key] or np.inf) for key, error in errors.items()]
+    relative = [np.nan_to_num(error) / (noise[key] or np.inf) for key, error in errors.items()]
     size = np.sqrt(np.sum(np.square(relative), axis=0))
     theta = np.stack([observations.covariate(f"theta_{motor}") for motor in (1, 2)], axis=1)
-    load = np.stack([observations.covariate(name) for name in (*FORCES, *MOMENTS)], axis=1)
+    load = np.stack([observations.covariate(name) for name in LOAD], axis=1)
     chosen: list[int] = []
     for unit in np.argsort(-size).tolist():
         moment = np.abs(observations.times[chosen] - observations.times[unit]) < APART_S

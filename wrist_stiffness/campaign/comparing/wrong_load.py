@@ -9,27 +9,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from wrist_stiffness.campaign.comparing.compare import suspicion_in
-from wrist_stiffness.campaign.comparing.set_up import INDEPENDENT
-from wrist_stiffness.campaign.comparing.wiring import CLEAR, LOAD_MISTAKES
-from wrist_stiffness.campaign.fitting.calibrate import Calibration, calibrate
-from wrist_stiffness.campaign.fitting.free_effects import answering_as
-from wrist_stiffness.campaign.fitting.result import FittedParameter
+from wrist_stiffness.campaign.comparing.wiring import LOAD_MISTAKES
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import ANSWERS_LOAD
+from wrist_stiffness.campaign.searching.calibrate import Calibration, calibrate
+from wrist_stiffness.campaign.searching.free_effects import answering_as
+from wrist_stiffness.campaign.searching.result import FittedParameter
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
+
+VERY_STRONG = 5.0
+"""Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
+"""
 
 
 def wrong_load(
     model: ErrorModel,
     fitted: ErrorModel,
     sessions: Sequence[MeasuredSession],
-    rng: np.random.Generator,
     found: Calibration | None = None,
-    hold_out: bool = False,
     progress: Progress = silent,
 ) -> str:
     """Return the mistake that a fit hides, in a sentence for a technician; empty for none.
@@ -42,12 +41,8 @@ def wrong_load(
         After it.
     sessions : sequence of MeasuredSession
         To which it was fitted, in the order of time.
-    rng : numpy.random.Generator
-        For the noise floor.
     found : Calibration, optional
         The fit, if it was one; else it is made.
-    hold_out : bool
-        Whether it was judged by a part that it has not seen: then the other one is, too.
     progress : callable, optional
         Told steps of the fit without the mistake, done and at most.
 
@@ -56,17 +51,17 @@ def wrong_load(
     InputError
         If there is too little to compare.
     """
-    suspicion = suspicion_in(answering_as(model, fitted), sessions, rng, LOAD_MISTAKES)
+    suspicion = suspicion_in(answering_as(model, fitted), sessions, LOAD_MISTAKES)
     if suspicion is None:
         return ""
-    before = found or calibrate(model, sessions, hold_out)
+    before = found or calibrate(model, sessions)
     right = tuple(suspicion.mistake.measured_right(session) for session in sessions)
-    after = calibrate(model, right, hold_out, progress)
-    if _cost(after) >= CLEAR * _cost(before):
+    after = calibrate(model, right, progress)
+    if _gain(before, after) < VERY_STRONG:
         return ""
     left = " and ".join(
         f"{after.after[q.key]:.3g} {q.unit} of {q.name}, not {before.after[q.key]:.3g},"
-        for q in before.judged.observations.reported
+        for q in before.fit.problem.table.reported
     )
     return suspicion.told(f"a fit leaves {left} and parts nearer to their drawing")
 
@@ -81,10 +76,9 @@ def doubts_load(found: Calibration) -> bool:
     return any(each.far or each.at_bound for each in found.parameters if answers_load(each))
 
 
-def _cost(found: Calibration) -> float:
-    """Return what a fit leaves beyond noise, and how far parts went so that it is no more."""
-    floor = found.floor.rms(found.judged.observations)
-    over = [found.after[key] / level for key, level in floor.items() if level > 0.0]
-    beyond = max(max(over, default=1.0) ** 2 - 1.0, 0.0)
-    strain = sum(each.moved**2 for each in found.parameters if answers_load(each))
-    return INDEPENDENT * beyond + strain
+def _gain(before: Calibration, after: Calibration) -> float:
+    """Return the gain of log evidence; under another load other units may lie in the range."""
+    found = [each.fit.fit.evidence for each in (before, after)]
+    counts = [len(each.point.left) for each in found]
+    first, second = (each.log / count for each, count in zip(found, counts, strict=True))
+    return (second - first) * min(counts)

@@ -9,6 +9,7 @@ import numpy as np
 
 from wrist_stiffness.campaign.planning.information import MeasurementNoise
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.answer import SCHEMA
 from wrist_stiffness.inputs.document import Node, read_json
 from wrist_stiffness.inputs.schema import (
     Quantity,
@@ -24,8 +25,6 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 
-SCHEMA = 1
-
 LEAST_WHITE = 0.25
 """Share of a rotation's floor that is no hidden encoder count, at least."""
 
@@ -37,7 +36,8 @@ class Rivals:
     Parameters
     ----------
     classes : tuple of tuples of Effect
-        Effects that its recordings could not tell apart, best first and with the values found.
+        Effects that its recordings could not tell apart, best first and with the values found: of
+        what was named, and of what was not sure enough.
     silent : tuple of Effect
         What its recordings could not have shown.
     floor : (2,) float
@@ -78,9 +78,9 @@ def read_rivals(path: str | Path) -> Rivals:
         If the file cannot be read, a key is missing or wrong, or an effect is not of the catalogue.
     """
     found = DIAGNOSIS(read_json(path, InputError))
-    floor, silent = found["noise_floor"], found["not_excited"]
+    floor, silent = found["noise"], found["not_excited"]
     return Rivals(
-        tuple(found["findings"]),
+        (*found["findings"], *found["suspects"]),
         tuple({effect.name: effect for effect in silent}.values()),
         (floor["s"], floor["phi"]),
     )
@@ -112,10 +112,11 @@ def _members(node: Node) -> tuple[Effect, ...]:
 DIAGNOSIS = record(
     {
         "schema": version(SCHEMA),
-        "noise_floor": record(
+        "noise": record(
             dict.fromkeys(("s_um", "phi_mdeg"), Quantity(number(above=0.0))), others=True
         ),
         "findings": list_of(_members),
+        "suspects": list_of(_members),
         "not_excited": list_of(_effect),
     },
     others=True,

@@ -16,14 +16,19 @@ from scipy.linalg import lstsq
 from scipy.special import chdtri
 
 from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.fitting.free_effects import (
+from wrist_stiffness.campaign.searching.free_effects import (
     FreeEffect,
     commissioning,
     within_tolerances,
 )
-from wrist_stiffness.campaign.searching.base_problem import BaseProblem
+from wrist_stiffness.campaign.searching.parts import parted
+from wrist_stiffness.campaign.searching.problem import FitProblem
+from wrist_stiffness.campaign.searching.questions import questions
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.campaign.units import Mask
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.outliers import lost_units
+from wrist_stiffness.inference.settings import OUTLIER_LIMIT
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -38,12 +43,18 @@ ENOUGH, NEARLY = 3e-3, 3e-2
 
 SMALLEST_STEP = 1.0 / 16.0
 
+MOST_CLEANINGS = 3
+"""Fits after which lost beams are looked for."""
+
 ROUNDED_N = (1.0, 0.3, 0.1, 0.03)
 """Forces within which a pin goes from wall to wall, before the fit with the law as it is: from one
 wall to the other the sum of squares has a minimum for every pin that turns over, and steps end in
 the next one (graduated non-convexity, Blake and Zisserman 1987)."""
 
 Walls = Literal["sharp", "rounded first", "rounded"]
+
+Base = tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]
+"""What of a model is free, and what stays as it is."""
 
 MEDIAN_CHI2 = float(chdtri(1, 0.5))
 
@@ -54,7 +65,7 @@ class BaseFit:
 
     Parameters
     ----------
-    problem : BaseProblem
+    problem : FitProblem
         What was free.
     z : (p,) float
         Steps from the prior means.
@@ -64,19 +75,22 @@ class BaseFit:
         Names of the further effects.
     cost : float
         Weighted sum of squares with the priors' part, in units of the noise.
-    bare : BaseProblem
+    bare : FitProblem
         The base alone.
-    firm : BaseProblem
+    firm : FitProblem
         The base with those extras beside which its columns are taken.
+    arrived : bool
+        Whether the steps settled.
     """
 
-    problem: BaseProblem
+    problem: FitProblem
     z: Array
     residual: Array
     extras: tuple[str, ...]
     cost: float
-    bare: BaseProblem
-    firm: BaseProblem
+    bare: FitProblem
+    firm: FitProblem
+    arrived: bool
 
     @cached_property
     def columns(self) -> Array:
@@ -91,16 +105,12 @@ class BaseFit:
     @property
     def of_base(self) -> Mask:
         """Which unknowns belong to the base, (p,) bool."""
-        usual = len(self._usual)
+        usual = len(self.bare.free)
         return np.array([unknown.free < usual for unknown in self.problem.unknowns])
-
-    @cached_property
-    def _usual(self) -> dict[str, FreeEffect]:
-        return {each.effect.name: each for each in free_base(self.problem.whole)[0]}
 
     def beyond(self) -> dict[str, Effect]:
         """Return the extras by their names, of those on top of the base only what is on top."""
-        usual, found = len(self._usual), {}
+        usual, found = len(self.bare.free), {}
         for place, free in enumerate(self.problem.free[usual:], usual):
             # On a bound the way to steps and back rounds beyond it.
             values = {
@@ -120,7 +130,8 @@ class BaseFit:
     def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
         """Return the fitted effects of one session, also those that were held."""
         own = self.problem.effects(self.z, session)
-        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in self._usual]
+        usual = {each.effect.name for each in self.bare.free}
+        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in usual]
         return (*self.problem.model.effects, *kept)
 
     def model(self, session: int, with_extras: bool = True) -> SessionModel:
@@ -134,7 +145,7 @@ class BaseFit:
         return self.problem.whiten(values)
 
 
-def free_base(model: ErrorModel) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
+def free_base(model: ErrorModel) -> Base:
     """Return what of the base is free, and the effects that stay as they are."""
     free, held = commissioning(model)
     return within_tolerances(free), held
@@ -147,6 +158,7 @@ def fit_base(
     start: BaseFit | None = None,
     beside: bool = False,
     walls: Walls = "sharp",
+    base: Base | None = None,
 ) -> BaseFit:
     """Fit registrations, zeros, tare and tolerances, within their priors.
 
@@ -168,8 +180,10 @@ def fit_base(
     walls : {"sharp", "rounded first", "rounded"}
         Whether pins go from wall to wall little by little first, and whether they stay so: enough
         to tell which of several fits leads furthest.
+    base : (tuple of FreeEffect, tuple of Effect), optional
+        What of the model is free and what stays as it is; by default as `free_base` says.
     """
-    free, held = free_base(model)
+    free, held = base or free_base(model)
     # What was fitted with rounded walls begins with its own law again.
     extras = [_rounded(effect, None) for effect in extras]
     added = {effect.name: effect for effect in extras}
@@ -179,26 +193,68 @@ def fit_base(
     more = [_about_zero(each) for each in ordered]
     firm = len(ordered) if beside else sum(not each.law.state_is_a_guess for each in ordered)
     whole = model.with_effects(*held)
-    if start is not None and start.bare.whole is model and start.bare.sessions is sessions:
+    alone = FitProblem(whole, sessions, free)
+    if start is not None and start.bare.same_as(alone):
         alone = start.bare
-    else:
-        alone = BaseProblem(whole, sessions, free, model)
-    problem = BaseProblem(whole, sessions, (*free, *more), model)
+    problem = replace(alone, free=(*free, *more))
     bare = problem if firm == len(more) else alone
     if 0 < firm < len(more):
-        bare = BaseProblem(whole, sessions, (*free, *more[:firm]), model)
+        bare = replace(alone, free=(*free, *more[:firm]))
     z = _start(problem, start, added)
     if walls != "sharp":
         for force in ROUNDED_N:
             gradual = [replace(each, effect=_rounded(each.effect, force)) for each in more]
             easy = replace(problem, free=(*free, *gradual))
-            z, residual = _descended(easy, easy, z, NEARLY)
+            z, residual, arrived = _descended(easy, easy, z, NEARLY)
             if walls == "rounded":
                 cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
-                return BaseFit(easy, z, residual, tuple(added), cost, alone, easy)
-    z, residual = _descended(problem, bare, z)
+                return BaseFit(easy, z, residual, tuple(added), cost, alone, easy, arrived)
+    z, residual, arrived = _descended(problem, bare, z)
     cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
-    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare)
+    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare, arrived)
+
+
+def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFit, int]:
+    """Fit a problem as it stands, without units that no smooth law could explain: lost beams.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        What is free.
+    start : (p,) float, optional
+        Where to begin, in steps; by default at the means of the priors.
+
+    Returns
+    -------
+    BaseFit
+        Its problem lacks those units.
+    int
+        How many there were.
+    """
+    z, total = np.zeros(len(problem.unknowns)) if start is None else start, 0
+    for _ in range(MOST_CLEANINGS):
+        z, residual, arrived = _descended(problem, problem, z)
+        table = problem.table.with_values(residual)
+        # Exact data scatter by rounding: what is lost is far beyond the noise as well.
+        white = problem.whiten(residual).reshape(table.values.shape)
+        lost = _lost(table, problem.columns_at(z))
+        lost &= np.abs(white).max(axis=1) > OUTLIER_LIMIT
+        if not lost.any():
+            break
+        total += int(lost.sum())
+        problem = replace(problem, sessions=parted(problem.sessions, lost).seen)
+    cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
+    return BaseFit(problem, z, residual, (), cost, problem, problem, arrived), total
+
+
+def _lost(table: Observations, columns: Array) -> Mask:
+    """Return which units lie far from a base and every smooth law of the conditions, (u,)."""
+    asked = [each.features(table.covariates) for each in questions(table.covariates)]
+    found = [each for each in asked if each is not None]
+    smooth = np.concatenate([np.zeros((table.n_units, 0)), *found], axis=1)
+    spread = smooth[:, None, :, None] * np.eye(table.n_components)[:, None, :]
+    beside = spread.reshape(*table.values.shape, -1)
+    return lost_units(table, np.concatenate([columns, beside], axis=2), OUTLIER_LIMIT)
 
 
 def has_walls(effect: Effect) -> bool:
@@ -216,9 +272,9 @@ def _rounded(effect: Effect, force: float | None) -> Effect:
 
 
 def _descended(
-    problem: BaseProblem, bare: BaseProblem, z: Array, enough: float = ENOUGH
-) -> tuple[Array, Array]:
-    """Return where Gauss-Newton steps lead from `z`, and the residual there."""
+    problem: FitProblem, bare: FitProblem, z: Array, enough: float = ENOUGH
+) -> tuple[Array, Array, bool]:
+    """Return where Gauss-Newton steps lead from `z`, the residual there, whether they settled."""
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
@@ -242,11 +298,11 @@ def _descended(
         if after < before:
             z, residual = trial, tried
         if cooled and before - after < enough * before:
-            break
-    return z, residual
+            return z, residual, True
+    return z, residual, False
 
 
-def _columns(problem: BaseProblem, bare: BaseProblem, z: Array) -> Array:
+def _columns(problem: FitProblem, bare: FitProblem, z: Array) -> Array:
     """Return the columns of one problem, and of what another has on top of it.
 
     Play would be solved again for each column of the base.
@@ -274,7 +330,7 @@ def _about_zero(effect: Effect) -> FreeEffect:
     return FreeEffect(effect.with_values({p.key: 0.0 for p in sizes}), scale)
 
 
-def _start(problem: BaseProblem, start: BaseFit | None, added: Mapping[str, Effect]) -> Array:
+def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effect]) -> Array:
     """Return where the unknowns begin: where another fit left them, and effects at their values."""
     usual = len(problem.free) - len(added)
     known: dict[tuple[str, str, int | None, bool], float] = {}

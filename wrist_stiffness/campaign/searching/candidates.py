@@ -164,18 +164,26 @@ class Point:
         )
 
 
-def wrist_candidates(
-    point: Point,
-    absent: Collection[str],
-) -> tuple[WristCandidate, ...]:
-    """Evaluate the catalogue about a point.
+def searched(absent: Collection[str]) -> list[tuple[Law, str]]:
+    """Return all laws of the catalogue at all their places, but for effects that are there."""
+    return [
+        (law, place)
+        for law in catalogue().values()
+        if law.id not in SET_UP_ANEW
+        for place in law.places
+        if f"{law.id}@{place}" not in absent
+    ]
+
+
+def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[WristCandidate, ...]:
+    """Evaluate laws at places about a point.
 
     Parameters
     ----------
     point : Point
         The base.
-    absent : collection of str
-        Effects that cannot be candidates: the model has them, and they are no part of the base.
+    asked : sequence of (Law, str)
+        Laws with a component each.
 
     Raises
     ------
@@ -183,13 +191,7 @@ def wrist_candidates(
         If a law of another package does not say how large it usually is.
     """
     signals = point.signals
-    plans = [
-        (law, place, law.linearised(place, signals))
-        for law in catalogue().values()
-        if law.id not in SET_UP_ANEW
-        for place in law.places
-        if f"{law.id}@{place}" not in absent
-    ]
+    plans = [(law, place, law.linearised(place, signals)) for law, place in asked]
     for law, place, _ in plans:
         _require_usual_sizes(law, place)
     trials: dict[tuple[object, ...], int] = {}

@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.campaign.fitting.problem import require_units
 from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.refitted import TOLERATED
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
+from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base, fit_cleaned
 from wrist_stiffness.campaign.searching.candidates import compensable, turns_normal
-from wrist_stiffness.campaign.searching.held_out import parted, unseen
+from wrist_stiffness.campaign.searching.held_out import Judge
+from wrist_stiffness.campaign.searching.problem import require_units
 from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
-from wrist_stiffness.campaign.searching.wrist_problem import WristFit, WristProblem, WristTable
+from wrist_stiffness.campaign.searching.wrist_fit import WristFit
+from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
 from wrist_stiffness.campaign.unit_session import UnitSession, as_units
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import (
@@ -27,17 +28,13 @@ from wrist_stiffness.inference.answer import (
     read,
     standings,
 )
-from wrist_stiffness.inference.evidence import Evidence
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted, sealed_units
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.search import Search, State
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import catalogue, find_law
-
-HELD_OUT = 0.2
-"""Part of a single session that is held out, at its end."""
 
 DETECTABLE = 3.0
 """Standard deviations that an effect of typical size must leave beyond the base to be seen."""
@@ -143,10 +140,11 @@ def diagnose_sessions(
     require_units(problem.begin().base.problem)
     search = Search(problem, seconds, tell)
     search.run()
-    reading = read(search, naming)
+    reading = _settled(read(search, naming))
     tell("judging by what was held out")
-    judge = _Judge(model, units, reading)
-    reading = judge.kept(search, reading)
+    judge = _Judged(model, units, search, reading)
+    kept = judge.kept(search, reading)
+    reading = kept if kept is reading else _settled(kept)
     state = reading.state
     absorbed = taken_up(state.fit.base, [session.name for session in sessions])
     findings = [_finding(search, each, reading, judge) for each in reading.named]
@@ -158,8 +156,8 @@ def diagnose_sessions(
     diagnosis = Diagnosis(
         reading.verdict,
         reading.probability,
-        table.table.rms(_noise(state.evidence, table.variance)),
-        table.table.rms(_discrepancy(state, table)),
+        table.noise(state.evidence),
+        table.above(state.evidence),
         _errors(table.table, held[0]),
         _errors(table.table, held[-1]),
         tuple(findings),
@@ -169,7 +167,7 @@ def diagnose_sessions(
         standings(search, reading),
         _not_excited(problem, search),
         tuple(each.sentence for each in absorbed),
-        "another session" if len(units) > 1 else "the end of this session",
+        judge.scope,
         () if search.in_time else ("the time was over before every candidate was fitted",),
     )
     beyond = state.fit.base.beyond()
@@ -185,6 +183,12 @@ def diagnose_sessions(
     )
 
 
+def _settled(reading: Reading) -> Reading:
+    """Return a reading with its set as it is handed over."""
+    found = reading.state.fit.settled()
+    return replace(reading, state=replace(reading.state, fit=found, evidence=found.evidence))
+
+
 def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
     if not sessions:
         raise InputError("no session to diagnose")
@@ -193,25 +197,24 @@ def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
             raise InputError(f"{session.name}: no measured pose in the whole session")
 
 
-class _Judge:
-    """Fits to what was seen, judged by what was not."""
+class _Judged:
+    """The stages of an answer, judged by what was not seen."""
 
-    def __init__(self, model: ErrorModel, units: tuple[UnitSession, ...], reading: Reading) -> None:
-        self._model = model
-        table = fit_base(model, units).problem.table if len(units) > 1 else None
-        observed = table or reading.state.fit.table.table
-        self._parts = parted(units, sealed_units(observed, HELD_OUT))
-        self._alone = fit_base(model, units)
-        self.stages = self._stages(reading.state.fit.base)
-
-    def _stages(self, fitted: BaseFit) -> list[HeldOut]:
-        """Return what is left by the nominal model, and with one effect more each time."""
-        effects = list(fitted.beyond().values())
-        return [self._left(effects[:count]) for count in range(len(effects) + 1)]
+    def __init__(
+        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, reading: Reading
+    ) -> None:
+        nominal: BaseFit = search.base.fit.base
+        if len(whole) > len(nominal.problem.sessions):
+            nominal, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
+        self._model, self._judge = model, Judge(nominal)
+        self.scope = self._judge.by
+        effects = list(reading.state.fit.base.beyond().values())
+        self.stages = [self._left(effects[:count]) for count in range(len(effects) + 1)]
 
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
-        fitted = fit_base(self._model, self._parts.seen, effects, self._alone)
-        return unseen(fitted, self._parts, self._alone)
+        """Return what is left by the model with some effects."""
+        judge = self._judge
+        return judge.left(fit_base(self._model, judge.parts.seen, effects, judge.whole))
 
     def kept(self, search: Search, reading: Reading) -> Reading:
         """Return a reading without what makes the held-out part worse: it is not handed over."""
@@ -232,7 +235,7 @@ class _Judge:
         return self._left(others) if others else self.stages[0]
 
 
-def _finding(search: Search, found: Class, reading: Reading, judge: _Judge | None) -> Finding:
+def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | None) -> Finding:
     state = reading.state if judge is not None else search.best
     fit: WristFit = state.fit
     law, place = _law_and_place(found.name)
@@ -269,27 +272,12 @@ def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, f
     """Return the parameters of an effect and their standard uncertainties, in their units."""
     places = state.fit.places[name]
     known = {each.key: each for each in effect.parameters}
-    sigma = np.sqrt(np.diag(state.evidence.covariance)[places])
+    sigma = np.sqrt(np.diag(state.evidence.covariance_of_fit)[places])
     keys = [state.fit.base.problem.unknowns[place].key for place in places]
     return {
         key: (effect.estimates[key].value, float(own * known[key].scale))
         for key, own in zip(keys, sigma, strict=True)
     }
-
-
-def _noise(found: Evidence, variance: Array) -> Array:
-    """Variance (u, 6) of a unit as its noise is known."""
-    return variance * min(found.excess, 1.0)
-
-
-def _discrepancy(state: State, table: WristTable) -> Array:
-    """Variance (u, 6) above that noise."""
-    found, own = state.evidence, np.zeros_like(table.variance)
-    for quantity in table.table.quantities:
-        at = list(quantity.components)
-        count = max(int(table.table.measured[:, at].sum()), 1)
-        own[:, at] = table.variance[:, at] * found.left_of(quantity.name, count)
-    return own
 
 
 def _errors(table: Observations, left: HeldOut) -> dict[str, float]:

@@ -2,48 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
-from wrist_stiffness.campaign.unit_session import UnitSession
-from wrist_stiffness.campaign.units import Mask
-from wrist_stiffness.inference.held_out import HeldOut
+from wrist_stiffness.campaign.searching.parts import Parts, parted
+from wrist_stiffness.campaign.searching.problem import FitProblem
+from wrist_stiffness.inference.held_out import HeldOut, sealed_units
+from wrist_stiffness.inference.settings import HELD_OUT
+from wrist_stiffness.model.error_model import ErrorModel
 
-Sessions = tuple[UnitSession, ...]
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Sessions with a part that is held out.
-
-    Parameters
-    ----------
-    whole : tuple of UnitSession
-        With all that was measured.
-    seen : tuple of UnitSession
-        With nothing measured in the units that are held out.
-    aside : (u,) bool
-        These units, of all that were measured.
-    """
-
-    whole: Sessions
-    seen: Sessions
-    aside: Mask
-
-
-def parted(sessions: Sessions, aside: Mask) -> Parts:
-    """Return the sessions with some units (u,) of all measured ones held out."""
-    parts, start = [], 0
-    for each in sessions:
-        rows = np.flatnonzero(each.measured)
-        own = rows[aside[start : start + len(rows)]]
-        start += len(rows)
-        shift, turn = each.shift.copy(), each.turn.copy()
-        shift[own], turn[own] = np.nan, np.nan
-        parts.append(replace(each, shift=shift, turn=turn))
-    return Parts(sessions, tuple(parts), aside)
+ANOTHER_SESSION = "another session"
+THIS_SESSION = "the end of this session"
 
 
 def unseen(fitted: BaseFit, parts: Parts, whole: BaseFit) -> HeldOut:
@@ -81,3 +52,29 @@ def unseen(fitted: BaseFit, parts: Parts, whole: BaseFit) -> HeldOut:
 def _key(fitted: BaseFit, number: int) -> tuple[str, str, int | None]:
     unknown = fitted.problem.unknowns[number]
     return fitted.problem.free[unknown.free].effect.name, unknown.key, unknown.session
+
+
+class Judge:
+    """Fits to what was seen are judged by what was not.
+
+    Parameters
+    ----------
+    whole : BaseFit
+        To all units, without those that are lost.
+    """
+
+    def __init__(self, whole: BaseFit) -> None:
+        self.whole, table = whole, whole.problem.table
+        self.parts = parted(whole.problem.sessions, sealed_units(table, HELD_OUT))
+        self.by = ANOTHER_SESSION if len(whole.problem.sessions) > 1 else THIS_SESSION
+
+    def left(self, fitted: BaseFit) -> HeldOut:
+        """Return what a fit to the part that was seen leaves of the other."""
+        return unseen(fitted, self.parts, self.whole)
+
+    def of_model(self, model: ErrorModel) -> HeldOut:
+        """Return what a model leaves of that part as it stands."""
+        problem = FitProblem(model, self.parts.whole, ())
+        residual = problem.residual(np.empty(0))
+        rows = np.repeat(self.parts.aside, 6)
+        return HeldOut(residual[self.parts.aside], problem.whiten(residual)[rows])

@@ -6,6 +6,8 @@ law itself explains most beside a base that follows it linearly.
 
 from __future__ import annotations
 
+from itertools import islice, product
+
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -16,6 +18,11 @@ from wrist_stiffness.model.effect import Effect
 
 MOST_TRIALS = 7
 """Steps of the fit of one candidate."""
+
+FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
+"""Multiples of the typed values that are tried where a law knows no usual size."""
+
+MOST_MULTIPLES = 512
 
 
 class Beyond:
@@ -47,6 +54,24 @@ class Beyond:
         white = self._whiten(changes)
         rows = np.vstack([white, np.zeros((len(self._left) - len(white), white.shape[1]))])
         return np.asarray(rows - self._basis @ (self._basis.T @ rows))
+
+    def best_multiple(self, effect: Effect) -> Effect:
+        """Return an effect without a usual size at that multiple of its values that explains most.
+
+        Parameters
+        ----------
+        effect : Effect
+            With the values that somebody typed.
+        """
+        typed = {key: estimate.value or 1.0 for key, estimate in effect.estimates.items()}
+        factors = FACTORS if len(FACTORS) ** len(typed) <= MOST_MULTIPLES else (-1.0, 1.0)
+        tried = [
+            {key: value * f for (key, value), f in zip(typed.items(), each, strict=True)}
+            for each in islice(product(factors, repeat=len(typed)), MOST_MULTIPLES)
+        ]
+        changes = self._point.changes([(effect.law, effect.component, each) for each in tried])
+        left = self._left[:, None] - self._white(np.moveaxis(changes, 0, -1))
+        return effect.with_values(tried[int(np.argmin(np.sum(left**2, axis=0)))])
 
     def fitted(self, candidate: WristCandidate, start: Effect) -> Effect:
         """Return a candidate with the values of its law that explain most.

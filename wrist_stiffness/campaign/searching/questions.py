@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from wrist_stiffness.inference.discrepancy import Question, bell, centred, scaled, straight
+from wrist_stiffness.inference.observations import Labels
 from wrist_stiffness.mechanism.components import Array
 
 Conditions = Mapping[str, Array]
@@ -61,26 +62,79 @@ KNOWN = frozenset(
 )
 """Conditions that every session of a wrist has."""
 
+ANGLES, SIDES, SPEEDS = (
+    tuple(f"{each}_{motor}" for motor in (1, 2)) for each in ("theta", "approach", "speed")
+)
+
 QUESTIONS = (
-    Question("the pose", lambda c: centred(pose_kernel(c)), 10),
-    Question("the load", _load, 8),
-    Question("the load and the pose together", _load_and_pose, 14),
-    Question("the side of approach", _approach, 8),
-    Question("the speed", _speed, 6),
-    Question("the time at rest", _at_rest, 6),
+    Question("the pose", lambda c: centred(pose_kernel(c)), 10, ANGLES),
+    Question("the load", _load, 8, LOAD),
+    Question("the load and the pose together", _load_and_pose, 14, (*ANGLES, *LOAD)),
+    Question("the side of approach", _approach, 8, SIDES),
+    Question("the speed", _speed, 6, SPEEDS),
+    Question("the time at rest", _at_rest, 6, ("held_s",)),
     Question("the temperature", _temperature, 3),
 )
 """Asked of every wrist, with the most columns of each (assumed)."""
+
+ZONE, RIPPLE = 0.35, 0.12
+"""Widths of a zone of poses and of a ripple of one angle, in standard deviations of the angles
+(assumed)."""
+
+PASSING_S, PASSING_RANK = 10.0, 40
+"""Correlation time of what passes [s], and its most columns in one session (assumed)."""
+
+
+def _zone(conditions: Conditions) -> Array:
+    return centred(bell(_columns(conditions, *ANGLES), ZONE))
+
+
+def _pushed(conditions: Conditions) -> Array:
+    """Play follows the direction of a load and not its size."""
+    sides = []
+    for names in (LOAD[:3], LOAD[3:]):
+        own = np.stack([conditions[name] for name in names], axis=1)
+        size = np.linalg.norm(own, axis=1, keepdims=True)
+        sides.append(np.divide(own, size, out=np.zeros_like(own), where=size > 0.0))
+    side = straight(np.concatenate(sides, axis=1))
+    return centred(side * 0.5 * (1.0 + pose_kernel(conditions)))
 
 
 def questions(conditions: Conditions) -> tuple[Question, ...]:
     """Return what is asked of a wrist: the same of each, and every signal recorded beside it."""
 
     def of(name: str) -> Question:
-        return Question(name, lambda own: centred(bell(_columns(own, name))), 5)
+        return Question(name, lambda own: centred(bell(_columns(own, name))), 5, (name,))
 
     beside = [name for name in conditions if name not in KNOWN and not name.startswith("T_")]
     return (*QUESTIONS, *map(of, beside))
+
+
+def finer_questions(conditions: Conditions) -> tuple[Question, ...]:
+    """Return those and some that look closer."""
+
+    def ripple(name: str) -> Question:
+        kernel = lambda own: centred(bell(_columns(own, name), RIPPLE))  # noqa: E731
+        return Question(f"the angle of motor {name[-1]}", kernel, 25, (name,))
+
+    return (
+        *questions(conditions),
+        Question("the direction of the load", _pushed, 10, LOAD),
+        Question("a zone of poses", _zone, 30, ANGLES),
+        *map(ripple, ANGLES),
+    )
+
+
+def passing(sessions: Labels) -> Question:
+    """Return whether the error changes within seconds; sessions (u,) do so apart."""
+
+    def kernel(own: Conditions) -> Array:
+        apart = np.abs(own["time_s"][:, None] - own["time_s"]) / PASSING_S
+        apart[sessions[:, None] != sessions] = np.inf
+        return np.exp(-apart)
+
+    rank = PASSING_RANK * len(np.unique(sessions))
+    return Question("the time", kernel, rank, ("time_s",))
 
 
 def alike(conditions: Conditions) -> Array:

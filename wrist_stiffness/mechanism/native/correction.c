@@ -148,5 +148,4 @@ void apply_safely(const Mechanism *k, const Safety *safety, const double command
     const double step[2] = {applied[0] - found->delta[0], applied[1] - found->delta[1]};
     for (int i = 0; i < 3; i++)
         found->after[3 + i] += found->jacobian[2 * i] * step[0] + found->jacobian[2 * i + 1] * step[1];
-    for (int i = 0; i < 2; i++) found->delta[i] = applied[i];
 }

@@ -5,7 +5,7 @@
 
 #include "wrist.h"
 
-enum { MOST_BUFFERS = 12 };
+enum { MOST_BUFFERS = 16 };
 
 /* Views of the first `count` arguments; None is a null pointer. */
 typedef struct {
@@ -150,65 +150,77 @@ static PyObject *predict_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     Py_RETURN_NONE;
 }
 
-/* Mechanism, parts, task, commands (n, 2), loads (n, 6), which are in U (n), which are wanted (n),
- * the correction held so far (2), contact state (m); answers (n, 86), contact states (n, m); m, where
- * to begin and to end.  Ends at the first command that it cannot serve and returns its place and
- * why; a command that is not wanted leaves nothing held. */
+/* Mechanism, parts, task, safety, commands (n, 2), their stamps (n), loads (n, 6), which are in U (n),
+ * which are wanted (n), shares (n), the correction held so far (2), contact state (m), the correction
+ * applied so far (2) and when (1); answers (n, 86), contact states (n, m); m, where to begin and to
+ * end.  Ends at the first command that it cannot serve and returns its place; a command that is not
+ * wanted leaves nothing held.  Without safety it searches, without a task it applies what was
+ * searched.  What is applied begins each row, also of a command that is not wanted. */
 static PyObject *correct_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
     long m;
-    if (counted(count, 14) || sectors(args[11], &m)) return 0;
-    const Py_ssize_t n = PyObject_Length(args[5]), real = sizeof(double);
-    const Py_ssize_t begin = PyLong_AsSsize_t(args[12]), end = PyLong_AsSsize_t(args[13]);
+    if (counted(count, 19) || sectors(args[16], &m)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[7]), real = sizeof(double);
+    const Py_ssize_t begin = PyLong_AsSsize_t(args[17]), end = PyLong_AsSsize_t(args[18]);
     if (PyErr_Occurred()) return 0;
-    const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), sizeof(Task), 2 * n * real,
-                                6 * n * real, n, n, 2 * real, m, n * sizeof(Corrected), n * m};
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), sizeof(Task), sizeof(Safety),
+                                2 * n * real, 8 * n, 6 * n * real, n, n, n * real, 2 * real, m,
+                                2 * real, 8, n * sizeof(Corrected), n * m};
     Buffers b;
-    if (take(&b, args, sizes, "dddddbbdbdb", 15u << 7)) return 0;
-    const double *command = b.view[3].buf, *load = b.view[4].buf;
-    const unsigned char *in_u = b.view[5].buf, *wanted = b.view[6].buf;
-    double *held = b.view[7].buf;
-    unsigned char *closed = b.view[8].buf, *states = b.view[10].buf;
-    Corrected *out = b.view[9].buf;
+    if (take(&b, args, sizes, "dddddqdbbddbdqdb", 63u << 10)) return 0;
+    const Task *task = b.view[2].buf;
+    const Safety *safety = b.view[3].buf;
+    const double *command = b.view[4].buf, *load = b.view[6].buf, *share = b.view[9].buf;
+    const int64_t *stamp = b.view[5].buf;
+    const unsigned char *in_u = b.view[7].buf, *wanted = b.view[8].buf;
+    double *held = b.view[10].buf, *applied = b.view[12].buf;
+    unsigned char *closed = b.view[11].buf, *states = b.view[15].buf;
+    Corrected *out = b.view[14].buf;
     int status = OK;
     Py_ssize_t i = begin < 0 ? 0 : begin;
     Py_BEGIN_ALLOW_THREADS
     for (; i < end && i < n; i++) {
-        if (wanted[i])
-            status = correct(b.view[0].buf, b.view[1].buf, (int)m, b.view[2].buf, command + 2 * i,
-                             load + 6 * i, in_u[i], held, closed, out + i);
-        if (status) break;
-        for (int motor = 0; motor < 2; motor++) held[motor] = wanted[i] ? out[i].delta[motor] : 0.0;
-        for (long j = 0; j < m; j++) states[i * m + j] = closed[j];
+        if (task) {
+            if (wanted[i])
+                status = correct(b.view[0].buf, b.view[1].buf, (int)m, task, command + 2 * i,
+                                 load + 6 * i, in_u[i], held, closed, out + i);
+            if (status) break;
+            for (int motor = 0; motor < 2; motor++)
+                held[motor] = wanted[i] ? out[i].delta[motor] : 0.0;
+            for (long j = 0; j < m; j++) states[i * m + j] = closed[j];
+        }
+        if (safety) {
+            apply_safely(b.view[0].buf, safety, command + 2 * i, stamp[i], share[i],
+                         wanted[i] ? out + i : 0, applied, b.view[13].buf);
+            for (int motor = 0; motor < 2; motor++) out[i].delta[motor] = applied[motor];
+        }
     }
     Py_END_ALLOW_THREADS
     release(&b);
-    return Py_BuildValue("ni", i, status);
+    return PyLong_FromSsize_t(i);
 }
 
-/* Mechanism, safety, commands (n, 2), their stamps (n), shares (n), which have a correction (n), the
- * correction applied so far (2) and when (1); answers (n, 86), what is applied (n, 2); where to begin
- * and to end. */
-static PyObject *apply_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
-    if (counted(count, 12)) return 0;
-    const Py_ssize_t n = PyObject_Length(args[5]), real = sizeof(double);
-    const Py_ssize_t begin = PyLong_AsSsize_t(args[10]), end = PyLong_AsSsize_t(args[11]);
-    if (PyErr_Occurred()) return 0;
-    const Py_ssize_t sizes[] = {sizeof(Mechanism), sizeof(Safety), 2 * n * real, 8 * n, n * real, n,
-                                2 * real, 8, n * sizeof(Corrected), 2 * n * real};
+/* Mechanism, scales, angles (n, 2), loads (n, 6), which of them are in U (n); readings (n, 11),
+ * statuses (n).  Returns the first status that is not OK. */
+static PyObject *read_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    if (counted(count, 7)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[4]), real = sizeof(double);
+    if (n < 0) return 0;
+    const Py_ssize_t sizes[] = {sizeof(Mechanism), sizeof(Scales), 2 * n * real, 6 * n * real, n,
+                                n * sizeof(Reading), n};
     Buffers b;
-    if (take(&b, args, sizes, "dddqdbdqdd", 15u << 6)) return 0;
-    const double *command = b.view[2].buf, *share = b.view[4].buf;
-    const int64_t *stamp = b.view[3].buf;
-    const unsigned char *has = b.view[5].buf;
-    double *applied = b.view[6].buf, *sent = b.view[9].buf;
-    Corrected *out = b.view[8].buf;
-    for (Py_ssize_t i = begin < 0 ? 0 : begin; i < end && i < n; i++) {
-        apply_safely(b.view[0].buf, b.view[1].buf, command + 2 * i, stamp[i], share[i],
-                     has[i] ? out + i : 0, applied, b.view[7].buf);
-        for (int motor = 0; motor < 2; motor++) sent[2 * i + motor] = applied[motor];
+    if (take(&b, args, sizes, "ddddbdb", 3u << 5)) return 0;
+    const double *theta = b.view[2].buf, *load = b.view[3].buf;
+    const unsigned char *in_u = b.view[4].buf;
+    Reading *out = b.view[5].buf;
+    unsigned char *statuses = b.view[6].buf;
+    int first = OK;
+    for (Py_ssize_t i = 0; i < n; i++) {
+        statuses[i] = (unsigned char)read_load(b.view[0].buf, b.view[1].buf, theta + 2 * i,
+                                               load + 6 * i, in_u[i], out + i);
+        if (!first) first = statuses[i];
     }
     release(&b);
-    Py_RETURN_NONE;
+    return PyLong_FromLong(first);
 }
 
 /* Twists (n, 6) to positions and quaternions (n, 7). */
@@ -279,7 +291,7 @@ static PyMethodDef METHODS[] = {
     FAST("respond", respond_of, "Fill twist, force and contact state at one configuration."),
     FAST("predict", predict_of, "Fill twists and configurations of n samples in their order."),
     FAST("correct", correct_of, "Fill the corrections of n commands in their order."),
-    FAST("apply", apply_of, "Let the corrections of n commands through the guards."),
+    FAST("read_load", read_of, "Fill what n loads say of a payload."),
     FAST("pose_of_twist", pose_of, "Fill positions and quaternions of n twists."),
     FAST("table_covariance", covariance_of, "Fill the covariances of n predictions."),
     FAST("exp_twist", exp_of, "Fill rotation and shift of one twist."),
@@ -300,6 +312,8 @@ PyMODINIT_FUNC PyInit__native(void) {
         PyModule_AddIntConstant(module, "SAFETY", sizeof(Safety) / sizeof(double));
         PyModule_AddIntConstant(module, "CONFIGURATION", sizeof(Configuration) / sizeof(double));
         PyModule_AddIntConstant(module, "CORRECTED", sizeof(Corrected) / sizeof(double));
+        PyModule_AddIntConstant(module, "SCALES", sizeof(Scales) / sizeof(double));
+        PyModule_AddIntConstant(module, "READING", sizeof(Reading) / sizeof(double));
         PyModule_AddIntConstant(module, "MOST_SECTORS", MOST_SECTORS);
     }
     return module;

@@ -148,8 +148,7 @@ int predict(const Mechanism *k, const Parts *parts, int m, const double theta[2]
     int status = forward(k, theta, at);
     if (!status) status = in_domain(k, at);
     if (status) return status;
-    if (!(sqrt(dot3(load, load)) <= k->most_force && sqrt(dot3(load + 3, load + 3)) <= k->most_moment))
-        return BEYOND_LOADS;
+    if (beyond_loads(k, load)) return BEYOND_LOADS;
     memcpy(wrench, load, sizeof wrench);
     if (on_platform) turned(at->bodies[PLATFORM], load, wrench);
     for (int i = 0; i < 6; i++) wrench[i] = wrench[i] * parts->load_scale + parts->load_added[i];

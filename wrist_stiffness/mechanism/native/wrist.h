@@ -1,12 +1,13 @@
 /* One wrist at one pose: what the NumPy formulas of this folder say, compiled.
  *
  * The judges are `kinematics.py`, `statics.py`, `contact.py`, `rigid_motion.py` and
- * `compensation/correction.py`; tests hold both equal to 1e-12.  All matrices lie row by row; SI
+ * `compensation/correction.py` and `payload.py`; tests hold both equal to 1e-12.  All matrices lie row by row; SI
  * units; F and O as in docs/conventions.md.
  */
 #ifndef WRIST_H
 #define WRIST_H
 
+#include <math.h>
 #include <stdint.h>
 
 enum { BODY_COUNT = 5, GROUPS = 5, MOST_SECTORS = 192 };
@@ -61,6 +62,15 @@ typedef struct {
     Configuration at;
 } Corrected;
 
+/* What a load says of a payload, along two axes across gravity and down (see payload.py). */
+typedef struct {
+    double axes[3][3], gravity;
+} Scales;
+
+typedef struct {
+    double side, weight, moments[3], rows[2][3];
+} Reading;
+
 void exp_twist(const double twist[6], double rotation[9], double shift[3]);
 int log_motion(const double rotation[9], const double shift[3], double twist[6]);
 void pose_of_twist(const double twist[6], double pose[7]);
@@ -77,6 +87,9 @@ int respond(const Parts *parts, int m, const Configuration *at, const double wre
 int predict(const Mechanism *k, const Parts *parts, int m, const double theta[2],
             const double load[6], int on_platform, unsigned char *closed, double twist[6],
             Configuration *at);
+
+int read_load(const Mechanism *k, const Scales *scales, const double theta[2],
+              const double load[6], int on_platform, Reading *out);
 
 int correct(const Mechanism *k, const Parts *parts, int m, const Task *task,
             const double command[2], const double load[6], int on_platform,
@@ -102,6 +115,10 @@ static inline void apply(const double *m, const double *v, double *out) {
 }
 static inline void apply_back(const double *m, const double *v, double *out) {
     for (int i = 0; i < 3; i++) out[i] = m[i] * v[0] + m[i + 3] * v[1] + m[i + 6] * v[2];
+}
+static inline int beyond_loads(const Mechanism *k, const double *load) {
+    return !(sqrt(dot3(load, load)) <= k->most_force &&
+             sqrt(dot3(load + 3, load + 3)) <= k->most_moment);
 }
 static inline const Sector *sectors_of(const Parts *parts) { return (const Sector *)(parts + 1); }
 static inline const double *approach_of(const Parts *parts, int m) {

@@ -38,7 +38,7 @@ class Bars:
     values, uncertainties : sequence of float
         Root mean square errors and their standard uncertainties.
     marks : dict of str to float
-        Levels to compare with: the noise floor, a Gaussian process.
+        Levels to compare with: the instrument's noise, what laws of the conditions leave.
     """
 
     label: str

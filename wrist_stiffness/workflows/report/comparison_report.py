@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wrist_stiffness.campaign.comparing.comparison import ComparedModel, lengths
-from wrist_stiffness.campaign.noise_floor import SOURCES
+from wrist_stiffness.campaign.comparing.sentences import sentences
 from wrist_stiffness.inference import Quantity
 from wrist_stiffness.workflows.compare import Compared
 from wrist_stiffness.workflows.pictures.dependence import draw_against
@@ -40,12 +40,13 @@ HOW = (
     "Without a refit every comparison shows where the instrument stands: so the place of "
     "instrument and target, the zeros of the encoders and the tare of the load sensor are fitted "
     "again in every session, unless the recording says that they were calibrated.",
-    "A condition is told only if the largest of all conditions would by chance look as strong in "
-    "at most 2 of 100 such recordings; chance is what turning the signs of whole stretches of the "
-    "residual makes. +- is one standard uncertainty, with whatever is coupled inside a stretch.",
-    "The Gaussian process is a flexible curve over the recorded conditions, judged on stretches "
-    "that it has not seen: about what a law nobody has thought of yet could reach. Laws with a "
-    "memory can do better.",
+    "What is left is asked as in diagnose: noise, drift of the instrument, and smooth laws of the "
+    "conditions, each of which may be there or not. A law is told from a probability of 90 % on: "
+    "the evidence of all sets of laws that hold it, against those without it.",
+    "A size is the part of the error that goes with a condition, beyond what the refit could take "
+    "up; +- is one standard uncertainty, a band two.",
+    "Laws of the conditions, unseen part: what these laws leave of stretches that were not used to "
+    "fit them. Laws with a memory can do better.",
 )
 
 
@@ -61,8 +62,8 @@ def report_of_comparison(compared: Compared) -> Page:
     models = ", ".join(model.name for model in found.models)
     units = found.models[0].refitted.n_units
     sections = [
-        Section("How far off", _how_far(compared)),
         Section("On what the error depends", _depends(compared)),
+        Section("How far off", _how_far(compared)),
         Section("Where it fails", _where(compared)),
         Section("When it fails", _when(compared)),
         Section("How it was computed", (Bullets(tuple(typeset(line) for line in HOW)),)),
@@ -88,16 +89,18 @@ def _how_far(compared: Compared) -> tuple[Part, ...]:
             [model.name for model in found.models],
             [model.after[q.key].rms for model in found.models],
             [model.after[q.key].uncertainty for model in found.models],
-            {"noise floor": found.floor[q.key], "Gaussian process": found.process[q.key]},
+            {
+                "instrument noise": found.noise[q.key],
+                "laws of the conditions": found.reachable[q.key],
+            },
         )
         for q in found.quantities
     ]
     caption = (
         "Error after registrations were refitted, with one standard uncertainty, against what "
-        "noise alone makes and what a flexible curve over the conditions reaches."
+        "noise alone makes and what laws of the conditions would leave of stretches unseen."
     )
     parts: list[Part] = [drawn(draw_bars(bars), caption), _sizes(compared), _levels(compared)]
-    parts.append(Text(typeset(f"The noise floor comes from {SOURCES[found.noise.source]}.")))
     for model in found.models:
         parts.append(Text(f"What the refit took up for {model.name}:"))
         parts.append(Bullets(tuple(typeset(line) for line in model.absorbed)))
@@ -158,16 +161,19 @@ def _depends(compared: Compared) -> tuple[Part, ...]:
     for model in found.models:
         if len(found.models) > 1:
             parts.append(Text(f"{model.name}:"))
-        parts.append(Bullets(tuple(typeset(line) for line in model.told.sentences)))
-    first = found.models[0]
-    statements = [each for each in first.told.statements if each.changes][:MOST_PICTURED]
-    if statements:
-        shown = [(model.name, model.refitted) for model in _side_by_side(compared)]
+        parts.append(Bullets(tuple(typeset(line) for line in sentences(model.explained))))
+    first, *others = found.models
+    told = first.explained.told[:MOST_PICTURED]
+    if told:
+        shown = [(model.name, model.refitted) for model in others[1 - MOST_MAPPED :]]
         caption = (
-            f"The error of {first.name} against the conditions on which it depends most: every "
-            "dwell and moment (pale) and means of equal numbers of them with standard errors."
+            f"What {first.name} leaves against the conditions on which it depends most, everything "
+            "else that was found taken out: every dwell and moment, and the fitted law with its "
+            "95 % band. On a map the fields are the law and the dots what was measured. Squares "
+            "are means of what the other models leave."
         )
-        parts.append(drawn(draw_against([against(each, shown) for each in statements]), caption))
+        pictures = [against(each.curve, each.name, shown) for each in told]
+        parts.append(drawn(draw_against(pictures), caption))
     return tuple(parts)
 
 
@@ -220,7 +226,7 @@ def _when(compared: Compared) -> tuple[Part, ...]:
         (
             _label(q),
             np.stack([lengths(model.refitted, q) for model in models]),
-            found.floor[q.key],
+            found.noise[q.key],
         )
         for q in found.quantities
     ]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from wrist_stiffness.campaign.comparing.sentences import Statement, Told, tell
-from wrist_stiffness.campaign.noise_floor import noise_floor
-from wrist_stiffness.inference import Diagnosis, Finding, Observations, Quantity
+from wrist_stiffness.campaign.comparing.explained import Explained, explain
+from wrist_stiffness.campaign.comparing.sentences import percent, sentences
+from wrist_stiffness.campaign.searching.base_fit import BaseFit
+from wrist_stiffness.campaign.searching.likelihood import WristTable
+from wrist_stiffness.inference import Diagnosis, Finding, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.fit_report import plus_minus
 from wrist_stiffness.workflows.pictures.dependence import draw_against
@@ -34,7 +34,6 @@ from wrist_stiffness.workflows.report.parts import (
 from wrist_stiffness.workflows.verdict import (
     class_of,
     correction_of,
-    percent,
     rest_lines,
     verdict_lines,
 )
@@ -65,35 +64,39 @@ class Shown:
 
     Parameters
     ----------
-    observations : Observations
-        Residuals after the base was refitted, without any effect; covariates as
-        `observing.observe` names them.
-    told : Told
-        On what those residuals depend, of `sentences.tell`.
+    left : Explained
+        Residuals after the base was refitted, without any effect, and on what they depend.
     explained : (n, 6) float, optional
         Residuals with the findings in the model, of the same units.
     """
 
-    observations: Observations
-    told: Told
+    left: Explained
     explained: Array | None = None
 
 
-def shown_by(
-    observations: Observations, rng: np.random.Generator, explained: Array | None = None
-) -> Shown:
-    """Return what the pictures need, with the sentences worked out.
+def shown_by(nominal: BaseFit, explained: Array | None = None) -> Shown:
+    """Return what the pictures need.
 
     Parameters
     ----------
-    observations : Observations
-        Residuals after the base was refitted, without any effect.
-    rng : numpy.random.Generator
-        For what chance gives.
+    nominal : BaseFit
+        The base without any effect.
     explained : (n, 6) float, optional
         Residuals with the findings in the model, of the same units.
     """
-    return Shown(observations, tell(observations, noise_floor(observations), rng), explained)
+    problem = nominal.problem
+    left = problem.table.with_values(nominal.residual)
+    return Shown(
+        explain(
+            left,
+            problem.sessions,
+            nominal.columns,
+            nominal.z,
+            left.measured / WristTable(left, problem.sessions).variance,
+            problem.weights,
+        ),
+        explained,
+    )
 
 
 def report_of_diagnosis(
@@ -121,7 +124,7 @@ def report_of_diagnosis(
     provenance : Provenance
         Files and versions.
     """
-    quantities = shown.observations.reported
+    quantities, units = shown.left.observations.reported, shown.left.observations.n_units
     sections = [
         Section("Findings", tuple(_findings(result, quantities))),
         Section("How much it brings", _fall(result, quantities)),
@@ -135,7 +138,7 @@ def report_of_diagnosis(
     ]
     return Page(
         "Which physical effect is missing?",
-        f"{', '.join(recordings)}: {shown.observations.n_units} dwells and half seconds in motion",
+        f"{', '.join(recordings)}: {units} dwells and half seconds in motion",
         (*([mistake] if mistake else []), *_verdict(result, quantities)),
         tuple(sections),
     )
@@ -216,20 +219,20 @@ def _ranking(result: Diagnosis) -> tuple[Part, ...]:
 
 
 def _depends(shown: Shown) -> tuple[Part, ...]:
-    parts: list[Part] = [Bullets(tuple(typeset(line) for line in shown.told.sentences))]
-    statements: list[Statement] = [each for each in shown.told.statements if each.changes]
-    if not statements:
+    left = shown.left
+    parts: list[Part] = [Bullets(tuple(typeset(line) for line in sentences(left)))]
+    if not left.told:
         return tuple(parts)
-    series = [("before", shown.observations)]
+    series = []
     if shown.explained is not None:
-        series.append(("with the findings", shown.observations.with_values(shown.explained)))
-    pictures = [against(each, series) for each in statements[:MOST_PICTURED]]
+        series.append(("with the findings", left.observations.with_values(shown.explained)))
+    pictures = [against(each.curve, each.name, series) for each in left.told[:MOST_PICTURED]]
     parts.append(
         drawn(
             draw_against(pictures),
-            "What the refitted base leaves against the conditions that show it best: every dwell "
-            "and half second in motion (pale), and means of equal numbers of them with standard "
-            "errors.",
+            "What the refitted base leaves against the conditions that show it best, everything "
+            "else that was found taken out: every dwell and half second in motion, and the fitted "
+            "law with its 95 % band.",
         )
     )
     return tuple(parts)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isnan
 
-from wrist_stiffness.campaign.comparing.sentences import Change, Statement
+from wrist_stiffness.campaign.comparing.curve import Curve
 from wrist_stiffness.inference import Observations
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.workflows.pictures.dependence import Against
 from wrist_stiffness.workflows.provenance import Provenance
 from wrist_stiffness.workflows.report.page import Section, Table, Text
@@ -35,36 +34,37 @@ def number(value: float) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
-def against(statement: Statement, models: Sequence[tuple[str, Observations]]) -> Against:
-    """Return what a picture needs of one statement: residuals along its direction.
+def against(curve: Curve, title: str, models: Sequence[tuple[str, Observations]] = ()) -> Against:
+    """Return what a picture needs of one dependence.
 
     Parameters
     ----------
-    statement : Statement
+    curve : Curve
         Of one of the models.
+    title : str
+        What it depends on.
     models : sequence of (str, Observations)
-        Name and residuals of each model to be shown, over the same units.
+        Name and residuals of further models over the same units, shown along the same direction.
     """
-    change = max(statement.changes, key=lambda each: each.size / each.uncertainty)
-    condition = statement.condition
-    values = condition.columns[:, 0] if condition.along is None else condition.along
+    columns = list(curve.quantity.components)
+    used = curve.direction != 0.0
+    others = [
+        (name, left.values[:, columns][:, used] @ curve.direction[used] * curve.quantity.per_si)
+        for name, left in models
+    ]
+    label = f"{curve.quantity.name} {curve.where} [{unit_of(curve.quantity.unit)}]"
+    labels = tuple(typeset(each) for each in curve.labels)
     return Against(
-        condition.name,
-        typeset(condition.axis),
-        f"{change.quantity} {'along' if change.quantity == 's' else 'about'} {change.where} "
-        f"[{unit_of(change.unit)}]",
-        values,
-        [(name, _along(observations, change)) for name, observations in models],
+        title,
+        labels,
+        label,
+        curve.values,
+        curve.measured,
+        curve.places,
+        curve.mean,
+        curve.sigma,
+        others,
     )
-
-
-def _along(observations: Observations, change: Change) -> Array:
-    """Part of the residual along the direction of a change, (n,) in the unit of its report."""
-    (quantity,) = (q for q in observations.quantities if q.name == change.quantity)
-    columns = observations.values[:, list(quantity.components)]
-    # A component that was never measured has no part in the direction.
-    used = change.direction != 0.0
-    return columns[:, used] @ change.direction[used] * quantity.per_si
 
 
 def provenance_section(provenance: Provenance) -> Section:

@@ -1,0 +1,103 @@
+"""An effect that somebody named is found at its size, wherever its law begins."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.searching.free_effects import free_all
+from wrist_stiffness.campaign.searching.result import Fit
+from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
+from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.columns import tangents
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.registry import find_law
+
+SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
+POSES = 60
+
+
+def base_of(model, hidden):
+    """Fit registrations alone to poses measured on a wrist that has one effect more."""
+    rng = np.random.default_rng(5)
+    theta = np.radians(rng.uniform(-30.0, 30.0, (POSES, 2)))
+    load = rng.normal(size=(POSES, 6)) * np.repeat([0.5, 0.01], 3)
+    block = Block(2.0 * np.arange(POSES), theta, load)
+    true = model.with_effects(hidden).batch(block).measured
+    rotation, shift = exp_twist(true + SIGMA * rng.normal(size=(POSES, 6)))
+    nominal = model.table.mechanism.forward(theta).platform
+    session = MeasuredSession("day", block, shift, rotation @ nominal, np.diag(SIGMA**2))
+    frame = free_all(Effect(find_law("measurement_frame"), "pose_sensor"), per_session=True)
+    return WristProblem(model, (as_units(model, session),), ((frame,), ()))
+
+
+def found_beside(problem, effect):
+    """Return the parameters of a named effect beside that base, by key."""
+    grown = problem.extended(problem.begin(), effect)
+    return {p.key: p for p in Fit(grown.settled(), 0).parameters if p.effect == effect.name}
+
+
+def agrees(found, size):
+    """Whether a size is found, and its uncertainty is true and small."""
+    return abs(found.value - size) < 3.0 * found.sigma and found.sigma < 0.1 * abs(size)
+
+
+@pytest.mark.parametrize(
+    ("law", "place", "key", "size"),
+    [
+        ("link_stiffness", "link_1", "flexibility_percent", 100.0),
+        ("link_stiffness", "link_1", "flexibility_percent", -50.0),
+        ("backlash", "motor_2", "width_mdeg", 60.0),
+    ],
+)
+def test_a_law_ends_at_its_true_value(model, law, place, key, size):
+    hidden = Effect(find_law(law), place).with_values({key: size})
+    found = found_beside(base_of(model, hidden), Effect(find_law(law), place))
+    assert agrees(found[key], size)
+
+
+class Worn(type(find_law("backlash"))):
+    """Play that is never nothing."""
+
+    id = "worn"
+
+    def parameters(self, place):
+        return (replace(super().parameters(place)[0], lower=30.0, mean=40.0),)
+
+    def linearised(self, place, signals):
+        return tangents(self.parameters(place))
+
+
+def test_a_law_whose_bounds_leave_out_zero_is_found_within_them(model):
+    hidden = Effect(find_law("backlash"), "motor_2").with_values({"width_mdeg": 60.0})
+    worn = Effect(Worn(), "motor_2", {"width_mdeg": Estimate(40.0)})
+    found = found_beside(base_of(model, hidden), worn)
+    assert agrees(found["width_mdeg"], 60.0)
+
+
+def test_a_shape_is_found_from_its_grid(model):
+    hidden = Effect(find_law("transmission_error"), "motor_1").with_values(
+        {"order": 13.8, "cos_mdeg": 30.0}
+    )
+    found = found_beside(base_of(model, hidden), Effect(hidden.law, "motor_1"))
+    assert agrees(found["order"], 13.8)
+    assert agrees(found["cos_mdeg"], 30.0)
+
+
+@pytest.mark.parametrize("typed", [1.0, -10.0])
+def test_a_formula_is_found_from_what_was_typed(model, typed):
+    """It has no prior that would say how large it is, nor of which sign."""
+
+    def sag(size):
+        law = FormulaLaw(
+            "sag", "platform", np.eye(6)[2], "sag_um * sin(2 * theta_1)", [], ["sag_um"]
+        )
+        return Effect(law, "platform", {"sag_um": Estimate(size)})
+
+    found = found_beside(base_of(model, sag(3.2)), sag(typed))
+    assert agrees(found["sag_um"], 3.2)

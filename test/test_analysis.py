@@ -1,0 +1,97 @@
+"""The commands as an object: versions grow, shrink and are judged by what no fit has seen."""
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.analysis import Analysis, Cancelled
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.instrument import instrument
+
+PLAY = "backlash@motor_2"
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+@pytest.fixture(scope="module")
+def sessions(model):
+    """Two days of a wrist with play in a gear."""
+    found = []
+    for day in (0, 1):
+        settings = CellSettings(
+            rate_hz=10.0,
+            program_seconds=90.0,
+            program_seed=41 + day,
+            base="wrong",
+            base_seed=3,
+            session=day,
+            hidden=(HiddenEffect("backlash", "motor_2", "single", np.radians(0.06), 5),),
+        )
+        cell = VirtualCell(model.table, settings, np.random.default_rng(day))
+        time = np.arange(900) / 10.0
+        sample = cell.run(time, cell.desired(time))
+        block = Block(time, sample.encoder, sample.wrench, sample.speed)
+        scatter = np.diag(instrument(settings.instrument).sigma ** 2)
+        pose = sample.measured_shift, sample.measured_rotation
+        found.append(MeasuredSession(f"day_{day}", block, *pose, scatter))
+    return found
+
+
+@pytest.mark.slow
+def test_the_error_falls_with_what_is_found_and_added(model, sessions):
+    heard = []
+    analysis = Analysis(model, sessions, tell=heard.append)
+    assert analysis.versions[0].held_out["s_um"] > 100.0
+    calibrated = analysis.calibrate()
+    assert calibrated.held_out["s_um"] < 0.1 * analysis.versions[0].held_out["s_um"]
+    (finding,) = analysis.rank().diagnosis.findings
+    assert finding.name == PLAY
+    assert heard
+    seen = analysis.preview(PLAY)
+    wrong = analysis.preview("backlash@motor_1")
+    assert seen.log_gain > wrong.log_gain + 20.0
+    before, after = seen.explains["phi_mdeg"]
+    assert after < 0.7 * before
+    assert seen.change.shape == analysis.residual.values.shape
+    # A preview adds nothing.
+    assert [each.name for each in analysis.versions] == ["as given", "calibrated"]
+    added = analysis.add(PLAY)
+    assert added.held_out["phi_mdeg"] < 0.7 * calibrated.held_out["phi_mdeg"]
+    assert added.added.estimates["width_mdeg"].value == pytest.approx(60.0, rel=0.15)
+    assert PLAY in {each.name for each in analysis.model.effects}
+    compared = analysis.compare()
+    errors = [each.after["phi_mdeg"].rms for each in compared.models]
+    assert errors[2] < 0.7 * errors[1]
+    with pytest.raises(InputError, match="the model has it already"):
+        analysis.add(PLAY)
+    assert len(analysis.versions) == 3
+    assert analysis.undo() is calibrated
+    assert analysis.model is calibrated.model
+
+
+def test_what_is_cancelled_changes_nothing(model, sessions):
+    def cancelling(done, total):
+        analysis.cancel()
+
+    analysis = Analysis(model, sessions[:1], progress=cancelling)
+    with pytest.raises(Cancelled):
+        analysis.calibrate()
+    assert [each.name for each in analysis.versions] == ["as given"]
+
+
+def test_wrong_use_is_one_clear_line(model, sessions):
+    with pytest.raises(InputError, match="an analysis needs a session"):
+        Analysis(model, [])
+    analysis = Analysis(model, sessions[:1])
+    with pytest.raises(InputError, match="nothing to undo"):
+        analysis.undo()
+    with pytest.raises(InputError, match="write law@component"):
+        analysis.preview("backlash")

@@ -1,0 +1,321 @@
+"""A wrist, its recordings and a model that grows: the commands as an object, all in memory.
+
+    analysis = Analysis(model, sessions)
+    analysis.calibrate()
+    answer = analysis.rank(seconds=30)
+    print(analysis.preview("backlash@motor_2").explains)
+    analysis.add("backlash@motor_2")
+    for version in analysis.versions:
+        print(version.name, version.held_out)
+    analysis.undo()
+
+A method that fails, or is cancelled, leaves everything as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from threading import Event
+
+import numpy as np
+
+from wrist_stiffness.campaign.comparing.compare import compare_models
+from wrist_stiffness.campaign.comparing.comparison import Comparison
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.planning.earlier import as_experiment
+from wrist_stiffness.campaign.planning.plan import Conditions, Plan, plan
+from wrist_stiffness.campaign.planning.question import between
+from wrist_stiffness.campaign.searching.calibrate import calibrate
+from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
+from wrist_stiffness.campaign.searching.extend import extend
+from wrist_stiffness.campaign.searching.free_effects import unfitted
+from wrist_stiffness.campaign.searching.held_out import Judge
+from wrist_stiffness.campaign.searching.result import Fit
+from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
+from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.inference.answer import NAMING
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.progress import Progress, silent
+
+
+class Cancelled(WristError):
+    """Somebody cancelled what was being done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Version:
+    """A model of the wrist on its way.
+
+    Parameters
+    ----------
+    name : str
+        What was done last: `as given`, `calibrated` or `+ law@component`.
+    model : ErrorModel
+        As it may be saved.
+    held_out : dict of str to float
+        Error on units that a fit has not seen, RMS by the key of the quantity (`s_um`, `phi_mdeg`).
+    fit : Fit or None
+        To all recordings, with noise, discrepancy and every parameter; None where nothing was
+        fitted.
+    added : Effect or None
+        Effect of the step.
+    warnings : tuple of str
+        What speaks against it.
+    """
+
+    name: str
+    model: ErrorModel
+    held_out: Mapping[str, float]
+    fit: Fit | None = None
+    added: Effect | None = None
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What a candidate would explain if it were added.
+
+    Parameters
+    ----------
+    effect : Effect
+        As fitted.
+    change : (u, 6) float
+        What it and the tolerances beside it take away from each unit [m, rad].
+    log_gain : float
+        Natural logarithm of the evidence with it over that without it.
+    explains : dict of str to float
+        Error before and after on the recordings themselves, RMS by the key of the quantity.
+    """
+
+    effect: Effect
+    change: Array
+    log_gain: float
+    explains: Mapping[str, tuple[float, float]]
+
+
+class Analysis:
+    """Models of one wrist against its recordings.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    sessions : sequence of MeasuredSession
+        In the order of time; the last one judges where there are several, else the end of it.
+    progress : callable, optional
+        Told steps done and in all.
+    tell : callable, optional
+        Told in words what is being done.
+
+    Raises
+    ------
+    InputError
+        If there is no session, or nothing of one lies in the model's range.
+    """
+
+    def __init__(
+        self,
+        model: ErrorModel,
+        sessions: Sequence[MeasuredSession],
+        progress: Progress = silent,
+        tell: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        if not sessions:
+            raise InputError("an analysis needs a session")
+        self.sessions = tuple(sessions)
+        self._progress, self._tell = progress, tell
+        self._stop = Event()
+        self._problems: dict[int, WristProblem] = {}
+        self._versions = [Version("as given", model, {})]
+        base = self._problem().begin().base
+        error = Judge(base).of_model(model)
+        held_out = {q.key: error.rmse(q) for q in base.problem.table.reported}
+        self._versions = [replace(self._versions[0], held_out=held_out)]
+
+    @property
+    def versions(self) -> tuple[Version, ...]:
+        """All models on the way, the first as it was given."""
+        return tuple(self._versions)
+
+    @property
+    def model(self) -> ErrorModel:
+        """The newest model."""
+        return self._versions[-1].model
+
+    @property
+    def residual(self) -> Observations:
+        """What the newest model leaves once set-up and tolerances are fitted, and conditions."""
+        base = self._problem().begin().base
+        return base.problem.table.with_values(base.residual)
+
+    def cancel(self) -> None:
+        """Let what is being done end with `Cancelled` at its next step; call it from anywhere."""
+        self._stop.set()
+
+    def compare(self) -> Comparison:
+        """Say how far every version is off, where and under which condition."""
+        models = [(each.name, each.model) for each in self._versions]
+        return compare_models(models, self.sessions, self._watched())
+
+    def calibrate(self) -> Version:
+        """Fit set-up and tolerances of the newest model; it becomes a version."""
+        now = self._versions[-1]
+        known = self._known()
+        found = calibrate(known, self.sessions, self._watched())
+        step = Step("calibrate", "", "", {})
+        child = replace(found.model, lineage=(*now.model.lineage, step))
+        return self._became(Version("calibrated", child, found.after, found.fit))
+
+    def rank(self, naming: float = NAMING, seconds: float = np.inf) -> WristDiagnosis:
+        """Ask which effect the newest model misses.
+
+        Parameters
+        ----------
+        naming : float
+            Probability from which an effect is named.
+        seconds : float
+            Time after which no further fit is begun.
+
+        Returns
+        -------
+        WristDiagnosis
+            Findings, and in `diagnosis.standings` every candidate with its probability.
+        """
+        tell = self._watched_words()
+        return diagnose_sessions(self._known(), self.sessions, naming, seconds, tell)
+
+    def preview(self, candidate: str | Effect) -> Preview:
+        """Return what a candidate would explain, without adding it.
+
+        Parameters
+        ----------
+        candidate : str or Effect
+            `law@component` of the catalogue, or an effect of any law.
+
+        Raises
+        ------
+        InputError
+            If there is no such law or component, or it finds no equilibrium here.
+        """
+        self._watched()(0, 1)
+        problem, effect = self._problem(), _effect(candidate)
+        begun = problem.begin()
+        grown = problem.extended(begun, effect)
+        before, after = begun.base.residual, grown.base.residual
+        table = problem.table.table
+        errors = [table.rms(np.nan_to_num(each) ** 2) for each in (before, after)]
+        return Preview(
+            grown.base.beyond()[effect.name],
+            before - after,
+            grown.evidence.log - begun.evidence.log,
+            {q.key: (errors[0][q.key], errors[1][q.key]) for q in table.reported},
+        )
+
+    def add(self, candidate: str | Effect) -> Version:
+        """Add an effect to the newest model and fit both; the result becomes a version.
+
+        Parameters
+        ----------
+        candidate : str or Effect
+            As for `preview`.
+
+        Raises
+        ------
+        InputError
+            If the model has it already, or the recordings lack a signal that it needs.
+        """
+        now, effect = self._versions[-1], _effect(candidate)
+        found = extend(self._known(), effect, self.sessions, self._watched())
+        step = Step("extend", "", "", {}, added=effect.name)
+        child = replace(found.model, lineage=(*now.model.lineage, step))
+        held_out = {q.key: found.after.rmse(q) for q in found.quantities}
+        own = next(each for each in child.effects if each.name == effect.name)
+        name = f"+ {effect.name}"
+        return self._became(Version(name, child, held_out, found.fit, own, found.warnings))
+
+    def undo(self) -> Version:
+        """Take the newest version back, and return the one before it.
+
+        Raises
+        ------
+        InputError
+            If there is only the model as it was given.
+        """
+        if len(self._versions) == 1:
+            raise InputError("nothing to undo: this is the model as it was given")
+        self._versions.pop()
+        self._problems.pop(len(self._versions), None)
+        return self._versions[-1]
+
+    def plan(self, rivals: Sequence[str | Effect], conditions: Conditions) -> Plan:
+        """Plan the experiment that tells rivals apart.
+
+        Parameters
+        ----------
+        rivals : sequence of str or Effect
+            Two or more, the most probable first.
+        conditions : Conditions
+            Loads, durations, noise.
+        """
+        question = between(
+            [[_effect(each) for each in rivals]], (), np.random.default_rng(conditions.seed)
+        )
+        earlier = [as_experiment(self.model, each) for each in self.sessions]
+        return plan(self.model, question, conditions, earlier, self._watched())
+
+    def _became(self, version: Version) -> Version:
+        self._versions.append(version)
+        return version
+
+    def _known(self) -> ErrorModel:
+        """Return the newest model without what fits to these recordings found of its base."""
+        fitted = any(each.fit is not None for each in self._versions)
+        return unfitted(self.model) if fitted else self.model
+
+    def _problem(self) -> WristProblem:
+        """Return the problem of the newest version, fitted once."""
+        key = len(self._versions) - 1
+        if key not in self._problems:
+            known = self._known()
+            units = tuple(as_units(known, each) for each in self.sessions)
+            self._problems[key] = WristProblem(known, units)
+        return self._problems[key]
+
+    def _watched(self) -> Progress:
+        """Return the progress, which ends what is being done once that was cancelled."""
+        self._stop.clear()
+
+        def told(done: int, total: int) -> None:
+            self._check()
+            self._progress(done, total)
+
+        return told
+
+    def _watched_words(self) -> Callable[[str], None]:
+        self._stop.clear()
+
+        def told(text: str) -> None:
+            self._check()
+            self._tell(text)
+
+        return told
+
+    def _check(self) -> None:
+        if self._stop.is_set():
+            raise Cancelled("cancelled")
+
+
+def _effect(candidate: str | Effect) -> Effect:
+    if isinstance(candidate, Effect):
+        return candidate
+    law, _, place = candidate.rpartition("@")
+    if not law or not place:
+        raise InputError(f"effect {candidate!r}: write law@component, such as backlash@motor_2")
+    return Effect(find_law(law), place)

@@ -1,1 +1,0 @@
-"""Fit the parameters of a model to measured sessions: calibrate, extend, judge."""

@@ -1,0 +1,153 @@
+"""What a corrector answers: angles for the motors, and the residual that they leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.compensation.correction import Correction
+from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
+from wrist_stiffness.compensation.pose import seen_from
+from wrist_stiffness.compensation.trajectory import PlannedPoint
+from wrist_stiffness.errors import WristError
+from wrist_stiffness.mechanism.compiled import Flags
+from wrist_stiffness.mechanism.components import Array
+
+
+@dataclass(frozen=True)
+class CorrectedCommand:
+    """What to send to the motors for one command.
+
+    Parameters
+    ----------
+    frame_id : str
+        For the header: `wrist_corrected` where correction is on or still fades out.
+    positions : (n,) float
+        All joints of the command, the motors corrected [rad].
+    theta : (2,) float
+        Corrected motor angles [rad].
+    correction : Correction or None
+        As it is applied, with the residual that remains; None while none can be had.
+    fault : WristError or None
+        Why none can be had although correction is on (what was applied before then fades out), or
+        why the model could not remember the command.
+    valid : bool
+        Whether the residual holds: the load is known and corrected for in full
+        (`Supervisor.valid`).
+    """
+
+    frame_id: str
+    positions: Array
+    theta: Array
+    correction: Correction | None
+    fault: WristError | None
+    valid: bool = False
+
+    def residuals(self, tool_point: Array) -> list[tuple[Array, Array]]:
+        """Return what a correction leaves: actual minus desired pose.
+
+        Parameters
+        ----------
+        tool_point : (3,) float
+            Of the geometry, in U [m].
+
+        Returns
+        -------
+        list of ((6,) float, (6, 6) float)
+            Twist in F at O and its covariance, and the same at the tool point where that is not O;
+            empty without a correction.  Where the residual does not hold, the covariance says so as
+            that of a pose does that is not measured.
+        """
+        if self.correction is None:
+            return []
+        prediction = self.correction.prediction
+        platform = prediction.configuration.platform
+        return _left(self.correction.after, prediction.covariance, platform, self.valid, tool_point)
+
+
+@dataclass(frozen=True)
+class CorrectedTrajectory:
+    """What to send for a whole trajectory.
+
+    Parameters
+    ----------
+    frame_id : str
+        For the header: `wrist_corrected` where correction is on.
+    points : tuple of PlannedPoint
+        The motors' angles, speeds and accelerations corrected.
+    fault : WristError or None
+        Why it passes unchanged although correction is on.
+    valid : bool
+        As of a command, at its start.
+    """
+
+    frame_id: str
+    points: tuple[PlannedPoint, ...]
+    fault: WristError | None
+    valid: bool = False
+
+
+@dataclass(frozen=True)
+class CorrectedBlock:
+    """What to send to the motors for n commands.
+
+    Parameters
+    ----------
+    theta : (n, 2) float
+        Corrected motor angles [rad].
+    corrected : (n,) bool
+        Which of them have a correction; residual and covariance of the others are undefined.
+    after : (n, 6) float
+        Residual with the correction as it is applied, at O in F [m, rad].
+    covariance : (n, 6, 6) float
+        Of the prediction behind it.
+    faults : dict of int to WristError
+        Why a command has none.
+    platform : (n, 3, 3) float
+        U -> F of the rigid platform at the corrected angles.
+    valid : (n,) bool
+        As `CorrectedCommand.valid`.
+    """
+
+    theta: Array
+    corrected: Flags
+    after: Array
+    covariance: Array
+    faults: dict[int, WristError]
+    platform: Array
+    valid: Flags
+
+    def residuals(self, tool_point: Array) -> list[tuple[Array, Array]]:
+        """Return the same as `CorrectedCommand` of the k commands that have a correction.
+
+        Returns
+        -------
+        list of ((k, 6) float, (k, 6, 6) float)
+            Twists and covariances.
+        """
+        own = np.flatnonzero(self.corrected)
+        rows = self.after[own], self.covariance[own], self.platform[own], self.valid[own]
+        if not tool_point.any():
+            doubt = np.where(rows[3], 0.0, NOT_MEASURED)[:, None, None] * np.eye(6)
+            return [(rows[0], rows[1] + doubt)]
+        # One by one: a stack of products may round otherwise.
+        each = [_left(*row, tool_point) for row in zip(*rows, strict=True)]
+        return [
+            (
+                np.array([residuals[place][0] for residuals in each]).reshape(-1, 6),
+                np.array([residuals[place][1] for residuals in each]).reshape(-1, 6, 6),
+            )
+            for place in range(2)
+        ]
+
+
+def _left(
+    twist: Array, covariance: Array, platform: Array, valid: bool, tool_point: Array
+) -> list[tuple[Array, Array]]:
+    doubt = (0.0 if valid else NOT_MEASURED) * np.eye(6)
+    found = [(twist, covariance + doubt)]
+    if tool_point.any():
+        there = seen_from(platform @ tool_point)
+        found.append((there @ twist, there @ covariance @ there.T + doubt))
+    return found

@@ -1,0 +1,83 @@
+"""What is believed of the load, and what counts as another load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from wrist_stiffness.compensation.payload import Payload, Thresholds
+
+
+class State(Enum):
+    """What is believed of the load, by the operators' names."""
+
+    UNSURE = "unsure"
+    FREE = "free"
+    HOLDING = "holding"
+    IN_CONTACT = "in contact"
+    RELEASED = "released"
+
+
+@dataclass(frozen=True)
+class SupervisorSettings:
+    """What counts as another load, and how far the model is trusted beside obstacles.
+
+    Parameters
+    ----------
+    limit : Thresholds
+        A load that departs by less is the same load.  Never below five times the scatter that the
+        tare found.
+    model_doubt : float
+        The wrist may be so many times stiffer or softer than the model, 1 or more [-].
+    follow : bool
+        Correct for every load as it is measured, and in full.  Only where it cannot be a contact.
+    """
+
+    limit: Thresholds = Thresholds(0.05, 0.002)
+    model_doubt: float = 2.0
+    follow: bool = False
+
+    @property
+    def trust(self) -> float:
+        """Part of the predicted correction that leaves least of the error in the worst case [-].
+
+        Of an error e a model that is r times too soft predicts r e, and a part c of that leaves
+        |1 - c r| e.  Over all r from 1/q to q the largest is least where both ends leave the same,
+        at c = 2 / (q + 1/q): (q^2 - 1) / (q^2 + 1) of the error, and never as much as without
+        correction.  The whole correction, c = 1, of a model twice too soft turns the error round:
+        as large as before, but away from the obstacle that would have borne a part of it.
+        """
+        return 1.0 if self.follow else 2.0 / (self.model_doubt + 1.0 / self.model_doubt)
+
+
+@dataclass(frozen=True)
+class Supervision:
+    """What the supervisor believed at a moment.
+
+    Parameters
+    ----------
+    state : State
+        By the operators' names.
+    text : str
+        Why the correction is restricted; empty where it is not.
+    payload : Payload or None
+        What is corrected for.
+    told : bool
+        Whether the gripper told that payload.
+    share : float
+        Part of the correction that is applied, of what the model is trusted with; below 1 where it
+        yielded to a contact or is not certain [-].
+    valid : bool
+        Whether the load is known and corrected for, so that the residual holds.
+    stamp_ns, since_ns : int
+        Of the last command, and of the one at which the state began [ns].
+    """
+
+    state: State
+    text: str
+    payload: Payload | None
+    told: bool
+    share: float
+    valid: bool
+    stamp_ns: int
+    since_ns: int
