@@ -12,6 +12,7 @@ from wrist_stiffness.campaign.comparing.sentences import sentences
 from wrist_stiffness.campaign.comparing.set_up import without_set_up
 from wrist_stiffness.campaign.comparing.worst_poses import worst_poses
 from wrist_stiffness.campaign.searching.calibrate import calibrate
+from wrist_stiffness.campaign.searching.likelihood import KNOWN, SURE_OF_NOISE
 from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
@@ -102,7 +103,9 @@ def test_what_is_planted_in_a_session_is_told_first_with_its_size(cell, planted,
     grown = np.sqrt(found.error[key] ** 2 - cell().error[key] ** 2)
     assert first.sizes[key] == pytest.approx(grown, rel=0.25)
     assert found.above[key] == pytest.approx(grown, rel=0.25)
-    assert found.noise[key] == pytest.approx(cell().noise[key], rel=0.25)
+    # Jumps that no smooth curve follows may pass for noise, as far as noise is not known.
+    unsure = np.expm1(0.5 * SURE_OF_NOISE * KNOWN)
+    assert found.noise[key] == pytest.approx(cell().noise[key], rel=unsure)
 
 
 def table(dwells, change=None, seed=1):

@@ -18,13 +18,11 @@ from wrist_stiffness.inference.discrepancy import SLOW_DRIFT
 from wrist_stiffness.inference.evidence import (
     OFF,
     Array,
-    Background,
     Evidence,
-    Group,
-    Point,
     evidence,
     log_amplitude,
 )
+from wrist_stiffness.inference.point import Background, Group, Point
 
 HELD = 3.0
 """Log evidence that a group may gain when the amplitudes of the others follow."""

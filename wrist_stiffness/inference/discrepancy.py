@@ -13,8 +13,9 @@ from typing import Protocol
 
 import numpy as np
 
-from wrist_stiffness.inference.evidence import Array, Background, Group
+from wrist_stiffness.inference.evidence import Array
 from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.point import Background, Group
 
 DRIFT_S = (20.0, 200.0)
 """Correlation times of an instrument's slow drift, half of its variance each [s] (assumed)."""

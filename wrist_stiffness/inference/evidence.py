@@ -13,8 +13,8 @@ integrated (Laplace's method, exact where a law is linear).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.linalg.lapack import dpotri, dtrtri
 from scipy.special import gammaln
+
+from wrist_stiffness.inference.point import Background, Group, Point
 
 Array = NDArray[np.float64]
 
@@ -34,10 +36,6 @@ MISFIT = 0.05
 
 MOST_MISFIT = 3.0
 """Standard deviation of the logarithm of that excess variance (assumed)."""
-
-OUTSIDE = 0.2
-"""Prior probability that a model is wrong in a way that no effect of the catalogue is (assumed),
-spread evenly over the groups of the discrepancy."""
 
 SURPRISE = 2.0
 """Standard deviations of the logarithm of a drift's amplitude that no instrument reaches, but one
@@ -52,159 +50,6 @@ ask for more than one."""
 
 MOST_STEPS, ENOUGH = 15, 0.1
 """Steps of the search for the amplitudes, and the gain of log evidence below which it ends."""
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Columns of one kind that have no name, with one amplitude.
-
-    Parameters
-    ----------
-    name : str
-        What they depend on.
-    quantity : str
-        Name of the quantity that they change.
-    columns : (N, k) float
-        Whitened, for an amplitude of 1.
-    expected : float
-        Amplitude that is expected, of an instrument's drift; 0 for a discrepancy, which may be
-        absent.
-    width : float
-        Standard deviation of the logarithm of the amplitude about the expected one.
-    features : (u, k / c) float, optional
-        The same of each unit, before it changed the c components of the quantity.
-    size : (m,) float, optional
-        What that is of each component; 0 for those of other quantities.
-    """
-
-    name: str
-    quantity: str
-    columns: Array
-    expected: float = 0.0
-    width: float = 1.0
-    features: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    size: Array = field(default_factory=lambda: np.zeros(0))
-
-    def change(self, values: Array) -> Array:
-        """Return what values (k,) of the columns change, (u, m)."""
-        at = np.flatnonzero(self.size)
-        out = np.zeros((len(self.features), len(self.size)))
-        out[:, at] = self.features @ values.reshape(-1, len(at)) * self.size[at]
-        return out
-
-
-@dataclass(frozen=True, eq=False)
-class Background:
-    """All groups of a table, put together once for all sets of effects.
-
-    Parameters
-    ----------
-    groups : tuple of Group
-        None where nothing but the noise is without a name.
-    noise_width : float
-        Standard deviation of the logarithm of the noise's variance about the known one.
-    asked : int
-        Groups of the discrepancy that might have been there; 0 for those that are listed.
-    """
-
-    groups: tuple[Group, ...]
-    noise_width: float
-    asked: int = 0
-
-    @cached_property
-    def columns(self) -> Array:
-        """Columns of all groups, (N, q)."""
-        return np.concatenate([each.columns for each in self.groups], axis=1)
-
-    @cached_property
-    def group(self) -> NDArray[np.intp]:
-        """Number of the group of each column, (q,)."""
-        return np.repeat(np.arange(len(self.groups)), self.sizes)
-
-    @cached_property
-    def sizes(self) -> NDArray[np.intp]:
-        """Columns in each group, (g,)."""
-        return np.array([each.columns.shape[1] for each in self.groups], dtype=np.intp)
-
-    @cached_property
-    def optional(self) -> NDArray[np.bool_]:
-        """Which groups belong to the discrepancy of the model, (g,)."""
-        return np.array([each.expected == 0.0 for each in self.groups], dtype=bool)
-
-    @cached_property
-    def log_odds(self) -> float:
-        """Log prior odds of one group of the discrepancy to be there."""
-        chance = OUTSIDE / (self.asked or max(int(np.count_nonzero(self.optional)), 1))
-        return float(np.log(chance / (1.0 - chance)))
-
-    @cached_property
-    def gram(self) -> Array:
-        """Products of all columns, (q, q)."""
-        if not self.groups:
-            return np.zeros((0, 0))
-        return np.asarray(self.columns.T @ self.columns)
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """Where a fit of a set of effects ended, and all slopes there; whitened.
-
-    Parameters
-    ----------
-    left : (N,) float
-        What the fit leaves.
-    columns : (N, p) float
-        Change of that by each unknown.
-    z : (p,) float
-        Unknowns, from the means of their priors and in their standard deviations.
-    weight : (p,) float
-        Weights of the Gaussian priors of set-up and tolerances, nearly 0 where there is none.
-    effects : dict of str to (k,) int
-        Places of the unknowns of each effect, which have the prior of effects.
-    inexact : (N, l) float
-        What the laws of the effects may leave because no law is exact.
-    varied : dict of str to (N, l) float
-        What each effect would add if its size changed with the conditions by its own size.
-    linear : bool
-        Whether the slopes hold everywhere: then the unknowns follow the amplitudes.
-    numbers : int
-        Numbers that were measured, where the rows only sum them up; 0 where each is a row.
-    """
-
-    left: Array
-    columns: Array
-    z: Array
-    weight: Array
-    effects: Mapping[str, NDArray[np.intp]]
-    inexact: Array
-    varied: Mapping[str, Array] = field(default_factory=dict)
-    linear: bool = False
-    numbers: int = 0
-    _beside: dict[int, tuple[Array, Array]] = field(default_factory=dict, repr=False)
-
-    @property
-    def count(self) -> int:
-        """How many numbers were measured, N."""
-        return self.numbers or len(self.left)
-
-    def moved(self, step: Array) -> Point:
-        """Return the point a step (p,) further on, as the slopes tell."""
-        return replace(self, left=self.left + self.columns @ step, z=self.z + step)
-
-    def beside(self, ground: Background) -> tuple[Array, Array]:
-        """Return all columns, those of a background last, and their products; worked out once."""
-        if id(ground) not in self._beside:
-            named = np.concatenate([self.columns, self.inexact], axis=1)
-            beside = ground.columns if ground.groups else named[:, :0]
-            columns = np.concatenate([named, beside], axis=1)
-            own = named.shape[1]
-            gram = np.empty((columns.shape[1], columns.shape[1]))
-            gram[:own, :own] = named.T @ named
-            gram[:own, own:] = named.T @ beside
-            gram[own:, :own] = gram[:own, own:].T
-            gram[own:, own:] = ground.gram
-            self._beside[id(ground)] = columns, gram
-        return self._beside[id(ground)]
 
 
 def log_size_prior(square: float, count: int) -> float:

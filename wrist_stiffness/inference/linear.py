@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from wrist_stiffness.inference.candidates import Candidate
-from wrist_stiffness.inference.evidence import Background, Point, size_weight
+from wrist_stiffness.inference.evidence import size_weight
 from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Observations
+from wrist_stiffness.inference.point import Background, Point
 from wrist_stiffness.inference.search import Ranked, Trial
 from wrist_stiffness.inference.table import Table
 

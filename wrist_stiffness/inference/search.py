@@ -14,7 +14,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wrist_stiffness.inference.evidence import Array, Background, Evidence, Point, evidence
+from wrist_stiffness.inference.evidence import Array, Evidence, evidence
+from wrist_stiffness.inference.point import Background, Point
 
 LEADERS = 6
 """Candidates of each ranking that are fitted whole."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from wrist_stiffness.inference.candidates import Candidate
 from wrist_stiffness.inference.discrepancy import background
-from wrist_stiffness.inference.evidence import Background
 from wrist_stiffness.inference.noise import replicate_variance, rich_basis
 from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.outliers import lost_units
+from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.projection import orthonormal
 from wrist_stiffness.inference.settings import FEWEST_UNITS, OUTLIER_LIMIT
 from wrist_stiffness.inference.shared import (

@@ -16,8 +16,8 @@ from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.blocks import time_blocks
 from wrist_stiffness.inference.dependence import Dependences, dependences
-from wrist_stiffness.inference.evidence import Group, Point
 from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.point import Group, Point
 from wrist_stiffness.mechanism.components import Array
 
 BLOCKS = 10

@@ -10,8 +10,9 @@ from wrist_stiffness.campaign.searching.problem import WANDER
 from wrist_stiffness.campaign.searching.questions import Conditions, alike, questions
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT, Question, background, low_rank
-from wrist_stiffness.inference.evidence import Background, Evidence
+from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.observations import Labels, Observations
+from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.shared import Apart, component_factors, own_covariance
 from wrist_stiffness.mechanism.components import Array
 
@@ -99,16 +100,23 @@ class WristTable:
         return self._rows // self.table.n_components
 
     def noise(self, found: Evidence) -> dict[str, float]:
-        """Return the scatter of a unit by noise, hidden counts and the instrument's drift, RMS."""
-        own = np.array(self._scatter)
-        if np.log(found.excess) <= SURE_OF_NOISE * self._noise_width:
-            own *= found.excess
+        """Return the scatter of a unit by noise and hidden counts, RMS by quantity."""
+        return self.table.rms(self._scatter_of(found))
+
+    def noise_and_drift(self, found: Evidence) -> dict[str, float]:
+        """Return that with the instrument's slow drift, RMS by quantity."""
+        own = self._scatter_of(found)
         at = {each.name: list(each.components) for each in self.table.quantities}
         groups = zip(found.background.groups, found.amplitude, found.discrepant, strict=True)
         for group, size, wrong in groups:
             if group.name == SLOW_DRIFT and not wrong:
                 own[:, at[group.quantity]] += (size * self.drift[at[group.quantity]]) ** 2
         return self.table.rms(own)
+
+    def _scatter_of(self, found: Evidence) -> Array:
+        """Variance of each unit by noise, as far as the excess is no misfit."""
+        known = np.log(found.excess) <= SURE_OF_NOISE * self._noise_width
+        return self._scatter * (found.excess if known else 1.0)
 
     def above(self, found: Evidence) -> dict[str, float]:
         """Return what is left above that noise, RMS by quantity."""

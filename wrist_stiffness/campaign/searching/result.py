@@ -166,7 +166,7 @@ class Fit:
     @cached_property
     def noise(self) -> dict[str, float]:
         """Root mean square of the noise and the instrument's drift, by the key of the quantity."""
-        return self.fit.table.noise(self.fit.evidence)
+        return self.fit.table.noise_and_drift(self.fit.evidence)
 
     @cached_property
     def discrepancy(self) -> dict[str, float]:

@@ -12,7 +12,8 @@ from scipy.optimize import lsq_linear
 
 from wrist_stiffness.campaign.searching.base_fit import BaseFit
 from wrist_stiffness.campaign.searching.likelihood import WristTable
-from wrist_stiffness.inference.evidence import Evidence, Point, evidence, known_noise
+from wrist_stiffness.inference.evidence import Evidence, evidence, known_noise
+from wrist_stiffness.inference.point import Point
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.parameters import Parameter
 

@@ -29,7 +29,8 @@ from wrist_stiffness.campaign.searching.problem import FitProblem
 from wrist_stiffness.campaign.searching.wrist_fit import WristFit
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.inference.evidence import Background, evidence
+from wrist_stiffness.inference.evidence import evidence
+from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.search import FALLS, Ranked, Trial, ranked
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
