@@ -96,8 +96,11 @@ def test_a_block_is_its_commands_one_by_one_to_the_bit(seed):
     block = commands(400, seed)
     running, together, alone = running_model(), Corrector(), Corrector()
     correcting = Correcting(together, running, running.compiled, SETTINGS, block)
-    for begin in range(0, len(block.wanted), 150):
-        correcting.correct(min(begin + 150, len(block.wanted)))
+    place = correcting.correct(0)
+    while place < len(block.wanted):
+        load = Load(block.load[place], bool(block.on_platform[place]))
+        correcting.correct_in_python(place, load, 1.0)
+        place = correcting.correct(place + 1)
     rows, faults = correcting.found, correcting.faults
     running = running_model()
     for i, stamp_ns in enumerate(block.stamp_ns.tolist()):

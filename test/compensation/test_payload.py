@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wrist_stiffness.compensation.payload import Scales
+from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.errors import LoadRangeError, UnreachablePoseError
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.error_model import Load

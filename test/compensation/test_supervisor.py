@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from wrist_stiffness.compensation import supervisor as module
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.payload import Payload, Scales, Thresholds
+from wrist_stiffness.compensation.payload import Payload, Thresholds
+from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.compensation.supervisor import LATE_S, Supervisor

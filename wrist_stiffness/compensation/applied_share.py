@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from operator import mul
-
 from wrist_stiffness.compensation.payload import Row
 
 RAMP_S = 1.0
@@ -50,7 +48,7 @@ class AppliedShare:
 
     def after(self, seconds: float, turn: Row) -> float:
         """Let time [s] pass with a correction that turns the platform by (3,), along u, v, down."""
-        if self.against is not None and sum(map(mul, self.against, turn)) < 0.0:
+        if self.against is not None and _dot(self.against, turn) < 0.0:
             self.value = max(0.0, self.value - seconds / YIELD_S)
         elif not self.sure:
             self.value = max(0.0, self.value - seconds / RAMP_S)
@@ -62,3 +60,8 @@ class AppliedShare:
 def apart(theta: list[float], other: list[float]) -> float:
     """Return how far two commands (2,) are apart, the larger of both motors [rad]."""
     return max(abs(theta[0] - other[0]), abs(theta[1] - other[1]))
+
+
+def _dot(a: Row, b: Row) -> float:
+    # Not `sum`, which rounds otherwise from Python 3.12 on.
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -18,16 +18,17 @@ from wrist_stiffness.compensation.corrector import Correcting, Corrector
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.judged_load import judged_load
 from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
-from wrist_stiffness.compensation.payload import Held, Reading, Thresholds
+from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.compensation.perishable import require_within_limits, within_limits
 from wrist_stiffness.compensation.plan import PlanCorrector
+from wrist_stiffness.compensation.scales import Held
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.compensation.supervision import Supervision
 from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.compensation.trajectory import PlannedPoint
 from wrist_stiffness.errors import InputError, StaleLoadError, WristError
-from wrist_stiffness.mechanism.compiled import CompiledCommands
+from wrist_stiffness.mechanism.compiled import CompiledCommands, CompiledSupervisor
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.model.error_model import ErrorModel, Load
@@ -156,15 +157,7 @@ class CorrectionStream(Stream):
         load: Load | None = None
         fault: WristError | None = None
         if self.correcting:
-            try:
-                load = self._load(stamp_ns, theta)
-                if self.supervisor.since_ns == stamp_ns:
-                    # With another payload the hysteresis begins anew.
-                    self._corrector.release()
-            except WristError as error:
-                fault = error
-                if isinstance(error, StaleLoadError):
-                    self.supervisor.lost()
+            load, fault = self._judged(stamp_ns, theta)
         delta, correction = NOTHING, None
         if self._running is not None:
             corrected = self._corrector.command(
@@ -221,44 +214,25 @@ class CorrectionStream(Stream):
         compiled = running.compiled
         if compiled is None:
             raise InputError("this model is corrected command by command")
-        wrench, on_platform, wanted = self.loads.block_at(stamps)
-        table, n, follow = running.model.table, len(stamps), settings.supervisor.follow
-        rows, usable = supervisor.scales(table.geometry).rows_of(table, theta, wrench, on_platform)
-        commands = CompiledCommands(stamps, theta, wrench, on_platform, wanted, np.ones(n))
+        n, valid = len(stamps), np.zeros(len(stamps), dtype=bool)
+        commands = CompiledCommands(stamps, theta, *self.loads.block_at(stamps), np.ones(n))
         block = Correcting(self._corrector, running, compiled, settings, commands)
-        angles, readings, times = theta.tolist(), rows.tolist(), stamps.tolist()
-        usable &= wanted
-        valid = np.zeros(n, dtype=bool)
-        # Where every load is followed and none is missing, each counts for itself.
-        skipped = n - 1 if follow and wanted.all() and supervisor.settled else 0
-        valid[:skipped] = True
-        for i in range(skipped, n):
-            try:
-                if follow or not usable[i]:
-                    load = self._load(times[i], theta[i])
-                    wrench[i], on_platform[i] = load.wrench, load.on_platform
-                else:
-                    reading = Reading.of_row(readings[i])
-                    judged = supervisor.judge(
-                        times[i], angles[i], reading, settings.supervisor, settings.correction_limit
-                    )
-                    wrench[i], on_platform[i] = 0.0 if judged is None else judged, False
-                if supervisor.since_ns == times[i]:
-                    block.search(i)
-                    self._corrector.release()
-            except WristError as error:
-                block.faults[i] = error
-                if isinstance(error, StaleLoadError):
-                    supervisor.lost()
-            wanted[i] = i not in block.faults
-            settled = supervisor.settled
-            commands.share[i] = settled or 0.0
-            if wanted[i] and not settled:
-                block.search(i)
-                block.search_one(supervisor.share)
-            valid[i] = supervisor.valid
-        block.correct(n)
-        corrected = commands.wanted.copy()
+        scales = supervisor.scales(running.model.table.geometry)
+        place = 0
+        while place < n:
+            judged = False
+            if commands.wanted[place]:
+                rows = supervisor.rows(scales, settings.supervisor, settings.correction_limit)
+                begin, place = place, block.correct(place, CompiledSupervisor(*rows, valid))
+                judged = supervisor.take_over(*rows)
+                last = min(place, n - 1) if judged else place - 1
+                if settings.supervisor.follow and last >= begin:
+                    supervisor.followed = _load_at(commands, last)
+            if place < n:
+                self._correct_one(block, place, judged)
+                valid[place] = supervisor.valid
+                place += 1
+        corrected = np.ones(n, dtype=bool)
         corrected[list(block.faults)] = False
         there = Configuration.of_row(np.ascontiguousarray(block.found.configuration))
         twist = np.ascontiguousarray(block.found.twist)
@@ -379,11 +353,30 @@ class CorrectionStream(Stream):
             return error
         return None
 
-    def _load(self, stamp_ns: int, theta: Array) -> Load:
-        """Return the load to correct for."""
-        _, measured = self.loads.at(stamp_ns)
-        table = self.running_model().model.table
-        return judged_load(self.supervisor, self.settings, table, stamp_ns, theta, measured)
+    def _judged(self, stamp_ns: int, theta: Array) -> tuple[Load | None, WristError | None]:
+        """Return the load to correct for, or why there is none."""
+        try:
+            _, measured = self.loads.at(stamp_ns)
+            table = self.running_model().model.table
+            load = judged_load(self.supervisor, self.settings, table, stamp_ns, theta, measured)
+        except WristError as error:
+            if isinstance(error, StaleLoadError):
+                self.supervisor.lost()
+            return None, error
+        if self.supervisor.since_ns == stamp_ns:
+            # With another payload the hysteresis begins anew.
+            self._corrector.release()
+        return load, None
+
+    def _correct_one(self, block: Correcting, place: int, judged: bool) -> None:
+        """Correct a command of a block that the compiled formulas cannot serve, as a live one."""
+        commands, fault = block.commands, None
+        load: Load | None = _load_at(commands, place)
+        if not judged:
+            load, fault = self._judged(int(commands.stamp_ns[place]), commands.theta[place])
+        block.correct_in_python(place, load, self.supervisor.settled or self.supervisor.share)
+        if fault is not None:
+            block.faults[place] = fault
 
     def _held_by(self, stamp_ns: int, first: Array | None) -> Held:
         """Return what a plan is corrected for, that begins at motor angles (2,) [rad].
@@ -397,3 +390,7 @@ class CorrectionStream(Stream):
             for load_ns, load in self.loads.since(start_ns, stamp_ns):
                 judged_load(supervisor, self.settings, table, load_ns, first, load)
         return supervisor.held(self.settings.supervisor)
+
+
+def _load_at(commands: CompiledCommands, place: int) -> Load:
+    return Load(commands.load[place].copy(), bool(commands.on_platform[place]))

@@ -25,6 +25,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.compiled import (
     CompiledCommands,
+    CompiledSupervisor,
     CompiledWrist,
     CorrectedRows,
     CorrectorState,
@@ -34,7 +35,7 @@ from wrist_stiffness.model.error_model import IN_F, IN_U, ErrorModel, Load
 
 WANTED = np.ones(1, dtype=bool)
 
-Share = Callable[[Array], float] | float
+Share = Callable[[list[float]], float] | float
 """Which part of a correction is applied, or a function of the platform's turn (3,) [rad]."""
 
 
@@ -145,8 +146,10 @@ class Corrector:
                 play = play_of(running.model, settings)
                 found = search(running, settings, stamp_ns, load, theta, theta_dot, held, play)
                 self.held[:] = found.delta
-                part = share(found.jacobian.dot(found.delta)) if callable(share) else share
-                wanted = part * faded(running, settings, found)
+                turn = turned(found.jacobian.ravel().tolist(), found.delta.tolist())
+                wanted = (share(turn) if callable(share) else share) * faded(
+                    running, settings, found
+                )
             except WristError as error:
                 fault = error
         limits = running.model.table.geometry.limits
@@ -168,14 +171,14 @@ class Correcting:
     settings : StreamSettings
         Objective and limits.
     commands : CompiledCommands
-        n of them; loads and which are wanted may still be written until they are searched.
+        n of them.
 
     Attributes
     ----------
     found : CorrectedRows
         The corrections.
     faults : dict of int to WristError
-        Why a command that was wanted has no correction, by its place.
+        Why a command has no correction, by its place.
     """
 
     def __init__(
@@ -198,67 +201,22 @@ class Correcting:
         self._state = CorrectorState(
             corrector.held, running.contact, applied.value, applied.stamp_ns
         )
-        self._searched = self._applied = 0
 
-    def correct(self, end: int) -> None:
-        """Correct commands up to a place; what their shares are must be said."""
-        self.search(end)
-        self._apply(end)
+    def correct(self, begin: int, supervisor: CompiledSupervisor | None = None) -> int:
+        """Judge and correct commands from a place on; return the first that this cannot serve."""
+        return self._compiled.correct(
+            self._task, self._safety, self.commands, self._state, self.found, supervisor, begin
+        )
 
-    def search(self, end: int) -> None:
-        """Search corrections up to a place, to be applied later."""
-        while self._searched < end:
-            begin = self._searched
-            self._searched = self._compiled.correct(
-                self._task, None, self.commands, self._state, self.found, begin, end
-            )
-            if self._searched < end:
-                self._search_in_python(float(self.commands.share[self._searched]))
-
-    def search_one(self, share: Callable[[Array], float]) -> None:
-        """Search the next one, and learn which share of it is applied."""
-        if not self._next(share):
-            self._search_in_python(share)
-
-    def only_one(self, share: Share) -> bool:
-        """Correct the only command of a block; tell whether the compiled formulas serve."""
-        if not callable(share):
-            self.commands.share[0] = share
-            state, found = self._state, self.found
-            return self._compiled.correct(self._task, self._safety, self.commands, state, found) > 0
-        if not self._next(share):
-            return False
-        self._apply(1)
-        return True
-
-    def _next(self, share: Callable[[Array], float]) -> bool:
-        own, found, place = self.commands, self.found, self._searched
-        end = place + 1
-        if self._compiled.correct(self._task, None, own, self._state, found, place, end) == place:
-            return False
-        row = found.rows[place]
-        own.share[place] = share(row[14:20].reshape(3, 2).dot(row[:2]))
-        self._searched = end
-        return True
-
-    def _apply(self, end: int) -> None:
-        begin, self._applied = self._applied, end
-        if begin < end:
-            state, found = self._state, self.found
-            self._compiled.correct(None, self._safety, self.commands, state, found, begin, end)
-
-    def _search_in_python(self, share: Share) -> None:
-        """Search and apply the next one."""
-        own, place = self.commands, self._searched
-        self._apply(place)
-        self._searched = self._applied = place + 1
+    def correct_in_python(self, place: int, load: Load | None, share: Share) -> None:
+        """Correct one command, for a load or none, and say why it cannot be."""
         one = self._corrector.searched(
             self._running,
             self._settings,
-            int(own.stamp_ns[place]),
-            own.theta[place],
+            int(self.commands.stamp_ns[place]),
+            self.commands.theta[place],
             None,
-            Load(own.load[place], bool(own.on_platform[place])),
+            load,
             share,
         )
         self.found.applied[place] = one.delta
@@ -267,6 +225,26 @@ class Correcting:
         elif one.correction is not None:
             at = one.correction.prediction
             self.found.put(place, one.correction.after, at.twist, at.configuration)
+
+    def only_one(self, share: Share) -> bool:
+        """Correct the only command of a block; tell whether the compiled formulas serve."""
+        own, state, found = self.commands, self._state, self.found
+        if not callable(share):
+            own.share[0] = share
+            return self._compiled.correct(self._task, self._safety, own, state, found) > 0
+        if not self._compiled.correct(self._task, None, own, state, found):
+            return False
+        row = found.rows[0].tolist()
+        own.share[0] = share(turned(row[14:20], row[:2]))
+        self._compiled.correct(None, self._safety, own, state, found)
+        return True
+
+
+def turned(jacobian: list[float], delta: list[float]) -> list[float]:
+    """Return how a correction (2,) [rad] turns the platform by its Jacobian (3, 2), row by row."""
+    (a, b, c, d, e, f), (x, y) = jacobian, delta
+    # Not `dot`, which rounds otherwise from one processor to another.
+    return [a * x + b * y, c * x + d * y, e * x + f * y]
 
 
 def search(

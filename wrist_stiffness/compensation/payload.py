@@ -13,18 +13,10 @@ arrays have three elements, and this is done for every command.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import isfinite, sqrt
 from typing import NamedTuple
 
-import numpy as np
-
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.compiled import Flags, native
-from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.vectors import triad
-from wrist_stiffness.model.error_model import IN_F, IN_U, Load
 
 SIGMAS = 3.0
 """A threshold is this many standard deviations of what one reading may be wrong by."""
@@ -82,7 +74,7 @@ class Thresholds(NamedTuple):
 
     def wider(self, reading: Reading, turn: float) -> Thresholds:
         """Return thresholds for a load that may seem turned [rad]."""
-        force, moment = hypot(reading.side, reading.weight), hypot(*reading.moments)
+        force, moment = reading.lengths
         return Thresholds(self.force + turn * force, self.moment + turn * moment)
 
 
@@ -112,10 +104,17 @@ class Reading(NamedTuple):
         side, weight, u, v, down, a, b, c, d, e, f = row
         return cls(side, weight, (u, v, down), ((a, b, c), (d, e, f)))
 
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Force and moment [N, N m]."""
+        side, weight, (u, v, down), _ = self
+        # Not `hypot`, which rounds otherwise from one library to another.
+        return sqrt(side * side + weight * weight), sqrt(u * u + v * v + down * down)
+
     def size(self, limit: Thresholds) -> float:
         """Return the load over the thresholds, the larger of force and moment [-]."""
-        force = hypot(self.side, self.weight) / limit.force
-        return max(force, hypot(*self.moments) / limit.moment)
+        force, moment = self.lengths
+        return max(force / limit.force, moment / limit.moment)
 
     def aside(self, limit: Thresholds) -> float:
         """Return over the thresholds what no payload weighs: across gravity and about it [-]."""
@@ -143,7 +142,20 @@ class PayloadEstimate:
         variance = open_moment * open_moment
         self.weight, self.moments = weight, moments
         self._readings = 0.0 if variance else ENOUGH
-        self._spread = (variance, 0.0, 0.0, variance, 0.0, variance)
+        self._spread: tuple[float, ...] = (variance, 0.0, 0.0, variance, 0.0, variance)
+
+    @property
+    def row(self) -> list[float]:
+        """All 11 numbers, as `of_row` takes them."""
+        return [self.weight, *self.moments, self._readings, *self._spread]
+
+    @classmethod
+    def of_row(cls, row: list[float]) -> PayloadEstimate:
+        """Return an estimate from its `row`."""
+        weight, x, y, z, readings, *spread = row
+        estimate = cls(weight, (x, y, z), 0.0)
+        estimate._readings, estimate._spread = readings, tuple(spread)
+        return estimate
 
     def rest(self, reading: Reading) -> Reading:
         """Return what of a load the payload does not explain."""
@@ -160,7 +172,7 @@ class PayloadEstimate:
 
     def open_moment(self, rows: tuple[Row, Row]) -> float:
         """Return how far its moments at a pose may be from what is known of them [N m]."""
-        return SIGMAS * max(_quadratic(self._spread, row) for row in rows) ** 0.5
+        return SIGMAS * sqrt(max(_quadratic(self._spread, row) for row in rows))
 
     def explains(self, reading: Reading, limit: Thresholds, counts: float) -> bool:
         """Tell whether a load is the payload's, within thresholds and what poses left open.
@@ -213,180 +225,3 @@ def _quadratic(spread: tuple[float, ...], row: Row) -> float:
     xx, xy, xz, yy, yz, zz = spread
     a, b, c = row
     return a * a * xx + b * b * yy + c * c * zz + 2.0 * (a * b * xy + a * c * xz + b * c * yz)
-
-
-class Scales:
-    """Weighs on one wrist: reads loads along gravity, and turns payloads into loads.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Gravity, and the largest moment of the table: a payload beyond it is refused anyway.
-    """
-
-    def __init__(self, geometry: Geometry) -> None:
-        self.geometry = geometry
-        self._g = float(np.linalg.norm(geometry.gravity))
-        down = geometry.gravity / self._g if self._g else np.array([0.0, 0.0, -1.0])
-        frame = triad(down, np.eye(3)[np.argmin(np.abs(down))])
-        self._axes: list[list[float]] = [*frame[:, 1:].T.tolist(), down.tolist()]
-        self._constants = np.append(self._axes, self._g)
-
-    def read(self, table: Table, theta: Array, load: Load) -> Reading:
-        """Read a load.
-
-        Parameters
-        ----------
-        table : Table
-            Its domain and range of loads.
-        theta : (2,) float
-            Motor angles [rad].
-        load : Load
-            On the platform there.
-
-        Raises
-        ------
-        WristError
-            If the pose or the load is out of range.
-        """
-        if native is not None:
-            rows, usable = self.rows_of(
-                table, theta, load.wrench, IN_U if load.on_platform else IN_F
-            )
-            if usable[0]:
-                return Reading.of_row(rows[0].tolist())
-        # A payload may stand in for it, but a load beyond the table is a fault in any case; turning
-        # a wrench changes neither of its sizes, so its frame does not matter.
-        table.check_load(load.wrench)
-        at = table.workspace.configuration(theta)
-        return self.reading(load.in_base(at).tolist(), at.platform.tolist())
-
-    def rows_of(
-        self, table: Table, theta: Array, wrench: Array, on_platform: Flags
-    ) -> tuple[Array, Flags]:
-        """Read many loads, compiled.
-
-        Parameters
-        ----------
-        table : Table
-            Its domain and range of loads.
-        theta, wrench : (n, 2), (n, 6) float
-            Motor angles [rad], loads at O [N, N m].
-        on_platform : (n,) bool
-            Which loads are in U, not in F.
-
-        Returns
-        -------
-        (n, 11) float, (n,) bool
-            What `Reading.of_row` takes, and where that could be had.
-        """
-        n = len(on_platform)
-        rows, status = np.empty((n, native.READING)), np.empty(n, dtype=np.uint8)
-        constants = table.workspace.constants
-        native.read_load(constants, self._constants, theta, wrench, on_platform, rows, status)
-        return rows, status == 0
-
-    def reading(self, wrench: list[float], rotation: list[list[float]]) -> Reading:
-        """Return a load (6,) at O in F [N, N m] on the platform that is turned by (3, 3)."""
-        force_u, force_v, weight = self.along(wrench[:3])
-        side = hypot(force_u, force_v)
-        if not self._g:
-            # Nothing weighs: whatever acts is a contact.
-            side, weight = hypot(side, weight), 0.0
-        return Reading(side, weight, self.along(wrench[3:]), self.rows(rotation))
-
-    def rows(self, rotation: list[list[float]]) -> tuple[Row, Row]:
-        """Return what the moments about u and v are of Q, on the platform turned by (3, 3)."""
-        (ux, uy, uz), (vx, vy, vz), _ = self._axes
-        (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = rotation
-        first = (
-            vx * r00 + vy * r10 + vz * r20,
-            vx * r01 + vy * r11 + vz * r21,
-            vx * r02 + vy * r12 + vz * r22,
-        )
-        second = (
-            -ux * r00 - uy * r10 - uz * r20,
-            -ux * r01 - uy * r11 - uz * r21,
-            -ux * r02 - uy * r12 - uz * r22,
-        )
-        return first, second
-
-    def along(self, vector: list[float]) -> Row:
-        """Return a vector (3,) in F along u, v and down."""
-        x, y, z = vector
-        (ux, uy, uz), (vx, vy, vz), (dx, dy, dz) = self._axes
-        return ux * x + uy * y + uz * z, vx * x + vy * y + vz * z, dx * x + dy * y + dz * z
-
-    def load(
-        self, payload: PayloadEstimate, rows: tuple[Row, Row], share: float
-    ) -> tuple[float, ...]:
-        """Return a share of a payload's load at the pose of a reading's rows, (6,) in F."""
-        (ux, uy, uz), (vx, vy, vz), (dx, dy, dz) = self._axes
-        weight = share * payload.weight
-        first, second = payload.shown(rows)
-        first, second = share * first, share * second
-        return (
-            weight * dx,
-            weight * dy,
-            weight * dz,
-            ux * first + vx * second,
-            uy * first + vy * second,
-            uz * first + vz * second,
-        )
-
-    def unknown(self, reading: Reading) -> PayloadEstimate:
-        """Return the estimate of a payload of which a reading's weight is all that is known."""
-        return PayloadEstimate(reading.weight, (0.0, 0.0, 0.0), self.geometry.limits.moment)
-
-    def estimate(self, payload: Payload) -> PayloadEstimate:
-        """Return a payload as an estimate that is known."""
-        weight = payload.mass_kg * self._g
-        x, y, z = payload.centre_m
-        return PayloadEstimate(weight, (weight * x, weight * y, weight * z), 0.0)
-
-    def payload(self, estimate: PayloadEstimate) -> Payload:
-        """Return an estimate as a payload."""
-        x, y, z = (moment / estimate.weight for moment in estimate.moments)
-        return Payload(estimate.weight / self._g, (x, y, z))
-
-
-@dataclass(frozen=True)
-class Held:
-    """What a plan is corrected for, from `Supervisor.held`.
-
-    Parameters
-    ----------
-    scales, payload : Scales, PayloadEstimate or None
-        None where there is no payload.
-    followed : Load or None
-        Where every load is followed.
-    share : float
-        Part of the correction that is applied [-].
-    valid : bool
-        Whether the load was known and corrected for, as `Supervision.valid`.
-    threshold : float
-        A moment by which a load would be another one [N m].
-    """
-
-    scales: Scales | None
-    payload: PayloadEstimate | None
-    followed: Load | None
-    share: float
-    valid: bool
-    threshold: float
-
-    def load(self, rotation: Array) -> Load:
-        """Return the load on the platform that is turned by (3, 3), U -> F."""
-        if self.followed is not None:
-            return self.followed
-        if self.scales is None or self.payload is None:
-            return Load(np.zeros(6))
-        rows = self.scales.rows(rotation.tolist())
-        return Load(np.array(self.scales.load(self.payload, rows, 1.0)))
-
-    def known(self, rotation: Array) -> bool:
-        """Tell whether that load is known: one pose shows but a part of a payload's centre."""
-        if self.scales is None or self.payload is None:
-            return self.valid
-        open_moment = self.payload.open_moment(self.scales.rows(rotation.tolist()))
-        return self.valid and open_moment <= self.threshold

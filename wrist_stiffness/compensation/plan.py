@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.compensation.corrector import Corrector, faded, search
-from wrist_stiffness.compensation.payload import Held, Scales
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import guard_weight, within_joint_limits
+from wrist_stiffness.compensation.scales import Held, Scales
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.trajectory import PlannedPoint, corrected_point, neighbours
 from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
@@ -104,7 +104,8 @@ class PlanCorrector:
         for i in np.flatnonzero(inside).tolist():
             # From nothing, so that no point depends on the one before.
             state = CorrectorState(np.zeros(2), self.running.contact, np.zeros(2), np.zeros(1, int))
-            inside[i] = compiled.correct(self._task, None, commands, state, found, i, i + 1) > i
+            end = compiled.correct(self._task, None, commands, state, found, None, i, i + 1)
+            inside[i] = end > i
         there = Configuration.of_row(np.ascontiguousarray(found.configuration))
         weight = guard_weight(table.workspace, there, self.settings.safety)
         delta = self.held.share * weight[:, None] * found.applied

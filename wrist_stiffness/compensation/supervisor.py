@@ -27,85 +27,38 @@ from __future__ import annotations
 
 from copy import copy
 
-from wrist_stiffness.compensation.applied_share import RAMP_S, AppliedShare, apart
-from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.payload import (
-    Held,
-    Payload,
-    PayloadEstimate,
-    Reading,
-    Scales,
-    Thresholds,
+from wrist_stiffness.compensation.applied_share import RAMP_S, apart
+from wrist_stiffness.compensation.belief import (
+    CALM,
+    CHANGES,
+    JUDGE_S,
+    LATE_S,
+    LONGEST_STEP_S,
+    NEW_WEIGHT,
+    NO_LOAD,
+    NO_WEIGHT,
+    OPEN,
+    SETTLE_S,
+    Belief,
 )
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.payload import Payload, PayloadEstimate, Reading, Thresholds
+from wrist_stiffness.compensation.scales import Held, Scales
 from wrist_stiffness.compensation.supervision import State, Supervision, SupervisorSettings
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.error_model import Load
 
-JUDGE_S = 0.1
-"""A contact, a release or a new weight that departs by one threshold is believed after this time,
-one that departs by more sooner in proportion, by two readings at least [s] ..."""
-
-SETTLE_S = 0.5
-"""... and what allows more correction after this: no part swings or is being lifted then [s]."""
-
-LATE_S = 0.2
-"""So late a load may be, and the motors behind their command: as much as the platform turns in this
-time, a load may seem turned, and readings within it may all be wrong by the same [s]."""
-
-CALM = 0.5
-"""A contact ends and a weight becomes the payload within this part of the thresholds, so that noise
-does not undo it."""
-
-OPEN = 10.0
-"""In contact a payload stands in only where its moment is known to this many thresholds."""
-
-LONGEST_STEP_S = 0.1
-"""A pause between commands counts as this much."""
-
-NO_LOAD = "no load is known"
-NO_WEIGHT = "the load is no weight: a contact, or the sensor is not tared"
-CHANGES = "the load changes with the correction: a contact"
-NEW_WEIGHT = "a weight that was not there before is being judged"
 COMING_IN = "the correction is coming in"
 YIELDED = "the correction yielded to a contact, and comes back when the command leaves this place"
 
 TRUSTED = (State.FREE, State.HOLDING)
 UNKNOWN = (State.UNSURE, State.IN_CONTACT)
 
-TEXTS = {State.UNSURE: NEW_WEIGHT, State.IN_CONTACT: NO_WEIGHT}
+TEXT_OF = {State.UNSURE: NEW_WEIGHT, State.IN_CONTACT: NO_WEIGHT}
 
 
-class Supervisor:
-    """The state machine of one corrector.
-
-    Attributes
-    ----------
-    scatter : Thresholds
-        The least thresholds, from the noise of the load.
-    """
-
-    def __init__(self) -> None:
-        self.scatter = Thresholds(0.0, 0.0)
-        self._scales: Scales | None = None
-        self._expected: Payload | None = None
-        self._told = False
-        self.forget()
-
-    def forget(self) -> None:
-        """Judge anew; what the gripper told still stands."""
-        self._stamp_ns = self._since_ns = 0
-        self._state = self._seen = State.UNSURE
-        self._text = NO_LOAD
-        self._seen_s = self._step_s = self._candidate_s = 0.0
-        self._payload: PayloadEstimate | None = None
-        self._candidate: PayloadEstimate | None = None
-        self._weight = self._departure = self._trust = 1.0
-        self._share = AppliedShare()
-        self._behind: list[float] | None = None
-        self._place: list[float] | None = None
-        self._rest_s = self._counts = 0.0
-        self._followed: Load | None = None
+class Supervisor(Belief):
+    """The state machine of one corrector.  Blocks of commands go through its compiled twin."""
 
     def declare_payload(self, payload: Payload | None) -> None:
         """Take over what the gripper tells.
@@ -171,7 +124,7 @@ class Supervisor:
     def follow(self, stamp_ns: int, measured: Load) -> None:
         """Take a load as it is measured for the payload."""
         self._begin(stamp_ns)
-        self._trust, self._followed = 1.0, measured
+        self._trust, self.followed = 1.0, measured
         self._state, self._share.against, self._share.sure = State.FREE, None, True
 
     def judge(
@@ -225,19 +178,14 @@ class Supervisor:
     def _begin(self, stamp_ns: int) -> None:
         last_ns, self._stamp_ns = self._stamp_ns or stamp_ns, stamp_ns
         self._step_s = min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)
-        self._followed = None
-
-    def limit(self, settings: SupervisorSettings) -> Thresholds:
-        """Return by how much another load departs at least, at rest."""
-        force = max(settings.limit.force, self.scatter.force)
-        return Thresholds(force, max(settings.limit.moment, self.scatter.moment))
+        self.followed = None
 
     def held(self, settings: SupervisorSettings) -> Held:
         """Return what is held now, in full, for plans: it stays that, whatever is judged later."""
         return Held(
             self._scales,
             copy(self._payload),
-            self._followed,
+            self.followed,
             self._trust * self._share.value,
             self.valid,
             self.limit(settings).moment,
@@ -248,17 +196,17 @@ class Supervisor:
         """What `share` says whatever the correction, and goes on saying; else None."""
         return self._trust if self._share.settled else None
 
-    def share(self, turn: Array) -> float:
+    def share(self, turn: list[float]) -> float:
         """Return the part of a correction to apply.
 
         Less where a contact works against it, and where it is not known what the platform carries.
 
         Parameters
         ----------
-        turn : (3,) float
+        turn : list of 3 float
             By which the correction turns the platform, in F [rad].
         """
-        along = (0.0, 0.0, 0.0) if self._scales is None else self._scales.along(turn.tolist())
+        along = (0.0, 0.0, 0.0) if self._scales is None else self._scales.along(turn)
         return self._trust * self._share.after(self._step_s, along)
 
     def _rest(self, theta: list[float]) -> None:
@@ -321,7 +269,7 @@ class Supervisor:
             self._payload, self._weight, self._share.sure = None, 1.0, False
         self._candidate = None
         self._state, self._since_ns = state, self._stamp_ns
-        self._text = TEXTS.get(state, "")
+        self._text = TEXT_OF.get(state, "")
 
     def _feel(self, theta: list[float], reading: Reading, limit: Thresholds) -> None:
         """Look again at what is held: whether the contact is its own, and it is still there."""

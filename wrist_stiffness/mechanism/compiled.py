@@ -75,6 +75,18 @@ class CompiledCommands(NamedTuple):
     share: Array
 
 
+class CompiledSupervisor(NamedTuple):
+    """Judges the loads of commands before they are corrected for.
+
+    What it goes by and believes (SUPERVISOR,), its stamps (2,) [ns], and whether each load was
+    known and corrected for in full (n,); see `compensation.belief`.
+    """
+
+    row: Array
+    stamps: NDArray[np.int64]
+    valid: Flags
+
+
 class CorrectorState(NamedTuple):
     """What is kept from command to command.
 
@@ -280,6 +292,7 @@ class CompiledWrist:
         commands: CompiledCommands,
         state: CorrectorState,
         found: CorrectedRows,
+        supervisor: CompiledSupervisor | None = None,
         begin: int = 0,
         end: int | None = None,
     ) -> int:
@@ -298,6 +311,8 @@ class CompiledWrist:
             Of the command before; afterwards that of the last command done.
         found : CorrectedRows
             To be filled.
+        supervisor : CompiledSupervisor, optional
+            Writes the loads to correct for over the measured ones, and the shares.
         begin, end : int
             Which of the commands.
 
@@ -320,6 +335,7 @@ class CompiledWrist:
             *state,
             found.rows,
             found.active,
+            *(supervisor or (None, None, None)),
             self.sectors,
             begin,
             len(commands.wanted) if end is None else end,

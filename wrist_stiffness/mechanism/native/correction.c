@@ -76,22 +76,20 @@ static double next_step(const Task *task, double missing, double last_missing, d
 }
 
 int correct(const Mechanism *k, const Parts *parts, int m, const Task *task,
-            const double command[2], const double load[6], int on_platform,
+            const Configuration *desired, const double load[6], int on_platform,
             const double held[2], unsigned char *closed, Corrected *out) {
-    Configuration desired;
+    const double *command = desired->theta;
     double cancel[12], steps[2] = {0.0, 0.0}, missing[2] = {0.0, 0.0}, size = INFINITY;
-    int status = forward(k, command, &desired);
-    if (!status) status = in_domain(k, &desired);
-    if (status) return status;
-    jacobian_of(k, &desired, out->jacobian);
-    if (cancelling(task, &desired, out->jacobian, cancel)) return RARE;
+    int status;
+    jacobian_of(k, desired, out->jacobian);
+    if (cancelling(task, desired, out->jacobian, cancel)) return RARE;
     memcpy(out->delta, held, sizeof out->delta);
     for (int iteration = 0; iteration <= task->most_iterations; iteration++) {
         const double theta[2] = {command[0] + out->delta[0], command[1] + out->delta[1]};
         status = predict(k, parts, m, theta, load, on_platform, closed, out->twist, &out->at);
         if (!status)
             status = residual_twist(out->twist, out->at.bodies[PLATFORM],
-                                    desired.bodies[PLATFORM], out->after);
+                                    desired->bodies[PLATFORM], out->after);
         if (status) return status;
         if (iteration == task->most_iterations) break;
         const double last = size;

@@ -5,7 +5,7 @@
 
 #include "wrist.h"
 
-enum { MOST_BUFFERS = 16 };
+enum { MOST_BUFFERS = 20 };
 
 /* Views of the first `count` arguments; None is a null pointer. */
 typedef struct {
@@ -74,6 +74,11 @@ static Py_ssize_t parts_size(long m) {
     return sizeof(Parts) + m * (sizeof(Sector) + m * sizeof(double));
 }
 
+static int reach(const Mechanism *k, const double theta[2], Configuration *at) {
+    const int status = forward(k, theta, at);
+    return status ? status : in_domain(k, at);
+}
+
 static int sectors(PyObject *number, long *m) {
     *m = PyLong_AsLong(number);
     if (*m >= 0 && *m <= MOST_SECTORS) return 0;
@@ -96,8 +101,7 @@ static PyObject *forward_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     unsigned char *statuses = b.view[3].buf;
     int first = OK;
     for (Py_ssize_t i = 0; i < n; i++) {
-        int status = forward(b.view[0].buf, theta + 2 * i, at + i);
-        if (!status) status = in_domain(b.view[0].buf, at + i);
+        const int status = reach(b.view[0].buf, theta + 2 * i, at + i);
         statuses[i] = (unsigned char)status;
         if (!first) first = status;
     }
@@ -152,45 +156,74 @@ static PyObject *predict_of(PyObject *self, PyObject *const *args, Py_ssize_t co
 
 /* Mechanism, parts, task, safety, commands (n, 2), their stamps (n), loads (n, 6), which are in U (n),
  * which are wanted (n), shares (n), the correction held so far (2), contact state (m), the correction
- * applied so far (2) and when (1); answers (n, 86), contact states (n, m); m, where to begin and to
- * end.  Ends at the first command that it cannot serve and returns its place; a command that is not
- * wanted leaves nothing held.  Without safety it searches, without a task it applies what was
- * searched.  What is applied begins each row, also of a command that is not wanted. */
+ * applied so far (2) and when (1); answers (n, 86), contact states (n, m); supervisor, its stamps (2),
+ * whether it held each load for known (n); m, where to begin and to end.  Ends at the first command
+ * that it cannot serve and returns its place; a command that is not wanted leaves nothing held.
+ * Without safety it searches, without a task it applies what was searched.  What is applied begins
+ * each row, also of a command that is not wanted.  A supervisor writes loads and shares before they
+ * are used. */
 static PyObject *correct_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
     long m;
-    if (counted(count, 19) || sectors(args[16], &m)) return 0;
+    if (counted(count, 22) || sectors(args[19], &m)) return 0;
     const Py_ssize_t n = PyObject_Length(args[7]), real = sizeof(double);
-    const Py_ssize_t begin = PyLong_AsSsize_t(args[17]), end = PyLong_AsSsize_t(args[18]);
+    const Py_ssize_t begin = PyLong_AsSsize_t(args[20]), end = PyLong_AsSsize_t(args[21]);
     if (PyErr_Occurred()) return 0;
     const Py_ssize_t sizes[] = {sizeof(Mechanism), parts_size(m), sizeof(Task), sizeof(Safety),
                                 2 * n * real, 8 * n, 6 * n * real, n, n, n * real, 2 * real, m,
-                                2 * real, 8, n * sizeof(Corrected), n * m};
+                                2 * real, 8, n * sizeof(Corrected), n * m, sizeof(Supervisor), 16, n};
     Buffers b;
-    if (take(&b, args, sizes, "dddddqdbbddbdqdb", 63u << 10)) return 0;
+    if (take(&b, args, sizes, "dddddqdbbddbdqdbdqb", 511u << 10 | 1u << 6 | 1u << 7 | 1u << 9))
+        return 0;
+    const Mechanism *k = b.view[0].buf;
     const Task *task = b.view[2].buf;
     const Safety *safety = b.view[3].buf;
-    const double *command = b.view[4].buf, *load = b.view[6].buf, *share = b.view[9].buf;
+    const double *command = b.view[4].buf;
     const int64_t *stamp = b.view[5].buf;
-    const unsigned char *in_u = b.view[7].buf, *wanted = b.view[8].buf;
-    double *held = b.view[10].buf, *applied = b.view[12].buf;
-    unsigned char *closed = b.view[11].buf, *states = b.view[15].buf;
+    double *load = b.view[6].buf, *share = b.view[9].buf, *held = b.view[10].buf;
+    double *applied = b.view[12].buf;
+    unsigned char *in_u = b.view[7].buf, *closed = b.view[11].buf, *states = b.view[15].buf;
+    const unsigned char *wanted = b.view[8].buf;
     Corrected *out = b.view[14].buf;
-    int status = OK;
+    Supervisor *judging = task ? b.view[16].buf : 0;
+    int64_t *at_ns = b.view[17].buf;
+    unsigned char *known = b.view[18].buf;
     Py_ssize_t i = begin < 0 ? 0 : begin;
     Py_BEGIN_ALLOW_THREADS
     for (; i < end && i < n; i++) {
+        Configuration desired;
+        Reading reading;
+        if (judging) {
+            const Rules *rules = &judging->rules;
+            judging->belief.judged = 0.0;
+            if (!wanted[i] || reach(k, command + 2 * i, &desired)) break;
+            if (!rules->follow &&
+                read_load(k, &judging->scales, &desired, load + 6 * i, in_u[i], &reading)) break;
+            begin_judging(rules, &judging->belief, stamp[i], at_ns);
+            if (!rules->follow) {
+                judge(rules, &judging->scales, &judging->belief, command + 2 * i, &reading, at_ns,
+                      load + 6 * i);
+                in_u[i] = 0;
+            }
+            judging->belief.judged = 1.0;
+            if (at_ns[1] == stamp[i]) held[0] = held[1] = 0.0;
+        } else if (task && wanted[i] && reach(k, command + 2 * i, &desired)) {
+            break;
+        }
         if (task) {
-            if (wanted[i])
-                status = correct(b.view[0].buf, b.view[1].buf, (int)m, task, command + 2 * i,
-                                 load + 6 * i, in_u[i], held, closed, out + i);
-            if (status) break;
+            if (wanted[i] && correct(k, b.view[1].buf, (int)m, task, &desired, load + 6 * i, in_u[i],
+                                     held, closed, out + i)) break;
             for (int motor = 0; motor < 2; motor++)
                 held[motor] = wanted[i] ? out[i].delta[motor] : 0.0;
             for (long j = 0; j < m; j++) states[i * m + j] = closed[j];
         }
+        if (judging) {
+            share[i] = share_of(&judging->rules, &judging->scales, &judging->belief, out[i].jacobian,
+                                out[i].delta);
+            known[i] = (unsigned char)holds_in_full(&judging->belief);
+        }
         if (safety) {
-            apply_safely(b.view[0].buf, safety, command + 2 * i, stamp[i], share[i],
-                         wanted[i] ? out + i : 0, applied, b.view[13].buf);
+            apply_safely(k, safety, command + 2 * i, stamp[i], share[i], wanted[i] ? out + i : 0,
+                         applied, b.view[13].buf);
             for (int motor = 0; motor < 2; motor++) out[i].delta[motor] = applied[motor];
         }
     }
@@ -215,8 +248,10 @@ static PyObject *read_of(PyObject *self, PyObject *const *args, Py_ssize_t count
     unsigned char *statuses = b.view[6].buf;
     int first = OK;
     for (Py_ssize_t i = 0; i < n; i++) {
-        statuses[i] = (unsigned char)read_load(b.view[0].buf, b.view[1].buf, theta + 2 * i,
-                                               load + 6 * i, in_u[i], out + i);
+        Configuration at;
+        int status = reach(b.view[0].buf, theta + 2 * i, &at);
+        if (!status) status = read_load(b.view[0].buf, b.view[1].buf, &at, load + 6 * i, in_u[i], out + i);
+        statuses[i] = (unsigned char)status;
         if (!first) first = statuses[i];
     }
     release(&b);
@@ -313,6 +348,7 @@ PyMODINIT_FUNC PyInit__native(void) {
         PyModule_AddIntConstant(module, "CONFIGURATION", sizeof(Configuration) / sizeof(double));
         PyModule_AddIntConstant(module, "CORRECTED", sizeof(Corrected) / sizeof(double));
         PyModule_AddIntConstant(module, "SCALES", sizeof(Scales) / sizeof(double));
+        PyModule_AddIntConstant(module, "SUPERVISOR", sizeof(Supervisor) / sizeof(double));
         PyModule_AddIntConstant(module, "READING", sizeof(Reading) / sizeof(double));
         PyModule_AddIntConstant(module, "MOST_SECTORS", MOST_SECTORS);
     }

@@ -1,8 +1,8 @@
 /* One wrist at one pose: what the NumPy formulas of this folder say, compiled.
  *
  * The judges are `kinematics.py`, `statics.py`, `contact.py`, `rigid_motion.py` and
- * `compensation/correction.py` and `payload.py`; tests hold both equal to 1e-12.  All matrices lie row by row; SI
- * units; F and O as in docs/conventions.md.
+ * `compensation/correction.py`, `scales.py` and `supervisor.py`; tests hold both equal to 1e-12.  All
+ * matrices lie row by row; SI units; F and O as in docs/conventions.md.
  */
 #ifndef WRIST_H
 #define WRIST_H
@@ -62,7 +62,7 @@ typedef struct {
     Configuration at;
 } Corrected;
 
-/* What a load says of a payload, along two axes across gravity and down (see payload.py). */
+/* What a load says of a payload, along two axes across gravity and down (see scales.py). */
 typedef struct {
     double axes[3][3], gravity;
 } Scales;
@@ -70,6 +70,33 @@ typedef struct {
 typedef struct {
     double side, weight, moments[3], rows[2][3];
 } Reading;
+
+/* A payload as far as it is known: weight, moments of its centre, their covariance xx xy xz yy yz zz. */
+typedef struct {
+    double known, weight, moments[3], readings, spread[6];
+} Estimate;
+
+/* The constants of compensation/supervisor.py and the settings. */
+typedef struct {
+    double judge_s, settle_s, late_s, longest_step_s, ramp_s, yield_s, calm, open, sigmas, enough;
+    double follow, trust, force, moment, reach, encoder_step, most_moment;
+} Rules;
+
+/* What is believed of the load; whether something is there comes before it. */
+typedef struct {
+    double state, seen, text, told;
+    double seen_s, step_s, candidate_s, rest_s, counts, weight, departure, trust;
+    double share, sure, is_against, against[3], yielded, place[2];
+    double moves, behind[2], stands, stand[2];
+    Estimate payload, candidate, expected;
+    double judged;        /* whether the command at which the loop ended was judged */
+} Belief;
+
+typedef struct {
+    Rules rules;
+    Scales scales;
+    Belief belief;
+} Supervisor;
 
 void exp_twist(const double twist[6], double rotation[9], double shift[3]);
 int log_motion(const double rotation[9], const double shift[3], double twist[6]);
@@ -88,11 +115,17 @@ int predict(const Mechanism *k, const Parts *parts, int m, const double theta[2]
             const double load[6], int on_platform, unsigned char *closed, double twist[6],
             Configuration *at);
 
-int read_load(const Mechanism *k, const Scales *scales, const double theta[2],
+int read_load(const Mechanism *k, const Scales *scales, const Configuration *at,
               const double load[6], int on_platform, Reading *out);
+void begin_judging(const Rules *r, Belief *s, int64_t stamp_ns, int64_t at_ns[2]);
+void judge(const Rules *r, const Scales *scales, Belief *s, const double theta[2],
+           const Reading *load, int64_t at_ns[2], double wrench[6]);
+double share_of(const Rules *r, const Scales *scales, Belief *s, const double jacobian[6],
+                const double delta[2]);
+int holds_in_full(const Belief *s);
 
 int correct(const Mechanism *k, const Parts *parts, int m, const Task *task,
-            const double command[2], const double load[6], int on_platform,
+            const Configuration *desired, const double load[6], int on_platform,
             const double held[2], unsigned char *closed, Corrected *out);
 
 void apply_safely(const Mechanism *k, const Safety *safety, const double command[2], int64_t stamp_ns,
