@@ -63,7 +63,7 @@ def expected(line: Line) -> str:
     """Return the right verdict."""
     if not line["truth"] or line["kind"] in ("unexcitable", "absorbed"):
         return "none"
-    return "unknown" if line["kind"] == "stranger" else "found"
+    return "unknown" if line["kind"] == "stranger" else "effect"
 
 
 def binned(probability: Array, true: NDArray[np.bool_]) -> list[tuple[float, int, int]]:
@@ -103,7 +103,7 @@ def rows(lines: Sequence[Line]) -> list[tuple[str, Sequence[Line], Callable[[Lin
         ("one effect: right in the class", single, lambda x: bool(x["inside"])),
         ("one effect: a false class", single, lambda x: spurious(x) > 0),
         ("one effect: error after within 1.1", single, lambda x: x["after"] <= NEAR),
-        ("two effects: both found", double, lambda x: x["found"] == 2),
+        ("two effects: both found", double, lambda x: x["found"] == 1.0),
         ("outside the catalogue: nothing is named", outside, lambda x: not x["named"]),
         ("two days, one effect: right in the class", days, lambda x: bool(x["inside"])),
         ("all: a false class", lines, lambda x: spurious(x) > 0),
