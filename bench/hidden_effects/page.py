@@ -1,6 +1,6 @@
-"""Write the results of the benchmark into docs/hidden-effects.md and draw its pictures.
+"""Write the results of the benchmark as a page with pictures.
 
-python bench/hidden_effects/page.py [--results FILE] [--docs FOLDER] [--all-code]
+python bench/hidden_effects/page.py [--results FILE] [--output FOLDER] [--all-code]
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from tables import Line, by_solver, of_one_solver, paired
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
-BEGIN, END = "<!-- results: begin (page.py) -->", "<!-- results: end -->"
 SHOWN = {CEILING: "D", OWN: "o", "elastic_net": "^", "stepwise_bic": "v"}
 SHOWN_SIZES = (TINY, *SIZES)
 
@@ -46,8 +45,8 @@ def text_of(lines: Sequence[Line]) -> str:
             by_solver(scored),
             f"**Against the ceiling**, effects that a wrist may have and that can be seen\n\n"
             f"{paired([x for x in scored if _fair(x)], OWN, CEILING)}",
-            "![Right answers by size](pictures/hidden_effects_by_size.png)",
-            "![Right answers by effect](pictures/hidden_effects_by_effect.png)",
+            "![Right answers by size](hidden_effects_by_size.png)",
+            "![Right answers by effect](hidden_effects_by_effect.png)",
             of_one_solver(scored, OWN),
         ]
     )
@@ -132,22 +131,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     here = Path(__file__).parent
     parser.add_argument("--results", type=Path, default=here / "results" / "full.jsonl")
-    parser.add_argument("--docs", type=Path, default=here.parents[1] / "docs")
+    parser.add_argument("--output", type=Path, default=here.parents[1] / "bench-results")
     parser.add_argument(
         "--all-code", action="store_true", help="also answers that other code than today's gave"
     )
     arguments = parser.parse_args()
     all_code, path = arguments.all_code, arguments.results
     lines = list(read(path)) if all_code else current(path, list(SOLVERS))
-    page = arguments.docs / "hidden-effects.md"
-    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
-    after = rest.split(END)[1]
-    text = f"{before}{BEGIN}\n\n{text_of(lines)}\n\n{END}{after}"
+    arguments.output.mkdir(exist_ok=True)
+    page = arguments.output / "hidden-effects.md"
     with replacing(page) as written:
-        written.write_text(text, encoding="utf-8")
+        written.write_text(f"# Hidden effects\n\n{text_of(lines)}\n", encoding="utf-8")
     scored = [line for line in lines if "verdict" in line]
-    draw_sizes(scored, arguments.docs / "pictures" / "hidden_effects_by_size.png")
-    draw_effects(scored, arguments.docs / "pictures" / "hidden_effects_by_effect.png")
+    draw_sizes(scored, arguments.output / "hidden_effects_by_size.png")
+    draw_effects(scored, arguments.output / "hidden_effects_by_effect.png")
     print(f"{page}: {len(lines)} answers")
 
 
