@@ -47,6 +47,14 @@ LOADS = {
     "a payload of 80 g": np.array([0.0, 0.0, -0.8, 0.0, 0.0, 0.0]),
     "pressed aside": np.array([0.3, -0.2, -0.8, 0.005, 0.0, -0.01]),
 }
+MEMORIES = {
+    "backlash": "{effect: backlash, component: motor_1, parameters: {width_mdeg: 20.0}}",
+    "creep": "{effect: creep, component: joint_3, parameters: "
+    "{delayed_percent: 30.0, time_constant_s: 4.0}}",
+    "joint friction": "{effect: joint_friction, component: joint_2, parameters: "
+    "{coefficient: 0.2, preload_N: 0.5, presliding_um: 5.0}}",
+}
+"""Effects that remember: their samples go one by one, in the order of a node."""
 
 
 def record(path: Path, seconds: float, wrench: np.ndarray) -> None:
@@ -94,6 +102,14 @@ def streams(
             stream.loads.add(stamp_ns, "wrist_base", load[:3].tolist(), load[3:].tolist())
         predicting.on_joint_state(stamp_ns, MOTORS, angles)
         correcting.on_command(stamp_ns, "", MOTORS, angles)
+
+
+def remembering(path: Path, effects: list[str]) -> Path:
+    """Write a model with effects that remember."""
+    table = shipped_file("precomputed/palmieri2015.npz")
+    listed = "\n".join(f"- {effect}" for effect in effects)
+    path.write_text(f"schema: 1\nname: bench\ntable: {{path: {table}}}\neffects:\n{listed}\n")
+    return path
 
 
 def processor_seconds(action: Callable[[], object]) -> float:
@@ -150,6 +166,15 @@ def main() -> None:
                 print(
                     f"{name + ': ' + what:46} {rate:9.0f} {1e6 / rate:9.1f} {seconds / copied:9.2f}"
                 )
+        record(source, options.seconds / 10.0, LOADS["a payload of 80 g"])
+        for chosen in [*([name] for name in MEMORIES), [*MEMORIES]]:
+            model = remembering(Path(folder) / "model.yaml", [MEMORIES[name] for name in chosen])
+            seconds = processor_seconds(
+                lambda model=model: replay(source, model, target, own, overwrite=True)
+            )
+            rate = 0.1 * n / seconds
+            what = f"80 g, {' + '.join(chosen)}: replay"
+            print(f"{what:46} {rate:9.0f} {1e6 / rate:9.1f} {10.0 * seconds / copied:9.2f}")
         topics = {topic.name: topic.count for topic in open_recording(target).topics}
         print(f"topics written: {', '.join(sorted(topics))}")
         short = peak_mb(source)

@@ -59,7 +59,7 @@ def test_platform_twist_by_castigliano(table, case):
     force = np.abs(
         np.random.default_rng(1).normal(size=(len(wrench), len(table.components.sectors.gap)))
     )
-    through = component_wrenches(configuration, table.components, wrench, force)
+    through = component_wrenches(influence(configuration), table.components, wrench, force)
     flexibility = turned_flexibilities(configuration, table.components)
     step = 1e-3
     probe = np.random.default_rng(2).normal(size=wrench.shape)

@@ -67,7 +67,7 @@ class Configuration:
     @property
     def as_block(self) -> Configuration:
         """One pose as a stack of one."""
-        return Configuration(*(value[None] for value in self._values()))
+        return Configuration.of_row(self.row[None])
 
     def _values(self) -> list[Array]:
         return [getattr(self, field.name) for field in fields(self)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.influence import influence
+from wrist_stiffness.mechanism.influence import Influence, influence
 from wrist_stiffness.mechanism.statics import (
     component_rotations,
     turned_flexibilities,
@@ -15,14 +15,14 @@ from wrist_stiffness.mechanism.vectors import block_diagonal
 
 
 def component_wrenches(
-    configuration: Configuration, components: ElasticComponents, wrench: Array, force: Array
+    projectors: Influence, components: ElasticComponents, wrench: Array, force: Array
 ) -> Array:
     """Return the wrench through each component under a platform load and contact forces.
 
     Parameters
     ----------
-    configuration : Configuration
-        Of shape (...).
+    projectors : Influence
+        Of configurations of shape (...).
     components : ElasticComponents
         Condensed parts.
     wrench : (..., 6) float
@@ -35,14 +35,11 @@ def component_wrenches(
     (..., 8, 6) float
         G_k' W + N_k' lambda at O in F [N, N m]; own weight is not in it.
     """
-    projectors = influence(configuration)
-    halves = np.reshape(wrench, (*np.shape(wrench)[:-1], 1, 2, 3))
-    through = np.einsum("...kji,...khj->...khi", projectors.of_components(), halves)
-    through = through.reshape(*through.shape[:-2], 6).copy()
+    halves = np.reshape(wrench, (*np.shape(wrench)[:-1], 1, 2, 3)) @ projectors.of_components()
     # Net push of the hubs along the joint axes, by virtual work on the slides.
-    push = force @ components.sectors.slide
-    through[..., :3] += np.einsum("...j,...kji->...ki", push, projectors.slides())
-    return through
+    push = (force @ components.sectors.slide)[..., None, None, :]
+    halves[..., :1, :] += push @ projectors.slides()
+    return np.asarray(halves.reshape(*halves.shape[:-2], 6))
 
 
 def component_screws(
@@ -66,7 +63,7 @@ def component_screws(
     (..., 8, 6) float
         C_k W_k, plus what pressed flanges add to their bushing; at O in F [m, rad].
     """
-    through = component_wrenches(configuration, components, wrench, force)
+    through = component_wrenches(influence(configuration), components, wrench, force)
     flexibility = turned_flexibilities(configuration, components)
     bent = (flexibility @ through[..., None])[..., 0]
     return bent + _pressed(_flange_screws(configuration, components, force), components)
@@ -96,7 +93,7 @@ def strain_energies(
     (..., 8) float
         In the order of `ELASTIC` [J].
     """
-    through = component_wrenches(configuration, components, wrench, force)
+    through = component_wrenches(influence(configuration), components, wrench, force)
     flexibility = turned_flexibilities(configuration, components)
     energy: Array = 0.5 * np.einsum("...ki,...kij,...kj->...k", through, flexibility, through)
     sectors = components.sectors

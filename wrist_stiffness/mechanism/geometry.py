@@ -170,7 +170,7 @@ class Limits:
         return tuple(zip(lowest, highest, strict=True))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Geometry:
     """Everything the geometry file says about one wrist.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
@@ -43,6 +45,7 @@ def cross_axes(geometry: Geometry, joint: str) -> Array:
     return np.stack([u, cross(w, u), w])
 
 
+@lru_cache(maxsize=32)
 def end_screws(geometry: Geometry, joint: str) -> Array:
     """Return the screws for unit displacements of a sleeve's ends across its axis.
 

@@ -106,7 +106,7 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     result = evaluate(model, block, None)
     at = result.situation
     force = forces_of(at.operators.approach, at.statics.told[1], result.active)
-    through = at.statics.own_weight + component_wrenches(configuration, at.parts, at.load, force)
+    through = at.statics.own_weight + component_wrenches(at.influence, at.parts, at.load, force)
     screws = at.screws_under(through, force)
     carried = block_diagonal(at.influence.of_components()) @ screws[..., None]
     twists = carried[0, :, :, 0]

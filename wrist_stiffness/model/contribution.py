@@ -46,9 +46,8 @@ class Contribution:
 
     def __add__(self, other: Contribution) -> Contribution:
         """Return both together; to first order they do not know of each other."""
-        return Contribution(
-            *(together(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
-        )
+        mine, its = vars(self), vars(other)
+        return Contribution(*(together(mine[name], its[name]) for name in mine))
 
     def check(self, samples: int, sectors: int) -> None:
         """Refuse arrays of other shapes than n samples and m sectors ask for, or not finite.

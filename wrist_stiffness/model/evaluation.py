@@ -19,7 +19,7 @@ from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
-from wrist_stiffness.model.contacts import Held, solve_alike, solve_contacts
+from wrist_stiffness.model.contacts import Held, solve_alike
 from wrist_stiffness.model.contribution import NOTHING, Contribution
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.stages import (
@@ -115,11 +115,7 @@ def evaluate(
     guess = None if memory is None else memory.active
     start = situation_of(model, with_speeds(block, memory), guess, pose)
     found = staged(model, start, memory, near=near)
-    at = found.last
-    compiled = None if pose is None or at.given.through is not None else model.compiled
-    if pose is not None and compiled is not None and "operators" not in at.statics.__dict__:
-        return Evaluated(found, *_settled_one(compiled, pose, at))
-    return Evaluated(found, *_settled(at))
+    return Evaluated(found, *found.last.answer)
 
 
 def evaluate_beside(
@@ -149,10 +145,12 @@ def evaluate_beside(
         for model, memory in zip(models, memories, strict=True)
     ]
     statics = like.situation.statics
+    if like.situation.wrist is not None:
+        return [Evaluated(each, *each.last.answer) for each in every]
     alike = [each for each in every if each.last.statics is statics]
     together = iter(_settled_alike([each.last for each in alike], like) if alike else ())
     return [
-        Evaluated(each, *(next(together) if each.last.statics is statics else _settled(each.last)))
+        Evaluated(each, *(next(together) if each.last.statics is statics else each.last.answer))
         for each in every
     ]
 
@@ -160,11 +158,13 @@ def evaluate_beside(
 def _start(model: Evaluable, like: Evaluated) -> Situation:
     """Return the situation in which a model begins beside another one."""
     start = like.staged.situations[0]
+    wrist = None if start.wrist is None else _wrist(model, start.wrist[1])
     if start.parts is not model.parts:
         statics = start.statics.with_parts(model.parts)
-        return Situation(statics, model.constants, guess=like.active)
+        return Situation(statics, model.constants, guess=like.active, wrist=wrist)
     if start.constants is not model.constants:
-        return replace(start, constants=model.constants, guess=like.held)
+        guess = like.held if wrist is None else like.active
+        return replace(start, constants=model.constants, guess=guess, wrist=wrist)
     return start
 
 
@@ -181,14 +181,12 @@ def situation_of(
         halves = load.reshape(-1, 2, 3) @ np.swapaxes(configuration.platform, -1, -2)
         load = halves.reshape(-1, 6)
     statics = BlockStatics(block, load, configuration, model.evaluation, model.table, model.parts)
-    return Situation(statics, model.constants, guess=guess)
+    wrist = None if pose is None else _wrist(model, pose)
+    return Situation(statics, model.constants, guess=guess, wrist=wrist)
 
 
-def _settled(at: Situation) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return twist (n, 6), force (n, m) and contact state (n, m)."""
-    twist, gap = at.free
-    force, active = solve_contacts(at.operators.approach, gap, at.guess)
-    return twist + (at.operators.force_twist @ force[..., None])[..., 0], force, active
+def _wrist(model: Evaluable, pose: Configuration) -> tuple[CompiledWrist, Configuration] | None:
+    return None if model.compiled is None else (model.compiled, pose)
 
 
 def _settled_alike(
@@ -201,21 +199,6 @@ def _settled_alike(
     force, active = solve_alike(operators.approach, gaps, like.held)
     pushed = np.ascontiguousarray(np.moveaxis(operators.force_twist @ force, -1, 0))
     return [(twist + pushed[t], force[..., t], active[..., t]) for t, (twist, _) in enumerate(free)]
-
-
-def _settled_one(
-    wrist: CompiledWrist, pose: Configuration, at: Situation
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return twist (1, 6), force (1, m) and contact state (1, m) of one sample."""
-    given = at.given
-    guess = None if at.guess is None else np.asarray(at.guess)
-    limb_1, limb_2, gap = (
-        None if value is None else value[0] for value in (given.limb_1, given.limb_2, given.gap)
-    )
-    twist, force, active = wrist.respond(pose, at.wrench[0], guess, limb_1, limb_2, gap)
-    if given.both is not None:
-        twist = twist + given.both[0]
-    return twist[None], force[None], active[None]
 
 
 def seen(twist: Array, left: Array | None, right: Array | None) -> Array:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.energy import component_wrenches
-from wrist_stiffness.mechanism.influence import Influence
+from wrist_stiffness.mechanism.influence import IN_LIMB_1, Influence
 from wrist_stiffness.mechanism.statics import ContactOperators, component_rotations, slides
 from wrist_stiffness.mechanism.vectors import block_diagonal, dot
 from wrist_stiffness.model.block import Block
@@ -41,12 +42,15 @@ class Situation:
         Sum of what its other effects added in earlier stages.
     guess : (m,) or (n, m) bool or Held or None
         First guess of the contact state.
+    wrist : (CompiledWrist, Configuration), optional
+        Of one sample alone: its pose, and the compiled formulas with the model's constants.
     """
 
     statics: BlockStatics
     constants: Constants = Constants()
     given: Contribution = NOTHING
     guess: NDArray[np.bool_] | Held | None = None
+    wrist: tuple[CompiledWrist, Configuration] | None = None
 
     @property
     def block(self) -> Block:
@@ -158,7 +162,30 @@ class Situation:
     @cached_property
     def contact(self) -> tuple[Array, NDArray[np.bool_]]:
         """Forces (n, m) [N] and state (n, m) of the flanges under all that was added so far."""
+        if self.wrist is not None:
+            return self.answer[1:]
         return solve_contacts(self.operators.approach, self.free[1], self.guess)
+
+    @cached_property
+    def answer(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Twist (n, 6) under all that was added so far, and the `contact` that belongs to it."""
+        if self.wrist is None:
+            force, active = self.contact
+            twist = self.free[0] + (self.operators.force_twist @ force[..., None])[..., 0]
+            return twist, force, active
+        given, guess = self.given, self.guess
+        limb_1, limb_2, gap = given.limb_1, given.limb_2, given.gap
+        if given.through is not None:
+            bent = (self.statics.turned_flexibility @ given.through[..., None])[..., 0]
+            limb_1 = together(limb_1, bent[:, IN_LIMB_1].sum(axis=1))
+            limb_2 = together(limb_2, bent[:, ~IN_LIMB_1].sum(axis=1))
+            gap = together(gap, self._opened(given.through))
+        compiled, pose = self.wrist
+        added = (None if value is None else value[0] for value in (limb_1, limb_2, gap))
+        flags = None if guess is None else np.asarray(guess).reshape(-1)
+        twist, force, active = compiled.respond(pose, self.wrench[0], flags, *added)
+        rows = twist[None] if given.both is None else twist[None] + given.both
+        return rows, force[None], active[None]
 
     @property
     def contact_force(self) -> Array:
@@ -170,7 +197,7 @@ class Situation:
         known, guess = self.__dict__.get("contact"), self.guess
         if known is not None and not isinstance(guess, Held):
             guess = known[1]
-        return replace(self, given=given, guess=guess)
+        return Situation(self.statics, self.constants, given, guess, self.wrist)
 
     @cached_property
     def through(self) -> Array:
@@ -179,7 +206,7 @@ class Situation:
         Own weight and contact included, (n, 8, 6) at O in F [N, N m].
         """
         through = self.statics.own_weight + component_wrenches(
-            self.configuration, self.parts, self.wrench, self.contact_force
+            self.influence, self.parts, self.wrench, self.contact_force
         )
         return through if self.acting.through is None else through + self.acting.through
 
@@ -283,13 +310,16 @@ class Situation:
             bent = (self.statics.turned_flexibility @ added.through[..., None])[..., 0]
             twist += _halves(projectors.of_components(), bent).sum(axis=-2)
             gap += slides(projectors, bent) @ sectors.slide.T
-            for k in np.unique(sectors.component).tolist():
-                own = sectors.component == k
-                home = self.at_home(ELASTIC[k], added.through[:, k])
-                gap[:, own] += home @ sectors.screw[own].T
+            gap += self._opened(added.through)
         if added.gap is not None:
             gap += added.gap
         return twist, gap
+
+    def _opened(self, through: Array) -> Array:
+        """Return by how much the bushings' own screws under wrenches (n, 8, 6) open flanges."""
+        sectors, n = self.parts.sectors, len(through)
+        home = through.reshape(n, -1, 2, 3) @ component_rotations(self.configuration)
+        return dot(home.reshape(n, -1, 6).take(sectors.component, axis=1), sectors.screw)
 
     def with_contact(self, twist: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
         """Return what a carried contribution does where the closed sectors hold: the tangent.

@@ -323,9 +323,13 @@ def with_speeds(block: Block, memory: Memory | None) -> Block:
     """Return the block with motor speeds, by backward differences where it has none."""
     if block.theta_dot is not None:
         return block
-    first = (block.time[0], block.theta[0]) if memory is None else (memory.time, memory.theta)
-    interval = np.diff(block.time, prepend=first[0])[:, None]
-    step = np.diff(block.theta, axis=0, prepend=first[1][None])
+    if memory is None:
+        interval, step = block.time - block.time[0], block.theta - block.theta[0]
+    else:
+        interval, step = block.time - memory.time, block.theta - memory.theta
+    if len(block) > 1:
+        interval[1:], step[1:] = np.diff(block.time), np.diff(block.theta, axis=0)
+    interval = interval[:, None]
     speed = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
     return replace(block, theta_dot=speed)
 
