@@ -14,6 +14,7 @@ import timeit
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
@@ -36,7 +37,14 @@ from wrist_stiffness.recording.messages import (
     Header,
     JointState,
     KeyValue,
+    Message,
+    Point,
+    Pose,
+    PoseWithCovariance,
     PoseWithCovarianceStamped,
+    Quaternion,
+    Vector3,
+    Wrench,
     WrenchStamped,
 )
 from wrist_stiffness.recording.schema import definition_text
@@ -121,6 +129,44 @@ def decode_rosbags(path: Path) -> int:
         )
 
 
+def _header(theirs: Any) -> Header:
+    stamp = theirs.stamp
+    return Header(1_000_000_000 * stamp.sec + stamp.nanosec, theirs.frame_id)
+
+
+def _vector(theirs: Any) -> Vector3:
+    return Vector3(theirs.x, theirs.y, theirs.z)
+
+
+def _pose(theirs: Any) -> PoseWithCovariance:
+    place, turn = theirs.pose.position, theirs.pose.orientation
+    pose = Pose(Point(place.x, place.y, place.z), Quaternion(turn.x, turn.y, turn.z, turn.w))
+    return PoseWithCovariance(pose, tuple(theirs.covariance.tolist()))
+
+
+def _status(theirs: Any) -> DiagnosticStatus:
+    values = tuple(KeyValue(each.key, each.value) for each in theirs.values)
+    level, name, text, hardware = theirs.level, theirs.name, theirs.message, theirs.hardware_id
+    return DiagnosticStatus(level, name, text, hardware, values)
+
+
+INTO_OURS: dict[type[Message], Callable[[Any], Message]] = {
+    JointState: lambda m: JointState(
+        _header(m.header),
+        tuple(m.name),
+        *(tuple(numbers.tolist()) for numbers in (m.position, m.velocity, m.effort)),
+    ),
+    WrenchStamped: lambda m: WrenchStamped(
+        _header(m.header), Wrench(_vector(m.wrench.force), _vector(m.wrench.torque))
+    ),
+    PoseWithCovarianceStamped: lambda m: PoseWithCovarianceStamped(
+        _header(m.header), _pose(m.pose)
+    ),
+    DiagnosticArray: lambda m: DiagnosticArray(_header(m.header), tuple(map(_status, m.status))),
+}
+"""From messages of rosbags to those that the project works with."""
+
+
 def codecs() -> None:
     """Print how long single messages take here, and how many times as long elsewhere."""
     header = Header(5, "ft")
@@ -149,10 +195,18 @@ def codecs() -> None:
             ),
         }.items():
             own, rosbags, support = (_microseconds(action) for action in actions)
-            print(
+            own, rosbags, support = (_microseconds(action) for action in actions)
+            line = (
                 f"{verb} {name.rpartition('/')[2]:27s} {own:5.1f} us, "
                 f"rosbags {rosbags / own:4.2f} x, mcap-ros2-support {support / own:5.2f} x"
             )
+            if verb == "decode":
+                into = INTO_OURS[type(message)]
+                if into(theirs) != message:
+                    raise SystemExit(f"{name}: rosbags decodes another message")
+                both = rosbags + _microseconds(partial(into, theirs))
+                line += f"; rosbags and then into the class of here {both / own:4.2f} x"
+            print(line)
 
 
 def _microseconds(action: Callable[[], object]) -> float:

@@ -8,9 +8,10 @@ a 32-bit count, then the elements; an empty sequence is not followed by padding.
 For each type two functions are written as a dataclass writes its own: straight lines that read, or
 write, all fields of the message and of its parts.
 
-No library does it here: mcap-ros2-support, which needs mcap alone, takes 1.2 to 4 times as long
-to decode and 4 to 18 times to encode; rosbags takes 0.8 to 1.4 and 1.0 to 2.0 times as long, and is
-no part of a robot's installation (`bench/recording_speed.py`).
+No library does it here: mcap-ros2-support, which needs mcap alone, takes 1.4 to 4 times as long
+to decode and 4 to 14 times to encode.  rosbags takes 1.0 to 1.2 times as long to decode, but into
+classes of its own: as the messages that all else works with, those of a stream take 1.6 to 1.8
+times; and 1.0 to 2.0 times to encode (`bench/recording_speed.py`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Some thousand stored messages at a time, in log-time order, undecoded."""
+"""Some thousand stored messages at a time, in log-time order, undecoded.
+
+Two million a second: five times what rosbags reads, thirteen times what mcap does
+(`bench/recording_speed.py`)."""
 
 from __future__ import annotations
 
