@@ -2,8 +2,8 @@
 
 The messages of a topic mostly differ in their numbers only: names, frame and the lengths of their
 sequences stay.  Then each number sits at the same byte in every payload, and NumPy reads a whole
-column.  Payloads that differ in more form groups of their own, down to a group of one.  Joint states
-come as arrays eleven times as fast as one by one, sixteen times as fast as from rosbags
+column.  Payloads that differ in more form groups of their own, down to a group of one.  Joint
+states come as arrays eleven times as fast as one by one, sixteen times as fast as from rosbags
 (`bench/recording_speed.py`).
 """
 

@@ -8,7 +8,7 @@ nothing else states which channels and how many messages they hold.
 What stands twice in a file is compared: the summary's channels, schemas and counts with those of
 the data, the checksums of both sections with their bytes.  What differs is told, and the data is
 taken.  For 200,000 messages in 7.6 MB the walk takes 5 ms, mcap's reading of the summary, which it
-believes, 1 ms; reading the messages takes 90 ms.
+believes, 1 ms; reading the messages in blocks takes 90 ms.
 """
 
 from __future__ import annotations

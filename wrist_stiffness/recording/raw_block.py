@@ -1,7 +1,8 @@
 """Some thousand stored messages at a time, in log-time order, undecoded.
 
 Two million a second: five times what rosbags reads, thirteen times what mcap does
-(`bench/recording_speed.py`)."""
+(`bench/recording_speed.py`).
+"""
 
 from __future__ import annotations
 
