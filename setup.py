@@ -81,11 +81,13 @@ setup(
         "plot": ["matplotlib>=3.8"],
         # Bars of commands that take long; without it they say nothing on the way.
         "progress": ["tqdm>=4.66"],
+        # The workbench; Plotly's JavaScript comes with it.
+        "web": ["nicegui>=3.0"],
         "fleet": ["distributed>=2024.5", "cloudpickle>=3"],
         "bench": ["scikit-learn>=1.3"],
         "verify": ["acrod>=1.2", "rosbags>=0.10", "mcap-ros2-support>=0.5"],
         # colcon finds pytest through this extra and would run no test without it.
-        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100"],
+        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100", "playwright>=1.49"],
         "dev": [
             "ruff>=0.9",
             "mypy>=1.13",

@@ -73,6 +73,12 @@ def test_the_error_falls_with_what_is_found_and_added(model, sessions):
     with pytest.raises(InputError, match="the model has it already"):
         analysis.add(PLAY)
     assert len(analysis.versions) == 3
+    before, after = analysis.view(1), analysis.view()
+    turned = [np.sqrt(np.nanmean(each.left.values[:, 3:] ** 2)) for each in (before, after)]
+    assert turned[1] < 0.3 * turned[0]
+    # The same was measured; where the instrument stands is in neither.
+    assert np.nanmax(np.abs(after.measured[:, :3])) < 5e-4
+    assert after.noise["phi_mdeg"] == pytest.approx(5.0, rel=0.2)
     assert analysis.undo() is calibrated
     assert analysis.model is calibrated.model
 
@@ -95,3 +101,5 @@ def test_wrong_use_is_one_clear_line(model, sessions):
         analysis.undo()
     with pytest.raises(InputError, match="write law@component"):
         analysis.preview("backlash")
+    with pytest.raises(IndexError):
+        analysis.view(1)

@@ -21,7 +21,8 @@ ROOMS_USED = {
     "simulation": {"mechanism", "lookup", "recording"},
     "analysis": CORE,
     "workflows": CORE | {"analysis", "shipped"},
-    "cli": CORE | {"workflows", "shipped"},
+    "web": CORE | {"analysis", "workflows", "shipped"},
+    "cli": CORE | {"workflows", "shipped", "web"},
     "ros": CORE | {"workflows", "shipped"},
     "errors": set(),
     "progress": set(),
@@ -40,6 +41,7 @@ LIBRARIES_USED = {
     "cli": ROBOT | {"tqdm"},  # the extra `progress`
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
     "workflows": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
+    "web": ROBOT | {"nicegui"},  # the extra `web`; Plotly's JavaScript comes with it
 }
 DRAWING = "matplotlib"
 

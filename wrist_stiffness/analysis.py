@@ -26,6 +26,7 @@ from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.campaign.planning.earlier import as_experiment
 from wrist_stiffness.campaign.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.campaign.planning.question import between
+from wrist_stiffness.campaign.refitted import SET_UP, names_of
 from wrist_stiffness.campaign.searching.calibrate import calibrate
 from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.campaign.searching.extend import extend
@@ -100,6 +101,30 @@ class Preview:
     explains: Mapping[str, tuple[float, float]]
 
 
+@dataclass(frozen=True, eq=False)
+class View:
+    """What one version says of each unit, and what it leaves.
+
+    Parameters
+    ----------
+    left : Observations
+        Measured less predicted once set-up and tolerances are fitted, and the conditions.
+    predicted : (u, 6) float
+        Error of the pose by this version, without the set-up of instrument and motors [m, rad].
+    noise : dict of str to float
+        Noise of one unit and drift of the instrument, RMS by the key of the quantity.
+    """
+
+    left: Observations
+    predicted: Array
+    noise: Mapping[str, float]
+
+    @property
+    def measured(self) -> Array:
+        """Measured error of the pose, the set-up taken out, (u, 6) [m, rad]."""
+        return np.asarray(self.left.values + self.predicted)
+
+
 class Analysis:
     """Models of one wrist against its recordings.
 
@@ -154,6 +179,23 @@ class Analysis:
         """What the newest model leaves once set-up and tolerances are fitted, and conditions."""
         base = self._problem().begin().base
         return base.problem.table.with_values(base.residual)
+
+    def view(self, number: int = -1) -> View:
+        """Return what a version says of each unit, for pictures.
+
+        Parameters
+        ----------
+        number : int
+            Place among the versions, the newest by default.
+        """
+        fit = self._problem(number).begin()
+        base, predicted = fit.base, []
+        for n, session in enumerate(base.problem.sessions):
+            model = base.model(n)
+            own = tuple(each for each in model.effects if each.name not in names_of(SET_UP))
+            predicted.append(model.predicted([own])[0][session.measured])
+        left = base.problem.table.with_values(base.residual)
+        return View(left, np.concatenate(predicted), fit.table.noise_and_drift(fit.evidence))
 
     def cancel(self) -> None:
         """Let what is being done end with `Cancelled` at its next step; call it from anywhere."""
@@ -274,16 +316,18 @@ class Analysis:
         self._versions.append(version)
         return version
 
-    def _known(self) -> ErrorModel:
-        """Return the newest model without what fits to these recordings found of its base."""
-        fitted = any(each.fit is not None for each in self._versions)
-        return unfitted(self.model) if fitted else self.model
+    def _known(self, number: int = -1) -> ErrorModel:
+        """Return a version's model without what fits to these recordings found of its base."""
+        last = range(len(self._versions))[number]
+        model = self._versions[last].model
+        fitted = any(each.fit is not None for each in self._versions[: last + 1])
+        return unfitted(model) if fitted else model
 
-    def _problem(self) -> WristProblem:
-        """Return the problem of the newest version, fitted once."""
-        key = len(self._versions) - 1
+    def _problem(self, number: int = -1) -> WristProblem:
+        """Return the problem of a version, fitted once."""
+        key = range(len(self._versions))[number]
         if key not in self._problems:
-            known = self._known()
+            known = self._known(key)
             units = tuple(as_units(known, each) for each in self.sessions)
             self._problems[key] = WristProblem(known, units)
         return self._problems[key]

@@ -26,6 +26,7 @@ from wrist_stiffness.cli import (
     simulate,
     table,
     tolerances,
+    workbench,
 )
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
@@ -59,6 +60,7 @@ EXTRA_OF = {
     "matplotlib": "plot",
     "distributed": "fleet",
     "cloudpickle": "fleet",
+    "nicegui": "web",
 }
 """The extra that installs a library which a robot does without."""
 
@@ -96,6 +98,7 @@ COMMANDS: tuple[CommandModule, ...] = (
     extend,
     plan,
     tolerances,
+    workbench,
     cell,
 )
 

@@ -170,7 +170,7 @@ def curve_of(
         direction,
         names,
         shown,
-        tuple(_label(name) for name in names),
+        tuple(condition_label(name) for name in names),
         sign * residual[:, at] @ ways[0] * quantity.per_si,
         places[order],
         sign * mean,
@@ -191,18 +191,18 @@ def _best(
     varied = [name for name in names if np.ptp(told[name]) > 0.0]
     found = []
     for name in varied:
-        shown = _shown(observations, name)
+        shown = condition_shown(observations, name)
         classes = _classes(shown)
         means = np.bincount(classes, law) / np.bincount(classes)
         found.append((float(np.var(means[classes])), name, shown))
     share, name, shown = max(found, key=lambda each: each[0])
     if share < 0.5 * np.var(law) and set(ANGLES) <= set(varied):
-        return ANGLES, np.stack([_shown(observations, angle) for angle in ANGLES], axis=1)
+        return ANGLES, np.stack([condition_shown(observations, angle) for angle in ANGLES], axis=1)
     return (name,), shown[:, None]
 
 
-def _shown(observations: Observations, name: str) -> Array:
-    """Return a condition in the unit in which it is shown, (u,)."""
+def condition_shown(observations: Observations, name: str) -> Array:
+    """Return a condition by name in the unit of its label, (u,)."""
     values = observations.covariate(name)
     if name == "time_s":
         starts = [
@@ -225,7 +225,8 @@ def _unit(name: str) -> tuple[str, str, float]:
     return name, "", 1.0
 
 
-def _label(name: str) -> str:
+def condition_label(name: str) -> str:
+    """Return what a condition is called on an axis, with its unit."""
     text, unit, _ = _unit(name)
     return f"{text} [{unit}]" if unit else text
 

@@ -1,0 +1,44 @@
+"""No name from the page leads out of the workspace."""
+
+import pytest
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.web.workspace import Workspace
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    return Workspace(tmp_path / "bench")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../model.yaml", "/etc/passwd", "..", ".", ".hidden.yaml", "a/b.mcap", "a\\..\\b", "", "a\0b"],
+)
+def test_a_name_that_leads_out_is_refused(workspace, name):
+    with pytest.raises(InputError, match="no plain file name"):
+        workspace.path(name)
+    with pytest.raises(InputError, match="no plain file name"):
+        workspace.save(name, b"")
+
+
+def test_a_link_that_leads_out_is_refused(workspace, tmp_path):
+    (tmp_path / "secret.yaml").write_text("key: 1\n")
+    (workspace.folder / "model.yaml").symlink_to(tmp_path / "secret.yaml")
+    with pytest.raises(InputError, match="no plain file name"):
+        workspace.path("model.yaml")
+    assert workspace.models() == []
+
+
+def test_uploads_are_recordings_tables_and_models_only(workspace):
+    with pytest.raises(InputError, match=r"recordings \(.mcap\)"):
+        workspace.save("law.py", b"import os")
+    workspace.save("monday.mcap", b"1")
+    workspace.save("monday.mcap", b"2")
+    workspace.save("wrist.yaml", b"")
+    assert workspace.path("monday.mcap").read_bytes() == b"2"
+    assert workspace.recordings() == ["monday.mcap"]
+    assert workspace.models() == ["wrist.yaml"]
+    (workspace.folder / "bag.mcap").mkdir()
+    with pytest.raises(InputError, match="a folder of that name"):
+        workspace.save("bag.mcap", b"")

@@ -1,0 +1,283 @@
+"""The analysis of one tab in a process of its own: long sums never hold the page up."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.analysis import Analysis, Version
+from wrist_stiffness.campaign.comparing.comparison import ComparedModel
+from wrist_stiffness.campaign.comparing.curve import Curve
+from wrist_stiffness.campaign.comparing.sentences import sentences
+from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.web.examples import EXAMPLES, recordings_of
+from wrist_stiffness.web.workspace import Workspace
+from wrist_stiffness.workflows.import_csv import import_csv
+from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
+
+SHIPPED = "config/palmieri2015_model.yaml"
+
+Changes = dict[str, Any]
+"""What a call changed of what a tab shows, by the names of `tab.Tab`."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A version as the page lists it.
+
+    Parameters
+    ----------
+    name : str
+        Of the version.
+    held_out : dict of str to float
+        Error on unseen data by the key of the quantity.
+    warnings : tuple of str
+        What speaks against it.
+    parameters : dict of str to (float, float)
+        Of the effect that was added: value and one standard uncertainty.
+    """
+
+    name: str
+    held_out: Mapping[str, float]
+    warnings: tuple[str, ...]
+    parameters: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a candidate would explain.
+
+    Parameters
+    ----------
+    name, sentence, check : str
+        `law@component`, what it does, and what to check on the machine.
+    change : (u, 6) float
+        What it takes away of each unit [m, rad].
+    explains : dict of str to (float, float)
+        RMS before and after by the key of the quantity.
+    parameters : dict of str to float
+        As fitted.
+    """
+
+    name: str
+    sentence: str
+    check: str
+    change: Array
+    explains: Mapping[str, tuple[float, float]]
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Depends:
+    """On what the rest of a version depends.
+
+    Parameters
+    ----------
+    sentences : tuple of str
+        For a technician.
+    curves : dict of str to Curve
+        By condition.
+    """
+
+    sentences: tuple[str, ...]
+    curves: Mapping[str, Curve]
+
+
+class Bench:
+    """The analysis behind one tab.
+
+    Parameters
+    ----------
+    folder : Path
+        Workspace.
+    tell, progress : callable
+        Told in words what is being done, and steps done and in all; they may raise to end it.
+    """
+
+    def __init__(
+        self, folder: Path, tell: Callable[[str], None], progress: Callable[[int, int], None]
+    ) -> None:
+        self._workspace = Workspace(folder)
+        self._tell, self._progress = tell, progress
+        self._analysis: Analysis | None = None
+
+    def open_example(self, name: str) -> Changes:
+        """Open an example, made where it is not there yet."""
+        (example,) = (each for each in EXAMPLES if each.name == name)
+        model = shipped_file(SHIPPED)
+        folder = self._workspace.folder / ".examples"
+        paths = recordings_of(example, folder, load_model(model).table, self._tell)
+        return self._open(paths, model)
+
+    def open_named(self, names: Sequence[str], model: str) -> Changes:
+        """Open recordings of the workspace; an empty name of a model is the shipped one."""
+        if not names:
+            raise InputError("choose at least one recording")
+        paths = [self._recording(self._workspace.path(name)) for name in names]
+        return self._open(paths, self._workspace.path(model) if model else shipped_file(SHIPPED))
+
+    def _recording(self, path: Path) -> Path:
+        if path.suffix != ".csv":
+            return path
+        folder = self._workspace.folder / ".imported"
+        folder.mkdir(exist_ok=True)
+        return import_csv(path, folder / f"{path.stem}.mcap", overwrite=True).path
+
+    def _open(self, paths: Sequence[Path], model: Path) -> Changes:
+        self._tell("reading")
+        loaded = load_model(model)
+        sessions = read_sessions(Recordings(paths, {}), [loaded], self._progress)
+        self._tell("finding where the instrument stands")
+        self._analysis = Analysis(loaded, list(sessions.values()), self._progress, self._tell)
+        return {
+            "names": tuple(path.name for path in sessions),
+            "model_path": model,
+            "glances": tuple(glance(each) for each in sessions.values()),
+            "remarks": tuple(line for each in sessions.values() for line in each.remarks),
+            "views": {},
+            "depends": (),
+            **self._newest(),
+        }
+
+    @property
+    def _opened(self) -> Analysis:
+        if self._analysis is None:
+            raise InputError("open a recording first")
+        return self._analysis
+
+    def calibrate(self) -> Changes:
+        """Fit set-up and tolerances."""
+        self._tell("fitting set-up and tolerances")
+        self._opened.calibrate()
+        return self._newest()
+
+    def compare(self) -> Changes:
+        """Ask on what the rest of every version depends."""
+        self._tell("asking on what the error depends")
+        return {"depends": tuple(_depends(each) for each in self._opened.compare().models)}
+
+    def rank(self) -> Changes:
+        """Ask what is missing."""
+        self._tell("asking which effect is missing")
+        return {"diagnosis": self._opened.rank().diagnosis}
+
+    def look_at(self, candidate: str | Effect) -> Changes:
+        """Find what a candidate would explain."""
+        name = candidate if isinstance(candidate, str) else candidate.name
+        self._tell(f"fitting {name}")
+        seen = self._opened.preview(candidate)
+        effect = seen.effect
+        values = {key: each.value for key, each in effect.estimates.items()}
+        sentence = effect.law.sentence.format(place=effect.component)
+        told = effect.name, sentence, effect.law.check, seen.change, seen.explains, values
+        return {"seen": Seen(*told), "version": len(self._opened.versions) - 1}
+
+    def add(self, candidate: str | Effect) -> Changes:
+        """Add a candidate."""
+        self._tell("fitting everything together, with and without it")
+        self._opened.add(candidate)
+        return self._newest()
+
+    def undo(self) -> Changes:
+        """Take the newest version back."""
+        self._opened.undo()
+        return self._newest()
+
+    def _newest(self) -> Changes:
+        versions = self._opened.versions
+        last = len(versions) - 1
+        return {
+            "rows": tuple(_row(each) for each in versions),
+            "version": last,
+            "view": (last, self._opened.view(last)),
+            "seen": None,
+            "diagnosis": None,
+        }
+
+
+def _row(version: Version) -> Row:
+    found = {} if version.added is None else version.added.estimates
+    values = {key: (each.value, each.sigma) for key, each in found.items()}
+    return Row(version.name, dict(version.held_out), version.warnings, values)
+
+
+def _depends(model: ComparedModel) -> Depends:
+    told = model.explained.told
+    curves = {each.name: each.curve for each in told if len(each.curve.names) == 1}
+    return Depends(sentences(model.explained), curves)
+
+
+def glance(session: MeasuredSession) -> dict[str, str]:
+    """Return what a recording holds, in words."""
+    block = session.block
+    seconds = float(block.time[-1] - block.time[0])
+    measured = int(session.measured.any(axis=1).sum())
+    angles = np.degrees(block.theta)
+    low, high = angles.min(axis=0), angles.max(axis=0)
+    force = np.linalg.norm(block.load[:, :3], axis=1)
+    warm = f"{len(block.temperatures)} temperatures" if block.temperatures else ""
+    return {
+        "recording": session.name,
+        "duration": f"{seconds / 60.0:.1f} min",
+        "poses": f"{measured:,} measured, {measured / max(seconds, 1e-9):.3g} a second",
+        "motor 1": f"{low[0]:.0f} to {high[0]:.0f} deg",
+        "motor 2": f"{low[1]:.0f} to {high[1]:.0f} deg",
+        "loads": f"{force.min():.2f} to {force.max():.2f} N",
+        "instrument": str(session.notes.get("pose_sensor", "not told")),
+        "beside": ", ".join(filter(None, [warm, *block.covariates])) or "nothing",
+    }
+
+
+class Stopped(WristError):
+    """Somebody cancelled what was being done."""
+
+
+def work(folder: Path, wires: Connection, stop: Event) -> None:
+    """Do what is asked over a connection until that is closed.
+
+    Parameters
+    ----------
+    folder : Path
+        Workspace.
+    wires : Connection
+        Takes (method, arguments); answers ("told", words), ("done", done, total), and at the end
+        ("good", changes) or ("bad", sentence).
+    stop : Event
+        Set by whoever cancels.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def tell(text: str) -> None:
+        _check()
+        wires.send(("told", text))
+
+    def progress(done: int, total: int) -> None:
+        _check()
+        wires.send(("done", done, total))
+
+    def _check() -> None:
+        if stop.is_set():
+            raise Stopped("cancelled")
+
+    bench = Bench(folder, tell, progress)
+    while True:
+        try:
+            method, arguments = wires.recv()
+        except EOFError:
+            return
+        try:
+            wires.send(("good", getattr(bench, method)(*arguments)))
+        except WristError as error:
+            wires.send(("bad", str(error)))

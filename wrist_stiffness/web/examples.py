@@ -1,0 +1,105 @@
+"""Built-in examples: recordings of the virtual cell, made when somebody first opens them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.simulation.cell import CellSettings
+from wrist_stiffness.workflows.simulate import hide, on_day, simulate_recording
+
+SECONDS, RATE_HZ, SEED = 120.0, 10.0, 21
+
+
+@dataclass(frozen=True)
+class Example:
+    """A wrist that hides something.
+
+    Parameters
+    ----------
+    name : str
+        Of its folder.
+    title, story : str
+        For the page.
+    hidden : str
+        `law@component:form`.
+    size : float
+        In units of one sample's noise.
+    experiment : str
+        Design of the program.
+    days : int
+        Recordings; the last one judges.
+    """
+
+    name: str
+    title: str
+    story: str
+    hidden: str
+    size: float
+    experiment: str = "rich"
+    days: int = 2
+
+
+EXAMPLES = (
+    Example(
+        "known_fault",
+        "A fault that the program knows",
+        "Two days of a wrist that turns by some hundredths of a degree too little or too much.",
+        "backlash@motor_2:single",
+        4.0,
+    ),
+    Example(
+        "unknown_fault",
+        "A fault that is on no list",
+        "Something happens to this wrist that the catalogue of effects does not hold.",
+        "cable_stop@platform",
+        4.0,
+    ),
+    Example(
+        "cannot_tell",
+        "Data that cannot tell",
+        "The same few weights at every pose: several causes would look alike.",
+        "link_stiffness@link_2",
+        1.5,
+        "dead_weights",
+        1,
+    ),
+)
+
+
+def recordings_of(
+    example: Example, folder: Path, table: Table, tell: Callable[[str], None]
+) -> list[Path]:
+    """Return the recordings of an example, made in a folder where they are not there.
+
+    Parameters
+    ----------
+    example : Example
+        Which.
+    folder : Path
+        Where examples are kept.
+    table : Table
+        Of the shipped wrist.
+    tell : callable
+        Told what is being done.
+    """
+    own = folder / example.name
+    paths = [own / f"day_{day}.mcap" for day in range(1, example.days + 1)]
+    if all(path.is_file() for path in paths):
+        return paths
+    tell("simulating the recordings of this example")
+    own.mkdir(parents=True, exist_ok=True)
+    settings = CellSettings(
+        rate_hz=RATE_HZ,
+        program_seconds=SECONDS,
+        program_seed=SEED,
+        base="wrong",
+        base_seed=SEED,
+        experiment=example.experiment,
+    )
+    settings = hide(example.hidden, example.size, table, settings, SECONDS)
+    for day, path in enumerate(paths, 1):
+        simulate_recording(path, table, on_day(day, settings), SECONDS, SEED + day, overwrite=True)
+    return paths

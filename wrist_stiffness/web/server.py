@@ -1,0 +1,95 @@
+"""Serves the page on one address of this machine."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from dataclasses import dataclass
+from typing import Any
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.web.gate import LOOPBACK, Gate
+from wrist_stiffness.web.workspace import Workspace
+
+TITLE = "Wrist workbench"
+
+PATIENCE_S = 60.0
+"""A tab that says nothing for so long is gone, and its process with it: laptops doze."""
+
+
+@dataclass(frozen=True)
+class Served:
+    """What is served, and where.
+
+    Parameters
+    ----------
+    folder : str
+        Workspace.
+    host : str
+        Address; beyond this machine it needs a token, which is drawn.
+    port : int
+        Of TCP.
+    largest_mb : int
+        Of an upload [MB].
+    browser : bool
+        Whether to open one.
+    """
+
+    folder: str
+    host: str
+    port: int
+    largest_mb: int
+    browser: bool
+
+
+def serve(served: Served) -> None:
+    """Serve until somebody ends it.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, the folder cannot be made, or the address is not to be had.
+    """
+    if not 0 < served.port < 65536:
+        raise InputError(f"--port {served.port} is not 1 to 65535")
+    if served.largest_mb < 1:
+        raise InputError(f"--largest-upload {served.largest_mb} is below 1 MB")
+    _require_address(served)
+    from nicegui import app, ui
+
+    from wrist_stiffness.web.page import Workbench
+
+    workspace = Workspace(served.folder)
+    token = "" if served.host in LOOPBACK else secrets.token_urlsafe(24)
+    largest = served.largest_mb * 2**20
+    guarded: Any = Gate
+    app.add_middleware(guarded, token=token, largest=largest)
+
+    @ui.page("/", title=TITLE)
+    def page() -> None:
+        Workbench(workspace, largest)
+
+    address = f"http://{served.host}:{served.port}/" + (f"?token={token}" if token else "")
+    print(f"{TITLE}: {address}\nworkspace {workspace.folder}; end it with Ctrl-C", flush=True)
+    ui.run(
+        host=served.host,
+        port=served.port,
+        title=TITLE,
+        reload=False,
+        reconnect_timeout=PATIENCE_S,
+        show=served.browser and not token,
+        show_welcome_message=False,
+        favicon="📐",
+    )
+
+
+def _require_address(served: Served) -> None:
+    try:
+        found = socket.getaddrinfo(served.host, served.port, type=socket.SOCK_STREAM)
+        with socket.socket(found[0][0], socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(found[0][4])
+    except OSError as error:
+        raise InputError(
+            f"{served.host}:{served.port} cannot be served: {error.strerror}; another --port?"
+        ) from error

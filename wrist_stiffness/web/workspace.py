@@ -1,0 +1,80 @@
+"""The workspace folder: the only place that the page reads from and writes to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.campaign.reading.folder import is_recording
+from wrist_stiffness.errors import InputError
+
+MODEL, TABLE = (".yaml", ".yml"), (".npz",)
+TAKEN = (".mcap", ".csv", *MODEL, *TABLE)
+"""What may be uploaded, by the end of the name."""
+
+NAME = re.compile(r"[\w][\w .+-]{0,99}")
+
+
+class Workspace:
+    """A folder, beyond which no name from a page leads.
+
+    Parameters
+    ----------
+    folder : path
+        Made where it is not there.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder).resolve()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
+
+    def path(self, name: str) -> Path:
+        """Return the path of a name in the folder.
+
+        Raises
+        ------
+        InputError
+            If it is no plain file name, or leads out of the folder.
+        """
+        path = self.folder / name
+        if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
+            raise InputError(f"{name!r} is no plain file name within the workspace")
+        return path
+
+    def save(self, name: str, content: bytes) -> Path:
+        """Write an uploaded file; one of that name is replaced.
+
+        Raises
+        ------
+        InputError
+            If the name or its ending is refused, or a folder has the name.
+        """
+        path = self.path(name)
+        if path.suffix.lower() not in TAKEN:
+            raise InputError(
+                f"{name}: the workbench takes recordings (.mcap), tables of poses (.csv), models "
+                "(.yaml) and their tables (.npz)"
+            )
+        if path.is_dir():
+            raise InputError(f"{name}: there is a folder of that name")
+        with replacing(path) as partial:
+            partial.write_bytes(content)
+        return path
+
+    def recordings(self) -> list[str]:
+        """Return the names of recordings and tables of poses."""
+        return [p.name for p in self._files() if is_recording(p) or p.suffix == ".csv"]
+
+    def models(self) -> list[str]:
+        """Return the names of model files."""
+        return [p.name for p in self._files() if p.suffix in MODEL]
+
+    def _files(self) -> Sequence[Path]:
+        return sorted(
+            p for p in self.folder.iterdir() if NAME.fullmatch(p.name) and not p.is_symlink()
+        )

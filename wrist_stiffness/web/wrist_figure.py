@@ -1,0 +1,195 @@
+"""The wrist in three dimensions at one moment, bent under its load."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.energy import strain_energies
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.web.figures import MAP, RED, Figure
+from wrist_stiffness.workflows.budget import Push
+from wrist_stiffness.workflows.pictures.bent_wrist import Shape, bent_shapes
+
+MM = 1e3
+SEEN_M = 0.008
+"""How far the largest displacement is drawn where nobody says otherwise."""
+
+NAMED = 2.0
+"""Share from which a body bears its name [%]; the others say it when they are pointed at."""
+
+BENT, MEASURED = "platform, as the load bends it", "platform, as measured"
+EYE = {"x": 0.95, "y": -1.1, "z": 0.6}
+
+
+def wrist_figure(
+    table: Table, theta: Array, load: Array, measured: Array, exaggeration: float | None
+) -> tuple[Figure, float]:
+    """Return the bodies at a pose: bent by the load, coloured by their share of what bends.
+
+    Parameters
+    ----------
+    table : Table
+        Of the wrist.
+    theta : (2,) float
+        Motor angles [rad].
+    load : (6,) float
+        Wrench at O in F [N, N m].
+    measured : (6,) float
+        Error of the platform that was measured [m, rad]; NaN = not.
+    exaggeration : float or None
+        Factor on every displacement [-]; None for one that is seen well.
+
+    Returns
+    -------
+    dict
+        The picture.
+    float
+        The factor.
+
+    Raises
+    ------
+    UnreachablePoseError, SingularPoseError, LoadRangeError
+        If the pose or the load is out of range.
+    """
+    push = Push(load[:3], load[3:], np.zeros(3))
+    shapes = bent_shapes(table, theta, push)
+    share = 100.0 * _shares(table, theta, load)
+    top = max(float(share.max()), 1.0)
+    platform = shapes[-1]
+    moved = [np.linalg.norm(shape.shift, axis=-1).max() for shape in shapes]
+    reach = float(np.linalg.norm(platform.points, axis=-1).max())
+    error = np.nan_to_num(measured)
+    moved.append(np.linalg.norm(error[:3]) + reach * np.linalg.norm(error[3:]))
+    if exaggeration is None:
+        exaggeration = _round(SEEN_M / max(float(max(moved)), 1e-9))
+    bent = [shape.points + exaggeration * shape.shift for shape in shapes]
+    bodies = list(zip(bent, share.tolist(), strict=False))
+    traces = [_bodies(bodies, top), _rigid(shapes)]
+    traces.append(_disc(bent[-1], BENT, "#9ca3af"))
+    if np.isfinite(measured).all():
+        turn, shift = exp_twist(exaggeration * measured)
+        traces.append(_disc(platform.points @ turn.T + shift, MEASURED, RED))
+    traces.append(_names(bodies))
+    axes = {
+        f"{axis}axis": {"title": {"text": f"{axis} [mm]"}, "backgroundcolor": "white"}
+        for axis in "xyz"
+    }
+    layout = {
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "font": {"size": 12, "color": "#1f2937"},
+        "scene": {**axes, "aspectmode": "data", "camera": {"eye": EYE}},
+        "uirevision": "kept",
+        "showlegend": False,
+    }
+    config = {"displaylogo": False, "responsive": True}
+    return {"data": traces, "layout": layout, "config": config}, exaggeration
+
+
+def _round(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is not above a value."""
+    size = 10.0 ** np.floor(np.log10(value))
+    return float(size * max(step for step in (1.0, 2.0, 5.0) if step * size <= value))
+
+
+def _shares(table: Table, theta: Array, load: Array) -> Array:
+    """Return the part of the load's strain energy by component, (8,), 0 without a load."""
+    at = table.workspace.configuration(theta)
+    response = respond(contact_operators(at, table.components, np.zeros(3)), load)
+    energy = strain_energies(at, table.components, load, response.force)
+    total = float(energy.sum())
+    return np.asarray(energy / total) if total > 0.0 else np.zeros(len(ELASTIC))
+
+
+def _bodies(bodies: list[tuple[Array, float]], top: float) -> Figure:
+    """Return all bodies as one net of triangles: a picture without a graphics card stays quick."""
+    points = [MM * each.reshape(-1, 3) for each, _ in bodies]
+    firsts = np.cumsum([0, *(len(each) for each in points[:-1])])
+    nets = [_triangles(*each.shape[:2]) for each, _ in bodies]
+    faces = np.concatenate([first + net for first, net in zip(firsts, nets, strict=True)])
+    colour = np.concatenate(
+        [np.full(len(own), share) for own, (_, share) in zip(points, bodies, strict=True)]
+    )
+    text = [
+        f"{name}: {share:.0f} %"
+        for name, (each, share) in zip(ELASTIC, bodies, strict=True)
+        for _ in range(each.shape[0] * each.shape[1])
+    ]
+    x, y, z = np.concatenate(points).T
+    i, j, k = faces.T
+    return {
+        "type": "mesh3d",
+        **{"x": x, "y": y, "z": z, "i": i, "j": j, "k": k},
+        "intensity": colour,
+        "colorscale": MAP,
+        "cmin": 0.0,
+        "cmax": top,
+        "colorbar": {
+            "title": {"text": "share of the bending [%]", "side": "right"},
+            "thickness": 12,
+            "len": 0.8,
+        },
+        "text": text,
+        "hovertemplate": "%{text}<extra></extra>",
+    }
+
+
+def _triangles(rows: int, columns: int) -> Array:
+    """Return corners of the triangles of a grid of points, (t, 3)."""
+    at = np.arange(rows * columns).reshape(rows, columns)
+    corners = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
+    one, two, three, four = (each.ravel() for each in corners)
+    halves = np.stack([one, two, three], axis=1), np.stack([one, three, four], axis=1)
+    return np.concatenate(halves)
+
+
+def _rigid(shapes: list[Shape]) -> Figure:
+    """Return outlines of the bodies as they would stand rigid."""
+    lines: list[Any] = []
+    for shape in shapes:
+        for line in (*np.moveaxis(shape.points, 1, 0)[:4], *shape.points[-1:]):
+            lines += [*(MM * line).tolist(), [None, None, None]]
+    x, y, z = zip(*lines, strict=True)
+    return {
+        "type": "scatter3d",
+        "mode": "lines",
+        "x": x,
+        "y": y,
+        "z": z,
+        "line": {"color": "#9ca3af", "width": 1},
+        "hoverinfo": "skip",
+    }
+
+
+def _disc(points: Array, name: str, colour: str) -> Figure:
+    x, y, z = MM * points.reshape(-1, 3).T
+    i, j, k = _triangles(*points.shape[:2]).T
+    return {
+        "type": "mesh3d",
+        **{"x": x, "y": y, "z": z, "i": i, "j": j, "k": k},
+        "color": colour,
+        "opacity": 0.55,
+        "hovertemplate": f"{name}<extra></extra>",
+    }
+
+
+def _names(bodies: list[tuple[Array, float]]) -> Figure:
+    """Return the names beside the bodies; none of a body that hardly bends."""
+    told = [(name, *each) for name, each in zip(ELASTIC, bodies, strict=True) if each[1] >= NAMED]
+    middle = [1.15 * MM * points.mean(axis=(0, 1)) for _, points, _ in told]
+    x, y, z = np.reshape(middle, (-1, 3)).T
+    return {
+        "type": "scatter3d",
+        "mode": "text",
+        "x": x,
+        "y": y,
+        "z": z,
+        "text": [f"{name} {share:.0f} %" for name, _, share in told],
+        "textfont": {"size": 12, "color": "#111827"},
+        "hoverinfo": "skip",
+    }
