@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import signal
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -17,15 +19,29 @@ from wrist_stiffness.campaign.comparing.comparison import ComparedModel
 from wrist_stiffness.campaign.comparing.curve import Curve
 from wrist_stiffness.campaign.comparing.sentences import sentences
 from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.campaign.planning.loads_file import Weight
+from wrist_stiffness.campaign.planning.plan import Conditions
+from wrist_stiffness.campaign.planning.rivals import Rivals
+from wrist_stiffness.campaign.planning.timeline import Pace
+from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.web.examples import EXAMPLES, recordings_of
+from wrist_stiffness.web.results import as_commands, told_plan, write_result
 from wrist_stiffness.web.workspace import Workspace
+from wrist_stiffness.workflows.extend import FormulaEffect
 from wrist_stiffness.workflows.import_csv import import_csv
+from wrist_stiffness.workflows.plan import Planned, write_plan
 from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
+
+USUAL_PACE = Pace(float(np.radians(30.0)), 2.0, True)
+HANG_S = 10.0
+"""That it takes to hang a weight on or off, as `plan` says where nobody does [s]."""
+
+HEAVIEST_G = 1000.0
 
 SHIPPED = "config/palmieri2015_model.yaml"
 
@@ -112,6 +128,10 @@ class Bench:
         self._workspace = Workspace(folder)
         self._tell, self._progress = tell, progress
         self._analysis: Analysis | None = None
+        self._answer: WristDiagnosis | None = None
+        self._model, self._paths = Path(), [Path()]
+        self._looked: tuple[str | Effect, str] = "", ""
+        self._options: list[str] = []
 
     def open_example(self, name: str) -> Changes:
         """Open an example, made where it is not there yet."""
@@ -141,7 +161,11 @@ class Bench:
         sessions = read_sessions(Recordings(paths, {}), [loaded], self._progress)
         self._tell("finding where the instrument stands")
         self._analysis = Analysis(loaded, list(sessions.values()), self._progress, self._tell)
+        self._answer, self._model, self._paths = None, model, list(sessions)
+        self._options = []
+        shared = [set(each.block.covariates) for each in sessions.values()]
         return {
+            "covariates": tuple(sorted(set.intersection(*shared))),
             "names": tuple(path.name for path in sessions),
             "model_path": model,
             "glances": tuple(glance(each) for each in sessions.values()),
@@ -171,28 +195,81 @@ class Bench:
     def rank(self) -> Changes:
         """Ask what is missing."""
         self._tell("asking which effect is missing")
-        return {"diagnosis": self._opened.rank().diagnosis}
+        self._answer = self._opened.rank()
+        return {"diagnosis": self._answer.diagnosis, "seen": None}
 
-    def look_at(self, candidate: str | Effect) -> Changes:
-        """Find what a candidate would explain."""
-        name = candidate if isinstance(candidate, str) else candidate.name
-        self._tell(f"fitting {name}")
-        seen = self._opened.preview(candidate)
+    def look_at(self, candidate: str | FormulaEffect) -> Changes:
+        """Find what a candidate would explain: `law@component`, or a formula."""
+        asked: str | Effect = ""
+        if isinstance(candidate, str):
+            asked, option = candidate, f"--effect {candidate}"
+        else:
+            common = [set(each.block.covariates) for each in self._opened.sessions]
+            asked = candidate.effect(sorted(set.intersection(*common)))
+            way = " ".join(f"{number:g}" for number in candidate.direction)
+            option = f"--formula {shlex.quote(candidate.expression)} --component "
+            option += f"{candidate.component} --direction {way} --name {candidate.id}"
+        self._tell(f"fitting {asked if isinstance(asked, str) else asked.name}")
+        seen = self._opened.preview(asked)
         effect = seen.effect
+        self._looked = asked, option
         values = {key: each.value for key, each in effect.estimates.items()}
         sentence = effect.law.sentence.format(place=effect.component)
-        told = effect.name, sentence, effect.law.check, seen.change, seen.explains, values
+        told = (
+            effect.name,
+            sentence,
+            effect.law.check.replace("{place}", effect.component),
+            seen.change,
+            seen.explains,
+            values,
+        )
         return {"seen": Seen(*told), "version": len(self._opened.versions) - 1}
 
-    def add(self, candidate: str | Effect) -> Changes:
-        """Add a candidate."""
+    def add(self) -> Changes:
+        """Add what was looked at last."""
+        asked, option = self._looked
         self._tell("fitting everything together, with and without it")
-        self._opened.add(candidate)
+        self._opened.add(asked)
+        self._options.append(option)
         return self._newest()
+
+    def plan(self, rivals: Sequence[str], grams: float) -> Changes:
+        """Plan the experiment that tells rivals apart with a weight that can be hung on."""
+        analysis, answer = self._opened, self._answer
+        if answer is None:
+            raise InputError("ask what is missing first")
+        if not 0.0 < grams <= HEAVIEST_G:
+            raise InputError(f"a weight of {grams:g} g is not above 0 and up to {HEAVIEST_G:g} g")
+        self._tell(f"planning an experiment between {' and '.join(rivals)}")
+        table = analysis.model.table
+        noise = answer.diagnosis.noise
+        floor = 1e-6 * noise["s_um"], float(np.radians(1e-3 * noise["phi_mdeg"]))
+        weight = Weight(f"{grams:g} g", 1e-3 * grams, table.geometry.load_point, HANG_S)
+        conditions = Conditions(
+            (weight,), USUAL_PACE, Rivals((), (), floor).noise(table), None, seed=0
+        )
+        found = analysis.plan(rivals, conditions)
+        text = told_plan(found)
+        if found.timeline is None:
+            return {"planned": (text, "")}
+        name = self._workspace.free("next_experiment")
+        write_plan(analysis.model, Planned(found, text), self._workspace.path(name))
+        return {"planned": (text, name)}
+
+    def export(self, number: int) -> Changes:
+        """Write a version's model, the report of the last diagnosis and the same as commands."""
+        self._tell("writing model, report and commands")
+        model = self._opened.versions[number].model
+        lines = as_commands(self._model, self._paths, self._options)
+        asked = self._model, self._paths, self._answer
+        return {"written": write_result(self._workspace, model, lines, *asked)}
 
     def undo(self) -> Changes:
         """Take the newest version back."""
+        gone = self._opened.versions[-1]
         self._opened.undo()
+        if gone.added is not None:
+            self._options.pop()
         return self._newest()
 
     def _newest(self) -> Changes:
@@ -281,3 +358,6 @@ def work(folder: Path, wires: Connection, stop: Event) -> None:
             wires.send(("good", getattr(bench, method)(*arguments)))
         except WristError as error:
             wires.send(("bad", str(error)))
+        except Exception as error:
+            traceback.print_exc()
+            wires.send(("bad", f"An error of the program, written to its terminal: {error!r}"))

@@ -10,7 +10,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.workflows.simulate import hide, on_day, simulate_recording
 
-SECONDS, RATE_HZ, SEED = 120.0, 10.0, 21
+RATE_HZ, SEED = 10.0, 21
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,12 @@ class Example:
         `law@component:form`.
     size : float
         In units of one sample's noise.
-    experiment : str
-        Design of the program.
     days : int
         Recordings; the last one judges.
+    seconds : float
+        Duration of each [s].
+    instrument : str
+        Pose sensor.
     """
 
     name: str
@@ -38,8 +40,9 @@ class Example:
     story: str
     hidden: str
     size: float
-    experiment: str = "rich"
     days: int = 2
+    seconds: float = 120.0
+    instrument: str = "interferometer"
 
 
 EXAMPLES = (
@@ -60,11 +63,12 @@ EXAMPLES = (
     Example(
         "cannot_tell",
         "Data that cannot tell",
-        "The same few weights at every pose: several causes would look alike.",
-        "link_stiffness@link_2",
-        1.5,
-        "dead_weights",
-        1,
+        "One minute with a laser tracker: two causes would look alike in it.",
+        "mount_compliance@motor_1",
+        0.7,
+        days=1,
+        seconds=60.0,
+        instrument="tracker",
     ),
 )
 
@@ -93,13 +97,13 @@ def recordings_of(
     own.mkdir(parents=True, exist_ok=True)
     settings = CellSettings(
         rate_hz=RATE_HZ,
-        program_seconds=SECONDS,
+        program_seconds=example.seconds,
         program_seed=SEED,
         base="wrong",
         base_seed=SEED,
-        experiment=example.experiment,
+        instrument=example.instrument,
     )
-    settings = hide(example.hidden, example.size, table, settings, SECONDS)
+    settings = hide(example.hidden, example.size, table, settings, example.seconds)
     for day, path in enumerate(paths, 1):
-        simulate_recording(path, table, on_day(day, settings), SECONDS, SEED + day, overwrite=True)
+        simulate_recording(path, table, on_day(day, settings), example.seconds, day, overwrite=True)
     return paths

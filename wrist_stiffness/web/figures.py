@@ -26,6 +26,8 @@ SYMBOL = {"s": "s", "phi": "φ"}
 MAP = "Cividis"
 """Perceptually even, and the same to people of any colour vision."""
 
+UNNAMED = {"showlegend": False}
+
 BREAK_MIN = 0.3
 """Gap between two recordings on one axis of time."""
 
@@ -174,13 +176,13 @@ def time_line(shown: Shown) -> Figure:
     traces = [
         _dots(time, measured, "measured", FLOOR, rows, shown, size=4),
         _line(time, predicted, "predicted", BLUE, rows),
-        _dots(time, left, "left", BLUE, rows, shown, yaxis="y2", size=4),
+        _dots(time, left, "left", BLUE, rows, shown, yaxis="y2", size=4) | UNNAMED,
     ]
     if shown.after is not None:
         after = shown.part(shown.after)
         with_it = predicted + left - after
         traces.insert(2, _line(time, with_it, f"with {shown.candidate}", RED, rows))
-        traces.append(_dots(time, after, f"left with {shown.candidate}", RED, rows, shown, "y2", 4))
+        traces.append(_dots(time, after, "left", RED, rows, shown, "y2", 4) | UNNAMED)
     figure = _figure(traces, "time [min]", f"{SYMBOL[shown.quantity.name]} [{shown.unit}]")
     at = float(time[shown.moment])
     cut = {"type": "line", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1}
@@ -188,7 +190,7 @@ def time_line(shown: Shown) -> Figure:
         "dragmode": "select",
         "selectdirection": "h",
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": 1.16, "x": 0},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
         "shapes": [{**cut, "line": {"color": FLOOR, "width": 1, "dash": "dot"}}],
     }
     figure["layout"]["yaxis"] |= {"domain": [0.5, 1.0]}
@@ -225,7 +227,7 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
     figure["layout"] |= {
         "dragmode": "lasso",
         "showlegend": True,
-        "legend": {"orientation": "h", "y": 1.12, "x": 0},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
     }
     return figure
 
@@ -240,8 +242,9 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
         "orientation": "h",
         "x": sizes,
         "y": [f"{number}  {each.name}" for number, each in enumerate(versions)],
-        "text": [f"<b>{_number(size)}</b> {unit_of(quantity)}" for size in sizes],
-        "textposition": "auto",
+        "text": [f"<b>{number(size)}</b> {unit_of(quantity)}" for size in sizes],
+        "textposition": ["inside" if size > 0.4 * top else "outside" for size in sizes],
+        "insidetextanchor": "start",
         "marker": {"color": [BLUE] * (len(sizes) - 1) + [GREEN]},
         "hoverinfo": "skip",
         "cliponaxis": True,
@@ -253,7 +256,7 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     figure["layout"] |= {
         "showlegend": False,
         "shapes": [{**line, "line": {"color": FLOOR, "width": 2, "dash": "dash"}}],
-        "annotations": [{**word, "text": f"noise {_number(floor)}"}],
+        "annotations": [{**word, "text": f"noise {number(floor)}"}],
     }
     figure["layout"]["xaxis"] |= {"range": [0.0, top]}
     figure["layout"]["yaxis"] |= {"autorange": "reversed", "automargin": True}
@@ -264,7 +267,8 @@ def _angles(table: Observations) -> Array:
     return np.stack([table.covariate("theta_1"), table.covariate("theta_2")], axis=1)
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """Return three digits, thousands without a power of ten."""
     return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
@@ -350,5 +354,5 @@ def _figure(traces: Sequence[Figure], x: str, y: str) -> Figure:
         "xaxis": _axis(x),
         "yaxis": _axis(y),
     }
-    config = {"displaylogo": False, "responsive": True, "scrollZoom": True}
+    config = {"displaylogo": False, "scrollZoom": True}
     return {"data": list(traces), "layout": layout, "config": config}

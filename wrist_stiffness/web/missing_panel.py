@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from wrist_stiffness.campaign.comparing.sentences import percent
+from wrist_stiffness.model.formula_law import SIGNALS
+from wrist_stiffness.web.formula_form import FormulaForm
 from wrist_stiffness.workflows.verdict import verdict_lines
 
 if TYPE_CHECKING:
     from wrist_stiffness.inference.answer import Diagnosis, Standing
+    from wrist_stiffness.web.bench import Seen
     from wrist_stiffness.web.page import Workbench
 
 FIRST = 12
@@ -29,7 +32,10 @@ class MissingPanel:
     def __init__(self, page: Workbench) -> None:
         self._page = page
         self._all = False
+        self._last: Seen | None = None
+        self._grams = 50.0
         self._body = ui.column().classes("w-full gap-2")
+        self.formula = FormulaForm(page)
         self.refresh()
 
     def refresh(self) -> None:
@@ -43,14 +49,19 @@ class MissingPanel:
         if not tab.rows:
             ui.label("Open a recording first.")
             return
-        for line in tab.sentences:
-            ui.label(line).classes("text-sm")
+        with ui.expansion("On what the error depends", value=tab.diagnosis is None).classes(
+            "w-full"
+        ):
+            for line in tab.sentences or ("Not asked yet.",):
+                ui.label(line).classes("text-sm")
         ui.button("What is missing?", on_click=lambda: page.work(("rank",))).classes("w-full")
         if tab.diagnosis is None:
             return
         result = tab.diagnosis
         for line in verdict_lines(result):
             ui.label(line).classes("font-bold")
+        if result.verdict == "unknown":
+            self._proposals()
         self._chosen()
         ui.label(
             "Candidates, most probable first; choose one to see what it would explain"
@@ -66,6 +77,17 @@ class MissingPanel:
             ):
                 for each in result.not_excited:
                     ui.label(f"{each.effect}@{each.component}: {each.needs}").classes("text-xs")
+
+    def _proposals(self) -> None:
+        """Offer a formula for every recorded signal on which the error surely depends."""
+        known = SIGNALS | set(self._page.tab.covariates)
+        for name, curve in self._page.tab.curves.items():
+            if (signal := curve.names[0]) in known:
+                text = f"Try a straight line over {name}"
+                offer = ui.button(
+                    text, on_click=lambda s=signal, c=curve: self.formula.propose(s, c)
+                )
+                offer.props("outline dense").classes("w-full")
 
     def _more(self) -> None:
         self._all = True
@@ -103,7 +125,11 @@ class MissingPanel:
         seen = tab.seen
         if seen is None:
             return
-        with ui.column().classes("w-full gap-1 p-2 rounded").style("background: #fff7ed"):
+        box = ui.column().classes("w-full gap-1 p-2 rounded").style("background: #fff7ed")
+        if seen is not self._last:
+            self._last = seen
+            ui.run_javascript(f"getHtmlElement({box.id}).scrollIntoView({{block: 'nearest'}})")
+        with box:
             ui.label(f"If {seen.name} were added").classes("font-bold")
             ui.label(seen.sentence).classes("text-sm")
             for key, (before, after) in seen.explains.items():
@@ -114,6 +140,30 @@ class MissingPanel:
                 ui.label(f"{name} = {value:.3g}").classes("text-sm")
             if seen.check:
                 ui.label(f"To be sure: {seen.check}").classes("text-sm")
-            calls = ("add", seen.name), ("compare",)
+            calls = ("add",), ("compare",)
             add = ui.button("Add it", on_click=lambda: page.work(*calls, then="Models"))
             add.classes("w-full").props("color=deep-orange-9")
+            self._deciding(seen)
+
+    def _deciding(self, seen: Seen) -> None:
+        """Offer the experiment that tells what is looked at from a rival."""
+        page, tab = self._page, self._page.tab
+        if tab.diagnosis is None:
+            return
+        names = [each.name for each in tab.diagnosis.standings if each.name != seen.name]
+        if seen.name not in {each.name for each in tab.diagnosis.standings} or not names:
+            return
+        with ui.expansion("Which experiment would decide?").classes("w-full"):
+            rival = ui.select(names, value=names[0], label="against").props("dense")
+            grams = ui.number("weight that you can hang on [g]", value=self._grams).props("dense")
+
+            def plan() -> None:
+                self._grams = float(grams.value or 0.0)
+                page.work(("plan", [seen.name, str(rival.value)], self._grams))
+
+            ui.button("Plan it", on_click=plan).props("outline dense").classes("w-full")
+            text, folder = tab.planned
+            if text:
+                ui.label(text).classes("text-sm whitespace-pre-line")
+            if folder:
+                ui.label(f"written into the workspace: {folder}").classes("text-xs")

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
-from nicegui import ui
+from nicegui import events, ui
+
+from wrist_stiffness.web.figures import number
+from wrist_stiffness.workflows.fit_report import plus_minus
 
 if TYPE_CHECKING:
     from wrist_stiffness.web.page import Workbench
@@ -36,28 +40,51 @@ class ModelsPanel:
         if not tab.rows:
             ui.label("Open a recording first.")
             return
-        for number, version in enumerate(tab.rows):
-            shown = number == tab.version
-            button = ui.button(on_click=lambda number=number: self._look(number))
+        for place, version in enumerate(tab.rows):
+            shown = place == tab.version
+            button = ui.button(on_click=partial(self._look, place))
             button.props(f"no-caps align=left dense {'unelevated' if shown else 'outline'}")
-            button.classes("w-full")
+            button.classes("w-full flex-none")
             with button, ui.column().classes("w-full gap-0 items-start text-left px-1"):
-                ui.label(f"{number}  {version.name}").classes("font-bold")
+                ui.label(f"{place}  {version.name}").classes("font-bold")
                 ui.label(_sizes(version.held_out)).classes("text-xs")
+                for key, (value, sigma) in version.parameters.items():
+                    ui.label(f"{key} = {plus_minus(value, sigma)}").classes("text-xs")
                 for warning in version.warnings:
                     ui.label(warning).classes("text-xs")
-        ui.button("Undo the newest", on_click=lambda: page.work(("undo",))).props("outline dense")
+        with ui.row().classes("w-full items-center"):
+            undo = ui.button("Undo the newest", on_click=lambda: page.work(("undo",), ("compare",)))
+            undo.props("outline dense").set_enabled(len(tab.rows) > 1)
+            write = ui.button("Export", on_click=lambda: page.work(("export", tab.version)))
+            write.props("outline dense")
+        others = {n: f"{n} {each.name}" for n, each in enumerate(tab.rows) if n != tab.version}
+        if others:
+            against = ui.select({-1: "nothing", **others}, label="compare in all pictures with")
+            against.set_value(-1 if tab.against is None else tab.against)
+            against.classes("w-full").props("dense").on_value_change(self._compare)
+        for name in tab.written:
+            path = page.workspace.path(name)
+            ui.button(f"download {name}", on_click=lambda p=path: ui.download(p)).props(
+                "flat dense"
+            )
+        if tab.written:
+            ui.label(".txt: the same as commands; .html: the report").classes("text-xs")
 
-    def _look(self, number: int) -> None:
+    def _look(self, place: int) -> None:
         page = self._page
         if not page.busy:
-            page.tab.version, page.tab.seen = number, None
+            page.tab.version, page.tab.seen, page.tab.against = place, None, None
             page.refresh()
+
+    def _compare(self, event: events.ValueChangeEventArguments) -> None:
+        tab = self._page.tab
+        tab.against, tab.seen = (None if event.value < 0 else int(event.value)), None
+        self._page.views.refresh()
 
 
 def _sizes(held_out: Mapping[str, float]) -> str:
     parts = []
     for key, size in held_out.items():
         name, _, unit = key.rpartition("_")
-        parts.append(f"{name} {size:.3g} {'µm' if unit == 'um' else unit}")
+        parts.append(f"{name} {number(size)} {'µm' if unit == 'um' else unit}")
     return "unseen data: " + ", ".join(parts)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from nicegui import background_tasks, events, run, ui
 
 from wrist_stiffness.web.missing_panel import MissingPanel
@@ -67,7 +70,7 @@ class Workbench:
         ui.context.client.on_delete(self.tab.worker.end)
         ui.keyboard(on_key=self._key)
 
-    def work(self, *calls: tuple[object, ...], then: str = "") -> None:
+    def work(self, *calls: Sequence[Any], then: str = "") -> None:
         """Do things that take long, one after the other, the page drawn anew after each.
 
         Parameters
@@ -84,12 +87,14 @@ class Workbench:
         self._watch()
         background_tasks.create(self._work(calls, then))
 
-    async def _work(self, calls: tuple[tuple[object, ...], ...], then: str) -> None:
+    async def _work(self, calls: Sequence[Sequence[Any]], then: str) -> None:
         why = ""
         for method, *arguments in calls:
-            why = await run.io_bound(self.tab.work, str(method), *arguments) or ""
+            why = await run.io_bound(self.tab.work, method, *arguments) or ""
             if why:
                 break
+            if method.startswith("open"):
+                self.views.begin()
             self.refresh()
         self.busy = False
         self._watch()

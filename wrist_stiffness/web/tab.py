@@ -87,7 +87,11 @@ class Tab:
         self.depends: tuple[Depends, ...] = ()
         self.diagnosis: Diagnosis | None = None
         self.seen: Seen | None = None
+        self.covariates: tuple[str, ...] = ()
+        self.planned = "", ""
+        self.written: tuple[str, ...] = ()
         self.version = 0
+        self.against: int | None = None
         self.chosen: Mask | None = None
         self.moment = 0
         self.axis: int | None = None
@@ -112,10 +116,11 @@ class Tab:
             setattr(self, name, value)
         if view is not None:
             number, seen = view
+            self.against = None
             self.views = {n: v for n, v in self.views.items() if n < number} | {number: seen}
             self.depends = self.depends[: number + 1]
         if "glances" in changes:
-            self.chosen, self.axis = None, None
+            self.chosen, self.axis, self.planned, self.written = None, None, ("", ""), ()
             self.table = load_model(self.model_path).table
             self.moment = int(np.nanargmax(length(self.views[0].left.values, self.quantities[-1])))
 
@@ -133,7 +138,13 @@ class Tab:
         """Return what all pictures show."""
         view = self.views[self.version]
         values = view.left.values
-        after = None if self.seen is None else values - self.seen.change
+        after, name = None, self.candidate
+        if self.seen is not None:
+            after = values - self.seen.change
+        elif self.against in self.views:
+            other = self.views[self.against].left.values
+            after = other if other.shape == values.shape else None
+            name = self.rows[self.against].name
         # One scale of colours and one direction for all versions: so the error is seen to fall.
         first = self.views[0].left.values
         scale = float(np.nanpercentile(length(first, quantity), ASIDE))
@@ -142,7 +153,7 @@ class Tab:
         if chosen is not None and len(chosen) != len(values):
             chosen = None
         moment = min(self.moment, len(values) - 1)
-        return Shown(view, after, self.candidate, quantity, axis, scale, chosen, moment)
+        return Shown(view, after, name, quantity, axis, scale, chosen, moment)
 
     @property
     def curves(self) -> dict[str, Curve]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from nicegui import events, ui
 
+from wrist_stiffness.campaign.comparing.curve import condition_label
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.web.figures import (
@@ -15,6 +16,7 @@ from wrist_stiffness.web.figures import (
     Figure,
     contrast,
     error_map,
+    number,
     rms,
     time_line,
     unit_of,
@@ -25,6 +27,8 @@ from wrist_stiffness.web.wrist_figure import wrist_figure
 if TYPE_CHECKING:
     from wrist_stiffness.web.figures import Shown
     from wrist_stiffness.web.page import Workbench
+
+DEPENDS, VERSIONS = "Depends on", "Versions"
 
 EXAGGERATIONS = (1, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
@@ -51,6 +55,7 @@ class Views:
                 self._quantity = ui.toggle({0: "shift s [µm]", 1: "rotation φ [mdeg]"}, value=1)
                 self._quantity.props("dense no-caps").on_value_change(self.refresh)
                 with ui.row().classes("items-center gap-2"):
+                    ui.label("along").classes("text-xs")
                     self._axis = ui.toggle(
                         {-1: "strongest", **dict(enumerate(AXES))}, value=-1
                     ).props("dense no-caps")
@@ -58,7 +63,7 @@ class Views:
                     self._all = ui.button("show all", on_click=self._show_all)
                     self._all.props("dense flat")
         row, column = "w-full no-wrap gap-2 items-stretch", "panel gap-0"
-        with ui.row().classes(row).style("height: calc((100vh - 190px) * 0.52)"):
+        with ui.row().classes(row).style("height: calc((100vh - 152px) * 0.52)"):
             with ui.column().classes(column).style("flex: 1; min-width: 0"):
                 self._map_title = ui.label("Where does it fail?").classes("font-bold")
                 self._map = self._plot("map")
@@ -73,24 +78,19 @@ class Views:
                     )
                     self._factor.on_value_change(self._draw_wrist)
                 self._wrist = self._plot("wrist")
-        with ui.row().classes(row).style("height: calc((100vh - 190px) * 0.48)"):
+        with ui.row().classes(row).style("height: calc((100vh - 152px) * 0.48)"):
             with ui.column().classes(column).style("flex: 1.5; min-width: 0"):
                 ui.label("When: measured and predicted, and what is left").classes("font-bold")
                 self._time = self._plot("time")
             with ui.column().classes(column).style("flex: 1; min-width: 0"):
-                with ui.tabs().props("dense inline-label").classes("w-full") as tabs:
-                    ui.tab("Depends on")
-                    ui.tab("Versions")
-                self._lower = tabs
-                with ui.tab_panels(tabs, value="Depends on").classes("w-full grow"):
-                    with ui.tab_panel("Depends on").classes("p-0 gap-0"):
-                        self._condition = ui.select([], label="").classes("w-full")
-                        self._condition.props("dense options-dense")
-                        self._condition.on_value_change(self._draw_contrast)
-                        self._contrast = self._plot("contrast")
-                    with ui.tab_panel("Versions").classes("p-0 gap-0"):
-                        self._waterfall = self._plot("waterfall")
-        for plot in (self._map, self._time, self._contrast):
+                with ui.row().classes("w-full no-wrap items-center gap-2"):
+                    self._lower = ui.toggle([DEPENDS, VERSIONS], value=DEPENDS)
+                    self._lower.props("dense no-caps").on_value_change(self._draw_lower)
+                    self._condition = ui.select([]).classes("grow").props("dense options-dense")
+                    self._condition.on_value_change(self._draw_lower)
+                    self._condition.bind_visibility_from(self._lower, "value", value=DEPENDS)
+                self._plot_lower = self._plot("lower")
+        for plot in (self._map, self._time, self._plot_lower):
             plot.on("plotly_selected", self._selected, js_handler=POINTS)
             plot.on("plotly_click", self._clicked, js_handler=POINTS)
 
@@ -98,6 +98,15 @@ class Views:
         plot = ui.plotly({"data": [], "layout": {"xaxis": {"visible": False}}})
         plot.classes("w-full grow").style("min-height: 0").props(f"id=plot-{name}")
         return plot
+
+    def begin(self) -> None:
+        """Begin with the quantity that stands farthest above its noise."""
+        tab = self._page.tab
+        view = tab.views[0]
+        over = [
+            rms(view.left.values, each) / max(view.noise[each.key], 1e-9) for each in tab.quantities
+        ]
+        self._quantity.set_value(int(np.argmax(over)))
 
     @property
     def shown(self) -> Shown | None:
@@ -116,20 +125,20 @@ class Views:
         self._tell_numbers(shown)
         border = tab.table.workspace.operative_border
         _show(self._map, error_map(shown, border))
-        what = f"if {tab.candidate} were added" if shown.after is not None else self._version_name()
+        what = tab.rows[tab.version].name
+        if tab.seen is not None:
+            what = f"if {tab.candidate} were added"
+        elif shown.after is not None:
+            what = shown.candidate
         self._map_title.text = f"Where does it fail? ({what})"
         _show(self._time, time_line(shown))
-        _show(self._waterfall, waterfall(tab.rows, self._noise(), shown.quantity))
         names, curves = list(shown.view.left.covariates), tab.curves
-        ordered = [*curves, *(name for name in names if name not in curves)]
+        ordered = {name: f"{name} (the error depends on it)" for name in curves}
+        ordered |= {name: condition_label(name) for name in names if name not in curves}
         if self._condition.options != ordered:
-            self._condition.set_options(ordered, value=ordered[0])
-        self._draw_contrast()
+            self._condition.set_options(ordered, value=next(iter(ordered)))
+        self._draw_lower()
         self._draw_wrist()
-
-    def _version_name(self) -> str:
-        tab = self._page.tab
-        return tab.rows[tab.version].name
 
     def _noise(self) -> dict[str, float]:
         tab = self._page.tab
@@ -143,7 +152,7 @@ class Views:
             for quantity in tab.quantities:
                 key, unit = quantity.key, unit_of(quantity)
                 sizes = [each.held_out[key] for each in versions[1:] or versions]
-                path = " → ".join(f"{size:.3g}" for size in dict.fromkeys((sizes[0], sizes[-1])))
+                path = " → ".join(number(size) for size in dict.fromkeys((sizes[0], sizes[-1])))
                 with ui.column().classes("gap-0"):
                     ui.label(f"{SYMBOL[quantity.name]} on unseen data").classes("text-xs")
                     ui.label(f"{path} {unit}").classes("text-3xl font-bold whitespace-nowrap")
@@ -158,10 +167,17 @@ class Views:
                 ui.label(f"{size:.3g} {shown.unit}").classes("text-xl")
                 ui.label(f"left, over {count} units").classes("text-xs")
 
-    def _draw_contrast(self) -> None:
-        shown, name = self.shown, self._condition.value
-        if shown is not None and name in shown.view.left.covariates:
-            _show(self._contrast, contrast(shown, str(name), self._page.tab.curves.get(str(name))))
+    def _draw_lower(self) -> None:
+        shown, tab = self.shown, self._page.tab
+        if shown is None:
+            return
+        if self._lower.value == VERSIONS:
+            _show(self._plot_lower, waterfall(tab.rows, self._noise(), shown.quantity))
+            return
+        told = tab.curves.get(str(self._condition.value))
+        name = str(self._condition.value) if told is None else told.names[0]
+        if name in shown.view.left.covariates:
+            _show(self._plot_lower, contrast(shown, name, told))
 
     def _draw_wrist(self) -> None:
         shown, tab = self.shown, self._page.tab
@@ -205,7 +221,8 @@ class Views:
     def _clicked(self, event: events.GenericEventArguments) -> None:
         shown = self.shown
         places = _places(event.args or [], shown.view.left.n_units if shown else 0)
-        if places:
+        bars = event.sender is self._plot_lower and self._lower.value == VERSIONS
+        if places and not bars:
             self._page.tab.moment = places[0]
             self.refresh()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
 from wrist_stiffness.atomic_file import replacing
@@ -45,6 +46,11 @@ class Workspace:
         if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
             raise InputError(f"{name!r} is no plain file name within the workspace")
         return path
+
+    def free(self, name: str) -> str:
+        """Return a name with a number that no file of the folder has."""
+        taken = {path.stem for path in self.folder.iterdir()}
+        return next(own for n in count(1) if (own := f"{name}_{n}") not in taken)
 
     def save(self, name: str, content: bytes) -> Path:
         """Write an uploaded file; one of that name is replaced.

@@ -24,7 +24,7 @@ NAMED = 2.0
 """Share from which a body bears its name [%]; the others say it when they are pointed at."""
 
 BENT, MEASURED = "platform, as the load bends it", "platform, as measured"
-EYE = {"x": 0.95, "y": -1.1, "z": 0.6}
+EYE = {"x": 1.05, "y": -1.2, "z": 0.65}
 
 
 def wrist_figure(
@@ -77,7 +77,11 @@ def wrist_figure(
         traces.append(_disc(platform.points @ turn.T + shift, MEASURED, RED))
     traces.append(_names(bodies))
     axes = {
-        f"{axis}axis": {"title": {"text": f"{axis} [mm]"}, "backgroundcolor": "white"}
+        f"{axis}axis": {
+            "title": {"text": f"{axis} [mm]", "font": {"size": 11}},
+            "tickfont": {"size": 9},
+            "nticks": 5,
+        }
         for axis in "xyz"
     }
     layout = {
@@ -87,7 +91,7 @@ def wrist_figure(
         "uirevision": "kept",
         "showlegend": False,
     }
-    config = {"displaylogo": False, "responsive": True}
+    config = {"displaylogo": False}
     return {"data": traces, "layout": layout, "config": config}, exaggeration
 
 
