@@ -99,7 +99,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"wrist-stiffness = {NAME}.cli.main:main",
-            *(f"{node} = {NAME}.ros.{node}:main" for node in NODES),
+            *(f"{node} = {NAME}.ros.start:{node}" for node in NODES),
         ]
     },
 )

@@ -207,6 +207,6 @@ def test_node_entry_becomes_a_command():
     python, *rest = entry.command()
     assert python == sys.executable
     assert " ".join(rest) == (
-        "-m wrist_stiffness.ros.angle_corrector --ros-args -r __node:=left "
+        "-m wrist_stiffness.ros.start angle_corrector --ros-args -r __node:=left "
         "-p enabled_on_start:=true -p rate_hz:=1.5 -r /motor_commands:=/left/motor_commands"
     )

@@ -45,6 +45,28 @@ def test_a_signal_ends_a_node_cleanly(graph, name, ending):
     assert "Traceback" not in errors
 
 
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_node_cleanly_while_its_libraries_are_loaded(tmp_path, ending):
+    slow = "import sys\nprint('loading', flush=True)\nsys.stdin.read()\n"
+    (tmp_path / "numpy.py").write_text(slow)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    with subprocess.Popen(
+        NODES["angle_corrector"].command(),
+        env={**os.environ, "PYTHONPATH": path},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert process.stdout.readline() == "loading\n"
+            process.send_signal(ending)
+            process.wait(DEADLINE_S)
+            assert (process.returncode, process.stderr.read()) == (0, "")
+        finally:
+            process.kill()
+
+
 def test_an_impatient_user_sees_no_traceback(graph):
     with subprocess.Popen(
         NODES["angle_corrector"].command(), stderr=subprocess.PIPE, text=True

@@ -4,8 +4,11 @@ import time
 
 import pytest
 import rclpy
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.ros import cell_simulator
 from wrist_stiffness.ros.cell_simulator import NAMELESS, CellSimulator
 from wrist_stiffness.workflows import cell
@@ -65,6 +68,31 @@ def test_a_listener_whose_name_comes_late_is_greeted_by_it(graph, monkeypatch):
     graph.until(lambda: graph.heard["/joint_states"], "first sample")
     assert len(nameless) == 3
     assert simulator.count_clients("/probe/get_parameters") == 1
+
+
+def test_two_cells_in_two_namespaces_have_frames_of_their_own(graph):
+    spoken = {"load_estimate": WrenchStamped} | dict.fromkeys(
+        ("platform_pose_measured", "cell_simulator/platform_pose_true"), PoseStamped
+    )
+    for side in ("left", "right"):
+        prefix = Parameter("frame_prefix", value=f"{side}/")
+        arguments = ["--ros-args", "-r", f"__ns:=/{side}"]
+        cell = CellSimulator(
+            context=graph.context, cli_args=arguments, parameter_overrides=[prefix]
+        )
+        graph.executor.add_node(cell)
+        for topic, message_type in spoken.items():
+            graph.listen(message_type, f"/{side}/{topic}")
+    for side in ("left", "right"):
+        for topic in spoken:
+            heard = graph.heard[f"/{side}/{topic}"]
+            graph.until(lambda heard=heard: heard, f"{side} {topic}")
+            assert {each.header.frame_id for each in heard} == {f"{side}/wrist_base"}
+
+
+def test_a_frame_prefix_that_cannot_be_one_is_refused(graph):
+    with pytest.raises(InputError, match="frame_prefix: '/left' is not made of"):
+        graph.add(CellSimulator, frame_prefix="/left")
 
 
 def test_the_recorder_waits_for_all_that_the_virtual_cell_says(graph):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -126,6 +127,18 @@ class MotorNames:
                 raise InputError(f"{what}: {motor} {count_text} among {listed}")
             found.append(names.index(motor))
         return found[0], found[1]
+
+
+FRAME_PREFIX = re.compile("([A-Za-z0-9_][A-Za-z0-9_/]*)?")
+
+
+def checked_prefix(prefix: str) -> str:
+    """Return a prefix of frames (InputError if it cannot be one)."""
+    if not FRAME_PREFIX.fullmatch(prefix):
+        raise InputError(
+            f"frame_prefix: {prefix!r} is not made of letters, digits, _ and, not at its start, /"
+        )
+    return prefix
 
 
 def frame_name(frame_id: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
-from wrist_stiffness.compensation.intake import Frames, MotorNames
+from wrist_stiffness.compensation.intake import Frames, MotorNames, checked_prefix
 from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.payload import Thresholds
@@ -23,7 +23,6 @@ from wrist_stiffness.errors import InputError
 ParameterValue = bool | int | float | str
 
 COVARIATE = re.compile("[A-Za-z][A-Za-z0-9_]*")
-FRAME_PREFIX = re.compile("([A-Za-z0-9_][A-Za-z0-9_/]*)?")
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,13 @@ def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) 
             )
 
 
+FRAMES_PREFIXED = ParameterEntry(
+    "frame_prefix",
+    "",
+    "before the names of all frames, on topics and in TF, so that wrists live side by side: left/",
+    fixed=True,
+)
+
 COMMON = (
     ParameterEntry("autostart", True, "configure and activate at the start", fixed=True),
     ParameterEntry("model_file", "", "model to load (YAML); empty for the shipped one"),
@@ -110,13 +116,7 @@ COMMON = (
         "frames of sensors (YAML): {FRAME_ID: {parent: wrist_base | wrist_platform, "
         "position_mm: [x, y, z], rpy_deg: [r, p, y], acts_on: platform | environment}}",
     ),
-    ParameterEntry(
-        "frame_prefix",
-        "",
-        "before the names of all frames, on topics and in TF, so that wrists live side by side: "
-        "left/",
-        fixed=True,
-    ),
+    FRAMES_PREFIXED,
     ParameterEntry(
         "covariates", "", "names of /covariates/NAME that the model uses, with blanks", fixed=True
     ),
@@ -346,11 +346,7 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
                 f"covariates: {name!r} cannot be the name of a topic: a letter, then letters, "
                 "digits and _"
             )
-    prefix = values["frame_prefix"]
-    if not FRAME_PREFIX.fullmatch(prefix):
-        raise InputError(
-            f"frame_prefix: {prefix!r} is not made of letters, digits, _ and, not at its start, /"
-        )
+    prefix = checked_prefix(values["frame_prefix"])
     sensors = frames_from_yaml(values["frames"]).sensors
     own = {name.removeprefix(prefix): sensor for name, sensor in sensors.items()}
     return StreamSettings(

@@ -20,9 +20,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from wrist_stiffness.compensation.intake import MotorNames
+from wrist_stiffness.compensation.intake import MotorNames, checked_prefix
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.parameters import ParameterEntry
+from wrist_stiffness.compensation.parameters import FRAMES_PREFIXED, ParameterEntry
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.answer_count import AnswerCount
@@ -74,6 +74,7 @@ PARAMETERS = (
     ParameterEntry(
         "enable_at_repeat", False, "switch the angle corrector on when the motion repeats"
     ),
+    FRAMES_PREFIXED,
 )
 
 SENT_QUEUE = QoSProfile(depth=1)
@@ -123,6 +124,7 @@ class CellSimulator(Node):
         self.cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
         motors = MotorNames()
         self._names = (motors.motor_1, motors.motor_2)
+        self._base_frame = checked_prefix(self.get_parameter("frame_prefix").value) + BASE_FRAME
         self._programs = self.get_parameter("programs").value
         self._enable_at_repeat = self.get_parameter("enable_at_repeat").value
         self._sent = self.cell.desired(0.0)
@@ -275,12 +277,15 @@ class CellSimulator(Node):
         stamp_ns = self._stamp_ns(time_s)
         sample = self.cell.step(time_s, self._sent)
         # The load first: it belongs to the joint state of the same stamp.
-        self._load.publish(wrench_message(stamp_ns, BASE_FRAME, sample.wrench))
+        frame = self._base_frame
+        self._load.publish(wrench_message(stamp_ns, frame, sample.wrench))
         self._joints.publish(joint_message(stamp_ns, "", self._names, sample.encoder, sample.speed))
         self._measured.publish(
-            pose_message_stamped(stamp_ns, sample.measured_rotation, sample.measured_shift)
+            pose_message_stamped(stamp_ns, sample.measured_rotation, sample.measured_shift, frame)
         )
-        self._true.publish(pose_message_stamped(stamp_ns, sample.pose_rotation, sample.pose_shift))
+        self._true.publish(
+            pose_message_stamped(stamp_ns, sample.pose_rotation, sample.pose_shift, frame)
+        )
         self._command.publish(joint_message(stamp_ns, "", self._names, self.cell.desired(time_s)))
         self._asked_s = time.monotonic()
 

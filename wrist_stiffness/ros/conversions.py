@@ -50,11 +50,13 @@ def pose_message(position: Array, quaternion: Array) -> Pose:
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=w))
 
 
-def pose_message_stamped(stamp_ns: int, rotation: Array, position: Array) -> PoseStamped:
-    """Return a platform pose in `wrist_base` from a rotation (3, 3) and the place of O (3,) [m]."""
+def pose_message_stamped(
+    stamp_ns: int, rotation: Array, position: Array, frame_id: str = BASE_FRAME
+) -> PoseStamped:
+    """Return a platform pose in the base from a rotation (3, 3) and the place of O (3,) [m]."""
     message = PoseStamped()
     message.header.stamp = time_message(stamp_ns)
-    message.header.frame_id = BASE_FRAME
+    message.header.frame_id = frame_id
     message.pose = pose_message(position, Rotation.from_matrix(rotation).as_quat(canonical=True))
     return message
 

@@ -51,8 +51,8 @@ class NodeEntry:
 
     def command(self) -> list[str]:
         """Return the process arguments that start this node with the running interpreter."""
-        arguments = [sys.executable, "-m", f"wrist_stiffness.ros.{self.executable}", "--ros-args"]
-        arguments += ["-r", f"__node:={self.name}"]
+        arguments = [sys.executable, "-m", "wrist_stiffness.ros.start", self.executable]
+        arguments += ["--ros-args", "-r", f"__node:={self.name}"]
         for parameter, value in self.parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value) or "''"
             arguments += ["-p", f"{parameter}:={text}"]
