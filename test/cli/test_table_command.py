@@ -198,6 +198,7 @@ def test_picture_that_cannot_be_written_is_one_line_and_leaves_nothing(
         (["-o", "table.npz", "--interface", "soft"], "'soft'"),
         (["missing.yaml", "-o", "table.npz"], "missing.yaml: cannot be read"),
         (["flat.yaml", "-o", "table.npz"], "wall_mm: -0.75 is not above 0"),
+        (["thick.yaml", "-o", "table.npz"], "4.5 does not fit links.link_1.platform_bore_mm"),
         ([], "-o/--output"),
     ],
 )
@@ -207,6 +208,9 @@ def test_build_refuses_before_it_computes(tmp_path, monkeypatch, refused, option
     values = yaml.safe_load(shipped)
     values["bushings"]["joint_4"]["wall_mm"] = -0.75
     (tmp_path / "flat.yaml").write_text(yaml.safe_dump(values))
+    values = yaml.safe_load(shipped)
+    values["bushings"]["joint_2"]["pin_diameter_mm"] = 4.5
+    (tmp_path / "thick.yaml").write_text(yaml.safe_dump(values))
     assert named in refused("table", "build", *options)
     assert not (tmp_path / "table.npz").exists()
 

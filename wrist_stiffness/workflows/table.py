@@ -13,6 +13,7 @@ from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
+from wrist_stiffness.mechanism.fits import check_fits
 from wrist_stiffness.mechanism.geometry_file import geometry_of
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.workflows.budget import PER_AXIS, Push, budget
@@ -87,7 +88,7 @@ def build(
             f"to {MAX_PER_AXIS} x {MAX_PER_AXIS}"
         )
     root = read_yaml(geometry, GeometryError)
-    geometry_of(root)
+    check_fits(root, geometry_of(root))
     settings = BuildSettings(
         evaluation=evaluation,
         interface=interface,  # type: ignore[arg-type]
