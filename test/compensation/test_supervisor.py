@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wrist_stiffness.compensation import supervisor as module
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.payload import Payload, Thresholds
+from wrist_stiffness.compensation.payload import ENOUGH, Payload, Thresholds
 from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.supervision import State, SupervisorSettings
@@ -30,7 +30,9 @@ AGREED = 1e-5  # N m, of thresholds of 2e-3: what the first guess of the centre 
 
 
 class Cell:
-    """Loads at 100 Hz for a supervisor, with a correction that turns the platform by `turn`."""
+    """Loads for a supervisor, with a correction that turns the platform by `turn`."""
+
+    rate_hz = 100
 
     def __init__(self, table, settings=None, turn=(0.0, 0.0, 0.0)):
         self.table, self.settings = table, settings or SupervisorSettings()
@@ -50,8 +52,8 @@ class Cell:
         """Let a load (6,), a payload, or a function of the share of the correction act."""
         self.theta = self.theta if theta is None else theta
         rotation = self.rotation()
-        for _ in range(round(100 * seconds)):
-            self.stamp += SECOND // 100
+        for _ in range(round(self.rate_hz * seconds)):
+            self.stamp += SECOND // self.rate_hz
             acting = load
             if callable(load):
                 acting = load(self.supervisor.supervision.share, self.corrected)
@@ -143,6 +145,35 @@ def test_noise_below_the_thresholds_changes_nothing(table, noise):
         cell.feel(0.03, cell.weight(PART) + scale * each)
     assert cell.states == before
     assert np.allclose(cell.corrected, cell.weight(PART), rtol=0.0, atol=np.max(scale))
+
+
+@pytest.mark.parametrize("rate_hz", [50, 200, 1000])
+def test_a_payload_is_learned_by_time_and_not_by_the_number_of_readings(cell, rate_hz):
+    """Readings within `LATE_S` may all be wrong by the same: together they count as one."""
+    cell.rate_hz, heavier = rate_hz, Payload(1.01 * PART.mass_kg, PART.centre_m)
+    cell.feel(1.0, PART)
+    learned = cell.feel(0.5, heavier).payload.mass_kg / PART.mass_kg - 1.0
+    # The mean over all its time: a third of it heavier.
+    assert learned == pytest.approx(0.01 / 3.0, rel=0.1)
+    cell.feel(ENOUGH * LATE_S, heavier)
+    known = cell.supervisor.supervision.payload
+    # As much as is enough: no further, so that a contact that grows slowly is not learned.
+    heaviest = Payload(1.02 * PART.mass_kg, PART.centre_m)
+    assert cell.feel(1.0, heaviest).payload.mass_kg == known.mass_kg
+
+
+def test_a_payload_is_learned_less_where_a_motion_turns_the_load(table):
+    """What a late load turns is turned by the same all along a motion."""
+    learned = []
+    for speed in (0.0, 0.5):
+        cell = Cell(table)
+        cell.feel(1.0, PART)
+        for step in range(50):
+            heavier = Payload(1.01 * PART.mass_kg, PART.centre_m)
+            held = cell.feel(0.01, heavier, HERE + speed * step * 0.01)
+        assert held.state is State.HOLDING
+        learned.append(held.payload.mass_kg / PART.mass_kg - 1.0)
+    assert 0.0 < learned[1] < 0.8 * learned[0]
 
 
 @pytest.mark.parametrize("push", [side(0.3), side(0.0, 0.01)], ids=["force", "couple"])
