@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.cli.main import main
+from wrist_stiffness.lookup.verification import random_loads
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
@@ -105,3 +106,32 @@ def test_refuses(tmp_path, monkeypatch, refused, options, named):
     monkeypatch.chdir(tmp_path)
     assert named in refused("predict", *options)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_past_first_order_the_exact_closure_is_told(tmp_path, capsys):
+    """A moment as large as the table's range turns the platform by more than 2 mrad somewhere."""
+    model = load_model(MODEL)
+    rng = np.random.default_rng(26)
+    poses = rng.uniform(*model.table.workspace.rectangle, (400, 2))
+    poses = poses[model.table.workspace.domain(poses)]
+    loads = random_loads(model.table.geometry.limits, len(poses), rng)
+    loads[:, 3:] *= 0.0999 / np.linalg.norm(loads[:, 3:], axis=1, keepdims=True)
+    found = [model.predict(*pair) for pair in zip(poses, map(Load, loads), strict=True)]
+    size = np.array([each.phi for each in found])
+    asked = {"below": np.argmin(size), "past": np.argmax(size)}
+    assert size[asked["below"]] < 2e-3 < size[asked["past"]]
+    told = {}
+    for name, index in asked.items():
+        path = tmp_path / f"{name}.json"
+        angles, load = np.degrees(poses[index]).tolist(), loads[index].tolist()
+        options = ["--angles", *map(repr, angles), "--load", *map(repr, load)]
+        assert main(["predict", *options, "--json", str(path)]) == 0
+        told[name] = json.loads(path.read_text())
+        assert ("past first order" in capsys.readouterr().out) == (name == "past")
+    assert told["below"]["exact"] is None
+    # Finite rotations add terms of the order of the rotation itself, and no more.
+    exact, phi = told["past"]["exact"], size[asked["past"]]
+    for name in ("s_um", "phi_mdeg"):
+        off = abs(exact[name] - told["past"][name])
+        assert off > 0.0
+        assert off < 10.0 * phi * told["past"][name]

@@ -51,6 +51,13 @@ def _run(arguments: argparse.Namespace) -> int:
     if other := values["other_evaluation"]:
         way = "spline" if values["evaluation"] == "closed_form" else "closed form"
         print(f"by the table's {way}: s {other['s_um']:.3f} um, phi {other['phi_mdeg']:.3f} mdeg")
+    if exact := values["exact"]:
+        print(
+            "past first order (2 mrad); with finite rotations: "
+            f"s {exact['s_um']:.3f} um, phi {exact['phi_mdeg']:.3f} mdeg"
+        )
+    elif values["past_first_order"]:
+        print("past first order (2 mrad), in which the model's effects are carried")
     inside = "inside" if values["in_operative_workspace"] else "outside"
     print(
         f"tilt {values['tilt_deg']:.2f} deg, {inside} the operative workspace, "

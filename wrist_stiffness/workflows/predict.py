@@ -9,10 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.lookup.table import Evaluation
+from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.stages import FIRST_ORDER_LIMIT
+from wrist_stiffness.simulation.exact import ExactWrist
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,9 @@ class PosePrediction:
         How the nodes evaluate the table.
     other : Prediction or None
         By the other evaluation, where it was asked for.
+    exact : (6,) float or None
+        Twist with finite rotations [m, rad], where the first order in which the prediction is made
+        has been left and the model has no effects.
     energy_shares : dict of str to float
         Part of the load's strain energy in each component with free slides; they add up to 1.
     tilt : float
@@ -40,6 +47,7 @@ class PosePrediction:
     prediction: Prediction
     evaluation: Evaluation
     other: Prediction | None
+    exact: Array | None
     energy_shares: dict[str, float]
     tilt: float
     singularity: float
@@ -51,6 +59,8 @@ class PosePrediction:
             **_values(self.prediction),
             "evaluation": self.evaluation,
             "other_evaluation": None if self.other is None else _values(self.other),
+            "exact": None if self.exact is None else _lengths(self.exact),
+            "past_first_order": past_first_order(self.prediction),
             "energy_share": self.energy_shares,
             "tilt_deg": float(np.degrees(self.tilt)),
             "singularity_D": self.singularity,
@@ -100,15 +110,38 @@ def predict(
         other = error_model.with_evaluation(way).predict(theta, wrench)
     table = error_model.table
     configuration = prediction.configuration
+    exact = None
+    if past_first_order(prediction) and not error_model.effects:
+        exact = _exact(table, configuration, wrench)
     return PosePrediction(
         prediction=prediction,
         evaluation=error_model.evaluation,
         other=other,
+        exact=exact,
         energy_shares=_shares(table.shares(configuration), wrench.in_base(configuration)),
         tilt=float(table.mechanism.tilt(theta)),
         singularity=float(configuration.singularity),
         operative=bool(table.workspace.operative(theta)),
     )
+
+
+def past_first_order(prediction: Prediction) -> bool:
+    """Whether the platform turns by more than first order holds for."""
+    return prediction.phi > FIRST_ORDER_LIMIT
+
+
+def _exact(table: Table, configuration: Configuration, load: Load) -> Array:
+    """Twist (6,) of the platform from the equilibrium of all bodies with finite rotations."""
+    state = ExactWrist(table, ()).solve(configuration.theta, load.in_base(configuration))
+    return log_motion(state.rotation @ configuration.platform.T, state.shift)
+
+
+def _lengths(twist: Array) -> dict[str, float]:
+    _, shift = exp_twist(twist)
+    return {
+        "s_um": 1e6 * float(np.linalg.norm(shift)),
+        "phi_mdeg": 1e3 * float(np.degrees(np.linalg.norm(twist[3:]))),
+    }
 
 
 def _shares(shares: Array, wrench: Array) -> dict[str, float]:
