@@ -24,8 +24,8 @@ NEGLIGIBLE = 3.0
 """Log odds against a set, beside the best one so far, below which it is not fitted: 1 in 20."""
 
 CLOSE = 0.6
-"""Share of the leader's gain to first order below which a candidate whose slopes show what it does
-is not fitted; and none at all once the leader leaves no more than noise."""
+"""Share of the gain to first order that the best fit kept, below which a candidate whose slopes show
+what it does is not fitted; and none at all once a fit leaves no more than noise."""
 
 FALLS = 0.8
 """Share of what was left before that an effect may leave if the search is to go on beside it: what
@@ -233,13 +233,13 @@ class Search:
                     self.first_order[each.trial.name] = each
         chosen = self._worth_a_fit(state, as_noise, beyond)
         found: list[State] = []
-        settled = False
+        settled, kept = False, 0.0
         for each in chosen:
             if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
                 self.in_time = False
                 break
             self._fits += 1
-            far_behind = each.gain < CLOSE * chosen[0].gain
+            far_behind = each.gain < CLOSE * kept
             if far_behind and (settled or (each.trial.smooth and self._costly)):
                 continue
             self._tell(f"fitting {each.trial.name}{_beside(state.names)}")
@@ -248,6 +248,8 @@ class Search:
                 self._impossible(each)
                 continue
             found.append(self._known(fit, state))
+            # Slopes may promise more than a fit keeps.
+            kept = max(kept, min(each.gain, found[-1].evidence.log - state.evidence.log))
             settled = settled or not found[-1].rough
         return found
 

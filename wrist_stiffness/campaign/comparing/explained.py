@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 from wrist_stiffness.campaign.comparing.curve import Curve, curve_of
 from wrist_stiffness.campaign.searching.likelihood import WristTable
-from wrist_stiffness.campaign.searching.questions import finer_questions, passing
+from wrist_stiffness.campaign.searching.questions import finer_questions
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.blocks import time_blocks
@@ -308,7 +308,7 @@ def explain(
     prior : (p,) float, optional
         Weights of the priors of the parameters in that fit; by default 1.
     """
-    table = WristTable(left, sessions, finer_questions, (passing(left.sessions),))
+    table = WristTable(left, sessions, finer_questions)
     white = table.whiten(left.values)
     prior = np.ones(len(z)) if prior is None else prior
     point = Point(white, table.whiten(columns), z, prior, {}, np.zeros((len(white), 0)))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from wrist_stiffness.campaign.searching.problem import WANDER
-from wrist_stiffness.campaign.searching.questions import Conditions, alike, questions
+from wrist_stiffness.campaign.searching.questions import Conditions, alike, passing, questions
 from wrist_stiffness.campaign.unit_session import UnitSession
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT, Question, background, low_rank
 from wrist_stiffness.inference.evidence import Evidence
@@ -42,8 +42,6 @@ class WristTable:
         Of which.
     ask : callable, optional
         From the conditions to what is asked of the discrepancy.
-    drifts : sequence of Question, optional
-        In which ways an instrument may drift beside slowly.
     """
 
     def __init__(
@@ -51,7 +49,6 @@ class WristTable:
         table: Observations,
         sessions: Sequence[UnitSession],
         ask: Callable[[Conditions], Sequence[Question]] = questions,
-        drifts: Sequence[Question] = (),
     ) -> None:
         self.table: Observations = table
         stated = table.covariance
@@ -82,7 +79,7 @@ class WristTable:
             scatter,
             self.drift,
             self._noise_width,
-            drifts=drifts,
+            drifts=(passing(table.sessions),),
         )
         self._alike = low_rank(alike(table.covariates), LAW_RANK)
 
