@@ -24,8 +24,8 @@ NEGLIGIBLE = 3.0
 """Log odds against a set, beside the best one so far, below which it is not fitted: 1 in 20."""
 
 CLOSE = 0.6
-"""Share of the gain to first order that the best fit kept, below which a candidate whose slopes show
-what it does is not fitted; and none at all once a fit leaves no more than noise."""
+"""Share of the gain to first order that the best fit kept, below which a candidate whose slopes
+show what it does is not fitted; and none at all once a fit leaves no more than noise."""
 
 FALLS = 0.8
 """Share of what was left before that an effect may leave if the search is to go on beside it: what
