@@ -258,3 +258,29 @@ def test_the_newest_value_that_is_not_younger_is_held(arriving, asked):
 def test_a_signal_that_is_not_finite_is_refused():
     with pytest.raises(InputError, match="ambient: nan"):
         HeldSignals(AGE_LIMIT_S).add("ambient", 0, float("nan"))
+
+
+class FewSignals(HeldSignals):
+    CAPACITY = 4
+
+
+STAMPS = st.lists(st.integers(1, 30), max_size=6)
+STAMPS |= STAMPS.map(set).map(sorted)
+
+
+@given(before=STAMPS, ahead=STAMPS, first=st.integers(1, 30))
+def test_values_heard_ahead_leave_samples_theirs_where_they_are_said_to(before, ahead, first):
+    ours, live = FewSignals(1e9), FewSignals(1e9)
+    for signals in (ours, live):
+        for stamp in before:
+            signals.add("ambient", stamp, float(stamp))
+    if not ours.rises_with("ambient", ahead, first):
+        return
+    for stamp in ahead:
+        ours.add("ambient", stamp, float(stamp))
+    for sample in range(first, 32):
+        for stamp in [stamp for stamp in ahead if stamp <= sample]:
+            # As a node hears them: not before the sample that they belong to.
+            live.add("ambient", stamp, float(stamp))
+        ahead = [stamp for stamp in ahead if stamp > sample]
+        assert ours.at(sample) == live.at(sample)

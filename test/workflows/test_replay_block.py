@@ -20,7 +20,7 @@ from wrist_stiffness.recording.messages import (
     Wrench,
     WrenchStamped,
 )
-from wrist_stiffness.recording.reader import MESSAGES_AT_A_TIME, open_recording
+from wrist_stiffness.recording.reader import open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
@@ -32,14 +32,32 @@ from wrist_stiffness.ros.stream_messages import (
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.workflows.parameter_file import node_settings
 from wrist_stiffness.workflows.replay import replay
+from wrist_stiffness.workflows.replay_block import BlockReplay
 from wrist_stiffness.workflows.signals_ahead import LOOKAHEAD_NS
 from wrist_stiffness.workflows.wrist_drawing import Pace, WristDrawing
 
 MODEL = shipped_file("config/palmieri2015_model.yaml")
 MOTORS = ("motor_1_joint", "motor_2_joint")
+EFFECTS = """
+schema: 1
+name: effects with a memory
+table: {{path: {table}}}
+effects:
+- {{effect: backlash, component: motor_1, parameters: {{width_mdeg: [20.0, 2.0]}}}}
+- {{effect: joint_friction, component: joint_2, parameters: {{coefficient: 0.2}}}}
+- effect: thermal_expansion
+  component: link_1
+  parameters: {{expansion_ppm_per_K: 70.0, lag_s: 3.0}}
+- effect: formula
+  id: drag
+  component: platform
+  direction: [0, 0, 1, 0, 0, 0]
+  expression: "drag_um * theta_dot_1"
+  parameters: {{drag_um: 1.0}}
+"""
 STEP_NS = 2_000_000
 SAMPLES = 2600
-FAR, HEAVY, LATE, GAP, JUMP, EMPTY = 300, 500, 700, 900, 1700, 2300
+FAR, HEAVY, LATE, GAP, JUMP, EMPTY = 300, 500, 700, 900, 2400, 2500
 """Samples at which: the pose is out of the domain, the load beyond the table, a load comes after
 its joint state, loads are missing for a second, the clock jumps back, a command is not finite."""
 
@@ -55,11 +73,17 @@ def signals(seed=5):
     wrench = np.zeros((SAMPLES, 6))
     # Nothing, then a weight, then a push aside.
     wrench[400:, 2] = -0.8
-    wrench[1200:1500, 0] = 0.5
+    wrench[750:850, 0] = 0.5
+    wrench[1600:1900, 0] = 0.5
     wrench += 1e-4 * rng.normal(size=wrench.shape)
     wrench[HEAVY : HEAVY + 3] *= 1000.0
     wrench[GAP : GAP + 500] = np.nan
     return stamps, theta, wrench
+
+
+def speeds(i):
+    """Return what the drivers say of the speeds, which is not finite now and then [rad/s]."""
+    return (np.nan if i % 97 == 0 else 0.01 * (i % 40), -0.2)
 
 
 def recorded(path):
@@ -75,24 +99,27 @@ def recorded(path):
             if np.isfinite(wrench[i]).all() and i != LATE:
                 writer.write("/load_estimate", load, at_ns)
             angles = tuple(theta[i].tolist())
-            writer.write("/joint_states", JointState(header, MOTORS, angles), at_ns)
+            writer.write("/joint_states", JointState(header, MOTORS, angles, speeds(i)), at_ns)
             if i == LATE:
                 writer.write("/load_estimate", load, at_ns)
             names = ("other", *MOTORS)
             first = np.nan if i == EMPTY else 0.5
-            command = JointState(header, names, (first, *angles), effort=(1.0, 2.0, 3.0))
+            command = JointState(
+                header, names, (first, *angles), (9.0, *speeds(i)), (1.0, 2.0, 3.0)
+            )
             writer.write("/motor_commands", command, at_ns)
             if i % 50 == 0:
-                writer.write("/temperatures", Temperature(header, 20.0 + i), at_ns)
+                link = replace(header, frame_id="link_1")
+                writer.write("/temperatures", Temperature(link, 20.0 + 0.01 * i), at_ns)
             if i == 10:
                 writer.write("/pose_error/s_um", Float64(1.0), at_ns)
     return path
 
 
-def wanted(settings):
+def wanted(path, settings):
     """Return the payloads that nodes would send by topic and what they refuse, one by one."""
     prediction, correction = settings
-    model = load_model(MODEL)
+    model = load_model(path)
     predicting = PredictionStream(model, prediction)
     correcting = CorrectionStream(model, correction, enabled=True)
     stamps, theta, wrench = signals()
@@ -107,9 +134,12 @@ def wanted(settings):
             if np.isfinite(load).all():
                 for stream in (predicting, correcting):
                     stream.loads.add(int(stamps[heard]), "wrist_base", load[:3], load[3:])
+            if heard % 50 == 0:
+                for stream in (predicting, correcting):
+                    stream.temperatures.add("link_1", int(stamps[heard]), 20.0 + 0.01 * heard)
             heard += 1
         try:
-            found = predicting.on_joint_state(stamp_ns, MOTORS, angles).prediction
+            found = predicting.on_joint_state(stamp_ns, MOTORS, angles, speeds(i)).prediction
             payload = error_payload(stamp_ns, found.twist, found.covariance)
             sent["/pose_error_predicted"].append(payload)
             s_um, mdeg = 1e6 * found.twist[:3], 1e3 * float(np.degrees(1.0)) * found.twist[3:]
@@ -121,14 +151,15 @@ def wanted(settings):
         except WristError:
             refused += 1
         names, first = ("other", *MOTORS), np.nan if i == EMPTY else 0.5
+        moving = (9.0, *speeds(i))
         try:
-            command = correcting.on_command(stamp_ns, "", names, (first, *angles))
+            command = correcting.on_command(stamp_ns, "", names, (first, *angles), moving)
         except WristError:
             refused += 1
             continue
         positions = tuple(command.positions.tolist())
         efforts = (1.0, 2.0, 3.0)
-        sample = JointSample(stamp_ns, "wrist_corrected", names, positions, (), efforts)
+        sample = JointSample(stamp_ns, "wrist_corrected", names, positions, moving, efforts)
         sent["/motor_commands_corrected"].append(joint_payload(sample))
         sent["/motor_positions_corrected"].append(angles_payload(command.theta))
         refused += command.fault is not None
@@ -148,15 +179,30 @@ TOPICS = (
 )
 
 
-@pytest.mark.parametrize("follow", [False, True], ids=["supervised", "every load followed"])
-def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, follow):
+@pytest.mark.parametrize(
+    ("effects", "follow"),
+    [(False, False), (False, True), (True, False)],
+    ids=["supervised", "every load followed", "effects with a memory"],
+)
+def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, follow):
+    model, answered = MODEL, []
+    answer = BlockReplay.answer
+
+    def noted(blocks, block):
+        answered.append(answer(blocks, block))
+        return answered[-1]
+
+    monkeypatch.setattr(BlockReplay, "answer", noted)
+    if effects:
+        model = tmp_path / "effects.yaml"
+        model.write_text(EFFECTS.format(table=shipped_file("precomputed/palmieri2015.npz")))
     prediction, correction = node_settings(None)
     own = replace(correction, supervisor=SupervisorSettings(follow=follow))
-    assert SAMPLES * 3 > 1.5 * MESSAGES_AT_A_TIME  # some blocks in one piece, some not
     summary = replay(
-        recorded(tmp_path / "in.mcap"), MODEL, tmp_path / "out.mcap", (prediction, own)
+        recorded(tmp_path / "in.mcap"), model, tmp_path / "out.mcap", (prediction, own)
     )
-    sent, refused = wanted((prediction, own))
+    assert answered == [True, False]  # before the clock jumps, and around it
+    sent, refused = wanted(model, (prediction, own))
     found = {topic: [] for topic in TOPICS}
     for raw in open_recording(tmp_path / "out.mcap").raw_messages(TOPICS):
         found[raw.channel.topic].append(raw.payload)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,6 +118,23 @@ class CorrectedBlock:
     faults: dict[int, WristError]
     platform: Array
     valid: Flags
+
+    @classmethod
+    def of(cls, answers: Iterable[CorrectedCommand], n: int) -> CorrectedBlock:
+        """Return n single answers as a block."""
+        theta, after, covariance = np.empty((n, 2)), np.empty((n, 6)), np.empty((n, 6, 6))
+        flags, platform = np.zeros((2, n), dtype=bool), np.empty((n, 3, 3))
+        found = cls(theta, flags[0], after, covariance, {}, platform, flags[1])
+        for place, one in enumerate(answers):
+            found.theta[place], found.valid[place] = one.theta, one.valid
+            if one.fault is not None:
+                found.faults[place] = one.fault
+            if one.correction is not None:
+                prediction = one.correction.prediction
+                found.corrected[place], found.after[place] = True, one.correction.after
+                found.covariance[place] = prediction.covariance
+                found.platform[place] = prediction.configuration.platform
+        return found
 
     def residuals(self, tool_point: Array) -> list[tuple[Array, Array]]:
         """Return the same as `CorrectedCommand` of the k commands that have a correction.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,7 +189,7 @@ class CorrectionStream(Stream):
 
     @property
     def in_blocks(self) -> bool:
-        """Whether `on_commands` can be asked: compiled, correcting, each command for itself."""
+        """Whether `on_commands` is one compiled loop: correcting, each command for itself."""
         running = self._running
         if running is None or running.compiled is None or not self.correcting:
             return False
@@ -199,7 +199,9 @@ class CorrectionStream(Stream):
         """Tell whether all commands (n, 2) [rad] are within the joint limits."""
         return self.model is None or within_limits(theta, self.model.table.geometry.limits)
 
-    def on_commands(self, stamps: NDArray[np.int64], theta: Array) -> CorrectedBlock:
+    def on_commands(
+        self, stamps: NDArray[np.int64], theta: Array, theta_dot: Array | None = None
+    ) -> CorrectedBlock:
         """Correct many commands, to the bit as `on_command` would one by one.
 
         Parameters
@@ -208,12 +210,17 @@ class CorrectionStream(Stream):
             Not falling [ns].
         theta : (n, 2) float
             Motor angles, finite and within the joint limits [rad].
-
+        theta_dot : (n, 2) float, optional
+            Their speeds [rad/s].
         """
         running, settings, supervisor = self.running_model(), self.settings, self.supervisor
         compiled = running.compiled
-        if compiled is None:
-            raise InputError("this model is corrected command by command")
+        if compiled is None or not self.in_blocks:
+            speeds = [()] * len(stamps) if theta_dot is None else theta_dot.tolist()
+            each = zip(stamps.tolist(), theta.tolist(), speeds, strict=True)
+            names = settings.motors.motor_1, settings.motors.motor_2
+            ones = (self.on_command(at, "", names, angles, speed) for at, angles, speed in each)
+            return CorrectedBlock.of(ones, len(stamps))
         n, valid = len(stamps), np.zeros(len(stamps), dtype=bool)
         commands = CompiledCommands(stamps, theta, *self.loads.block_at(stamps), np.ones(n))
         block = Correcting(self._corrector, running, compiled, settings, commands)
@@ -235,8 +242,7 @@ class CorrectionStream(Stream):
         corrected = np.ones(n, dtype=bool)
         corrected[list(block.faults)] = False
         there = Configuration.of_row(np.ascontiguousarray(block.found.configuration))
-        twist = np.ascontiguousarray(block.found.twist)
-        covariance = running.model.table_covariance(there, twist)
+        covariance = running.model.table_covariance(there, np.ascontiguousarray(block.found.twist))
         return CorrectedBlock(
             theta + block.found.applied,
             corrected,
@@ -254,8 +260,7 @@ class CorrectionStream(Stream):
             try:
                 next(work)
             except StopIteration as finished:
-                result: CorrectedTrajectory = finished.value
-                return result
+                return cast(CorrectedTrajectory, finished.value)
 
     def trajectory_work(
         self,
@@ -321,9 +326,8 @@ class CorrectionStream(Stream):
 
     def residuals(self, answer: CorrectedCommand | CorrectedBlock) -> list[tuple[Array, Array]]:
         """Return what corrections leave at O, and at the geometry's tool point if that is not O."""
-        if self.model is None:
-            return []
-        return answer.residuals(self.model.table.geometry.platform.tool_point)
+        geometry = None if self.model is None else self.model.table.geometry
+        return [] if geometry is None else answer.residuals(geometry.platform.tool_point)
 
     def _motor_angles(self, names: Sequence[str], positions: Sequence[float]) -> Array:
         theta = self.settings.motors.angles(names, positions, COMMAND)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import bisect
+import operator
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -57,6 +59,16 @@ class HeldSignals:
         stamps[place:], values[place:] = [stamp_ns], [value]
         if len(stamps) > self.CAPACITY:
             del stamps[0], values[0]
+
+    def rises_with(self, name: str, stamps: Sequence[int], first_ns: int) -> bool:
+        """Tell whether further values of these stamps [ns] leave those of a first sample in place.
+
+        They do where none is older than the one before, and none goes that the sample may need.
+        """
+        known = [*self._stamps.get(name, ()), *stamps]
+        rises = all(map(operator.lt, known[:-1], known[1:]))
+        surplus = len(known) - self.CAPACITY
+        return rises and (surplus <= 0 or known[surplus] <= first_ns)
 
     def at(self, stamp_ns: int) -> dict[str, float]:
         """Return the values that belong to a stamp [ns] by name.

@@ -5,8 +5,9 @@ A shell converts a message into numbers, calls one of these methods and converts
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from wrist_stiffness.compensation.load_history import LoadIntake, Zero
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.static_transforms import StaticTransform, sensor_frames
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -140,6 +141,10 @@ class PredictedBlock:
     ----------
     known : (n,) bool
         Which of them could be predicted; the rest of the others is undefined.
+    faults : dict of int to WristError
+        Why one could not, by its place.
+    warnings : Counter of str
+        Effects and signals that were left out.
     twist : (n, 6) float
         At O in F [m, rad].
     covariance : (n, 6, 6) float
@@ -152,6 +157,8 @@ class PredictedBlock:
     twist: Array
     covariance: Array
     configuration: Array
+    faults: dict[int, WristError] = field(default_factory=dict)
+    warnings: Counter[str] = field(default_factory=Counter)
 
 
 class PredictionStream(Stream):
@@ -206,14 +213,18 @@ class PredictionStream(Stream):
 
     @property
     def in_blocks(self) -> bool:
-        """Whether `on_joint_states` can be asked: compiled, and each sample stands for itself."""
+        """Whether `on_joint_states` is one compiled loop: each sample stands for itself."""
         running = self._running
         if running is None or running.compiled is None or self.settings.load_noise is not None:
             return False
         return running.model.certain and not running.model.constants.warnings
 
-    def on_joint_states(self, stamps: NDArray[np.int64], theta: Array) -> PredictedBlock:
+    def on_joint_states(
+        self, stamps: NDArray[np.int64], theta: Array, theta_dot: Array | None = None
+    ) -> PredictedBlock:
         """Predict for many joint states, to the bit as `on_joint_state` would one by one.
+
+        Where not `in_blocks` it is asked one by one.
 
         Parameters
         ----------
@@ -221,19 +232,34 @@ class PredictionStream(Stream):
             Not falling [ns].
         theta : (n, 2) float
             Motor angles [rad].
-
-        Returns
-        -------
-        PredictedBlock
-            `on_joint_state` says why one could not be predicted.
+        theta_dot : (n, 2) float, optional
+            Their speeds [rad/s].
         """
-        running = self.running_model()
-        compiled = running.compiled
+        running, compiled = self.running_model(), None
+        if self.in_blocks:
+            compiled = running.compiled
         if compiled is None:
-            raise InputError("this model is predicted sample by sample")
-        wrench, on_platform, known = self.loads.block_at(stamps)
-        rows = compiled.predict(theta, wrench, on_platform, running.contact, known)
-        known &= rows.status == 0
-        at = Configuration.of_row(rows.configuration)
-        covariance = running.model.table_covariance(at, rows.twist)
-        return PredictedBlock(known, rows.twist, covariance, rows.configuration)
+            n = len(stamps)
+            rows = np.empty((n, 6)), np.empty((n, 6, 6)), np.empty((n, 66))
+            found = PredictedBlock(np.zeros(n, dtype=bool), *rows)
+        else:
+            wrench, on_platform, known = self.loads.block_at(stamps)
+            served = compiled.predict(theta, wrench, on_platform, running.contact, known)
+            known &= served.status == 0
+            at = Configuration.of_row(served.configuration)
+            covariance = running.model.table_covariance(at, served.twist)
+            found = PredictedBlock(known, served.twist, covariance, served.configuration)
+        names = self.settings.motors.motor_1, self.settings.motors.motor_2
+        for place in np.flatnonzero(~found.known).tolist():
+            speeds = () if theta_dot is None else theta_dot[place].tolist()
+            angles = theta[place].tolist()
+            try:
+                one = self.on_joint_state(int(stamps[place]), names, angles, speeds).prediction
+            except WristError as error:
+                found.faults[place] = error
+                continue
+            found.known[place], found.twist[place] = True, one.twist
+            found.covariance[place] = one.covariance
+            found.configuration[place] = one.configuration.row
+            found.warnings.update((*one.warnings, *self.dropped_signals))
+        return found

@@ -194,12 +194,15 @@ def staged(
     """
     near = near if like is None else like.guesses
     states = memory.states if memory else (None,) * len(model.effects)
-    changing = [n for n, effect in enumerate(model.effects) if not effect.law.constant]
+    by_stage: dict[str, list[int]] = {}
+    for n, effect in enumerate(model.effects):
+        if not effect.law.constant:
+            by_stage.setdefault(effect.stage, []).append(n)
     advanced: list[Advanced | None] = [None] * len(model.effects)
     situations, warnings = [start], list(model.constants.warnings)
     for number, stage in enumerate(SAMPLE_STAGES):
         at, added = situations[-1], []
-        for n in (n for n in changing if model.effects[n].stage == stage):
+        for n in by_stage.get(stage, ()):
             found = _advanced(model.effects[n], at, states[n], like, near)
             advanced[n] = found
             added.append(found.added)

@@ -1,8 +1,8 @@
 """Thousands of a recording's messages at once through the streams, where nothing stands against it.
 
 The streams' blocks are the compiled loop that serves a live sample, so the numbers are those of a
-node to the bit.  What a block cannot do (a model with a memory, a clock that jumps, a trajectory, a
-payload of another layout) goes message by message.
+node to the bit; a model with a memory is asked sample by sample.  What a block cannot do (a clock
+that jumps, a trajectory, a payload of another layout) goes message by message.
 """
 
 from __future__ import annotations
@@ -76,6 +76,7 @@ class _Joints:
     batch: Batch
     stamps: Integers
     theta: Array
+    theta_dot: Array | None
 
     @property
     def like(self) -> JointState:
@@ -135,8 +136,6 @@ class BlockReplay:
         block : RawBlock
             The next messages of the recording.
         """
-        if not (self._predicting.in_blocks and self._correcting.in_blocks):
-            return False
         found: dict[str, _Joints] = {}
         for topic, rows in block.topics().items():
             standard = self._sampled.get(topic)
@@ -149,7 +148,8 @@ class BlockReplay:
                 found[standard] = joints
         last_ns = int(block.time_ns[-1])
         first_ns = min((int(joints.stamps[0]) for joints in found.values()), default=0)
-        if found and not self._ahead.rises_until(last_ns, first_ns):
+        alone = self._predicting.in_blocks and self._correcting.in_blocks
+        if found and not self._ahead.rises_until(last_ns, first_ns, not alone):
             return False
         self._ahead.read_for(last_ns)
         out = Messages()
@@ -184,7 +184,10 @@ class BlockReplay:
         theta = np.ascontiguousarray(positions[:, list(places)])
         if standard == MOTOR_COMMANDS and not self._correcting.within_limits(theta):
             return None
-        return _Joints(rows, block.time_ns[rows], batches[0], stamps, theta)
+        theta_dot = None
+        if len(like.velocity) == len(like.name):
+            theta_dot = np.ascontiguousarray(columns["velocity"][:, list(places)])
+        return _Joints(rows, block.time_ns[rows], batches[0], stamps, theta, theta_dot)
 
     def _copy(self, block: RawBlock, out: Messages) -> None:
         for place, channel in enumerate(block.channels):
@@ -198,16 +201,10 @@ class BlockReplay:
     def _predict(self, joints: _Joints, out: Messages) -> None:
         summary = self._summary
         summary.joint_states += len(joints.rows)
-        predicted = self._predicting.on_joint_states(joints.stamps, joints.theta)
-        like, columns = joints.like, joints.batch.columns
-        for place in np.flatnonzero(~predicted.known).tolist():
-            try:
-                # It says why.
-                self._predicting.on_joint_state(
-                    int(joints.stamps[place]), like.name, columns["position"][place].tolist()
-                )
-            except WristError as error:
-                summary.refuse(self._actual(JOINT_STATES), error)
+        predicted = self._predicting.on_joint_states(joints.stamps, joints.theta, joints.theta_dot)
+        for error in predicted.faults.values():
+            summary.refuse(self._actual(JOINT_STATES), error)
+        summary.warnings.update(predicted.warnings)
         known = np.flatnonzero(predicted.known)
         summary.predictions += len(known)
         twist = predicted.twist[known]
@@ -245,7 +242,7 @@ class BlockReplay:
     def _correct(self, joints: _Joints, out: Messages) -> None:
         summary, correcting = self._summary, self._correcting
         summary.commands += len(joints.rows)
-        block = correcting.on_commands(joints.stamps, joints.theta)
+        block = correcting.on_commands(joints.stamps, joints.theta, joints.theta_dot)
         for place in sorted(block.faults):
             summary.refuse(MOTOR_COMMANDS, block.faults[place])
         summary.corrections += int(np.count_nonzero(block.corrected))

@@ -96,7 +96,7 @@ class SignalsAhead:
                 self._runs.popleft()
             self._hear(run, slice(begin, run.next))
 
-    def rises_until(self, log_time_ns: int, first_ns: int) -> bool:
+    def rises_until(self, log_time_ns: int, first_ns: int, slow: bool) -> bool:
         """Tell whether `read_for` can be called once for many samples.
 
         Parameters
@@ -105,11 +105,13 @@ class SignalsAhead:
             Of the last one [ns].
         first_ns : int
             The least of their stamps [ns].
+        slow : bool
+            Whether temperatures and covariates count.
 
         Returns
         -------
         bool
-            Whether all loads that would be heard are newer than the ones before, and drive none out
+            Whether all that would be heard is newer than what was before, and drives nothing out
             that may belong to a sample.
         """
         end_ns = log_time_ns + LOOKAHEAD_NS
@@ -120,9 +122,27 @@ class SignalsAhead:
             if run.stamps is not None
         ]
         together = np.concatenate([np.empty(0, dtype=np.int64), *stamps])
-        return all(
+        return (not slow or self._slow_rise(end_ns, first_ns)) and all(
             stream.loads.history.rises_with(together)
             and stream.loads.history.keeps(together, first_ns)
+            for stream in self._streams
+        )
+
+    def _slow_rise(self, end_ns: int, first_ns: int) -> bool:
+        heard: dict[tuple[str, str], list[int]] = {}
+        for run in self._runs:
+            end = int(np.searchsorted(run.time_ns, end_ns, side="right"))
+            times = run.time_ns[run.next : end].tolist()
+            for at_ns, message in zip(times, run.messages[run.next : end], strict=False):
+                if isinstance(message, Temperature):
+                    of = "temperatures", message.header.frame_id
+                    heard.setdefault(of, []).append(message.header.stamp_ns)
+                elif isinstance(message, Float64):
+                    of = "covariates", self._names[run.topic].removeprefix(COVARIATES)
+                    heard.setdefault(of, []).append(at_ns)
+        return all(
+            getattr(stream, kind).rises_with(name, stamps, first_ns)
+            for (kind, name), stamps in heard.items()
             for stream in self._streams
         )
 
