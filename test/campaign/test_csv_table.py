@@ -200,7 +200,8 @@ def changed(row, column, value):
         (changed(4, "fx_N", "o.5"), r"row 4, column fx_N: 'o\.5' is no number"),
         (changed(4, "fx_N", '"-5,9e-05"'), r"'-5,9e-05' is no number: write -5\.9e-05, with a dec"),
         (changed(3, "motor_2_deg", ""), "row 3, column motor_2_deg: blank"),
-        (changed(7, "x_mm", "nan"), "row 7, column x_mm: 'nan' is not finite"),
+        (changed(7, "fx_N", "nan"), "row 7, column fx_N: blank"),
+        (changed(7, "x_mm", "inf"), "row 7, column x_mm: 'inf' is not finite"),
         (changed(4, "motor_1_deg", "400"), "row 4, column motor_1_deg: 400 is outside -360 to 360"),
         (changed(4, "fx_N", "-1e6"), "row 4, column fx_N: -1e6 is outside -10000 to 10000 N"),
         (changed(4, "mz_Nm", "1e5"), "row 4, column mz_Nm: 1e5 is outside -10000 to 10000 Nm"),
@@ -222,7 +223,6 @@ def changed(row, column, value):
         (changed(1, "x_mm", "p1x_mm"), "column p1y_mm, p1z_mm of the markers is missing"),
         (table_of(), "nothing measured"),
         (table_of(FULL, full_cells).splitlines()[0], "no rows below the column names"),
-        (table_of(FULL, full_cells).replace(",", ";"), "separated by ';'"),
         ("", "no column names in the first line"),
         (table_of(",p999999999x_mm", lambda i: ",1"), "p1x_mm, p1y_mm, p1z_mm of the markers"),
         (table_of(",p" + "9" * 5000 + "x_mm", lambda i: ",1"), "p1x_mm, p1y_mm, p1z_mm of the"),
@@ -231,7 +231,6 @@ def changed(row, column, value):
         (table_of(",x_mm", lambda i: ",1").replace("10,", "1e999999,", 1), "1e999999' is no"),
         (table_of(",x_mm", lambda i: ',"' + "1" * 200_000 + '"'), "row 2: field larger than"),
         (f"{MACHINE},{'x' * 200_000}", "row 1 has more than 131072 characters"),
-        (table_of(FULL, full_cells).replace(",", "\t"), "separated by tabs"),
         (changed(1, "x_mm", "x_m"), "column x_m is neither of the load nor of the pose.*x_mm"),
         (changed(1, "z_mm", "Z_mm"), "column Z_mm is neither of the load nor of the pose"),
         (changed(1, "spindle_1", "fx_kN"), "column fx_kN is neither of the load nor of the pose"),
@@ -296,3 +295,59 @@ def test_an_export_that_cannot_be_written_leaves_nothing(tmp_path, full, table):
         export_csv(tmp_path / "bag", tmp_path / "no folder" / "out.csv", table)
     with pytest.raises(WristError, match="cannot be written"):
         export_csv(tmp_path / "bag", tmp_path, table, overwrite=True)
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("mark", [",", "."])
+def test_a_spreadsheet_s_table_is_the_same_table(tmp_path, full, table, separator, mark):
+    text = table_of(FULL, full_cells).replace(",", separator).replace(".", mark)
+    import_csv(written(tmp_path / "sheet.csv", text), tmp_path / "bag")
+    export_csv(tmp_path / "bag", tmp_path / "out.csv", table)
+    assert (tmp_path / "out.csv").read_bytes() == full.read_bytes()
+
+
+def test_one_table_has_one_decimal_mark(tmp_path):
+    text = table_of(FULL, full_cells).replace(",", ";").replace("12.345", "12,345")
+    with pytest.raises(InputError, match=r"row 3, column motor_1_deg: 12,345 has a decimal ','"):
+        import_csv(written(tmp_path / "mixed.csv", text), tmp_path / "mixed.mcap")
+
+
+@pytest.mark.parametrize(
+    ("date", "ns"),
+    [
+        ("1970-01-01T00:00:01", 1_000_000_000),
+        ("2001-09-09 01:46:40.000000001Z", 1_000_000_000_000_000_001),
+        ("2001-09-09T03:46:40,5+02:00", 1_000_000_000_500_000_000),
+        ("1969-12-31T23:59:59.25", -750_000_000),
+    ],
+)
+def test_a_date_is_a_time(date, ns):
+    assert nanoseconds(date) == ns
+
+
+@pytest.mark.parametrize("date", ["2026-02-30T10:00:00", "02.03.2026 10:15:00", "2026-03-02"])
+def test_a_date_that_is_none_is_refused(date):
+    with pytest.raises(ValueError, match="is no number|day is out of range"):
+        nanoseconds(date)
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "NaN"])
+def test_nan_is_not_measured(tmp_path, cell):
+    text = table_of(",z_mm", lambda i: f",{cell if i == 2 else i}")
+    imported = import_csv(written(tmp_path / "gauge.csv", text), tmp_path / "bag")
+    assert (imported.rows, imported.measured) == (6, 5)
+
+
+@pytest.mark.parametrize("lost", [3, 20])
+def test_a_cut_last_line_is_left_out_and_told(tmp_path, lost):
+    text = table_of(",z_mm", lambda i: ",0.001")
+    cut = import_csv(written(tmp_path / "cut.csv", text[: -lost - 4]), tmp_path / "cut.mcap")
+    assert (cut.rows, cut.cut_row) == (5, 7)
+    whole = import_csv(written(tmp_path / "whole.csv", text.rstrip()), tmp_path / "whole.mcap")
+    assert (whole.rows, whole.cut_row) == (6, 0)
+
+
+def test_a_short_line_that_is_ended_is_refused(tmp_path):
+    text = table_of(",z_mm", lambda i: ",0.001")[:-12] + "\n"
+    with pytest.raises(InputError, match="row 7: .* cells for 10 columns"):
+        import_csv(written(tmp_path / "short.csv", text), tmp_path / "short.mcap")

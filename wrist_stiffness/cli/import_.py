@@ -11,7 +11,8 @@ Make a recording of a table, as a campaign with a CMM, a tracker or dial gauges 
 command that reads recordings reads it then. One row is one measured pose; the first line names the
 columns, each with its unit, in any order:
 
-  time_s                               rising; from its own zero, or since 1970
+  time_s                               rising; from its own zero, since 1970, or a date
+                                       such as 2026-03-02T10:15:00.25 (UTC, or with +01:00)
   motor_1_deg motor_2_deg              motor angles
   fx_N fy_N fz_N mx_Nm my_Nm mz_Nm     load on the platform at O, in wrist_base
   x_mm y_mm z_mm                       measured: the platform's point O in wrist_base
@@ -20,9 +21,9 @@ columns, each with its unit, in any order:
   T_COMPONENT_degC                     temperature of link_1, frame, ambient ...
   NAME_UNIT                            anything else that may matter: humidity_percent ...
 
-A blank cell is not measured: points only, pointing only or one dial gauge (only z_mm) will do. A
-row without any measured value still tells the way between two poses, which friction and backlash
-remember: list the poses that the wrist turned back at."""
+A blank cell, or nan, is not measured: points only, pointing only or one dial gauge (only z_mm)
+will do. A row without any measured value still tells the way between two poses, which friction and
+backlash remember: list the poses that the wrist turned back at."""
 
 EPILOG = """\
 examples:
@@ -39,7 +40,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("table", metavar="FILE.csv", help="commas between columns, UTF-8")
+    parser.add_argument(
+        "table", metavar="FILE.csv", help="UTF-8; commas, semicolons or tabs between columns"
+    )
     parser.add_argument(
         "-o", "--output", required=True, metavar="RECORDING", help="folder or .mcap file"
     )
@@ -72,6 +75,8 @@ def _run(arguments: argparse.Namespace) -> int:
     ):
         if names:
             print(f"  {what} {', '.join(names)}")
+    if imported.cut_row:
+        print(f"  row {imported.cut_row}, the last one, is cut and left out")
     if arguments.json:
         write_json(
             arguments.json,
@@ -81,6 +86,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 "measured": imported.measured,
                 "temperatures": imported.temperatures,
                 "covariates": imported.covariates,
+                "cut_row": imported.cut_row,
             },
         )
     return EXIT_DONE

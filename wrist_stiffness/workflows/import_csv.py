@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import TextIOWrapper
@@ -65,6 +66,10 @@ LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 """ROS 2 counts the seconds of a stamp in 32 bits."""
 
 ROWS_A_REPORT = 1000
+SEPARATORS = ";\t"
+"""Where they and not commas separate the columns, a comma may be the decimal mark."""
+
+DECIMAL = re.compile(r"[+-]?\d*([.,])\d*(?:[eE][+-]?\d+)?")
 LONGEST_LINE = csv.field_size_limit()
 """Of column names: what Python's reader takes for one cell."""
 
@@ -81,6 +86,8 @@ class Imported:
         Rows of the table; those in which something was measured.
     temperatures, covariates : tuple of str
         Components and names that were found.
+    cut_row : int
+        The last row, left out because the file ends in it; 0 if the file is whole.
     """
 
     path: Path
@@ -88,6 +95,7 @@ class Imported:
     measured: int
     temperatures: tuple[str, ...]
     covariates: tuple[str, ...]
+    cut_row: int
 
 
 def import_csv(
@@ -126,14 +134,14 @@ def import_csv(
         If the recording exists or cannot be written; then nothing is written.
     """
     table = Path(table)
-    total, header = _survey(table)
+    form = _survey(table)
     try:
-        columns = _columns(header, unloaded)
+        columns = _columns(form.header, unloaded)
     except InputError as error:
         raise InputError(f"{table}: {error}") from error
     rows = measured = zero_ns = 0
     with RecordingWriter(output, overwrite=overwrite) as writer:
-        for row in _rows(table, header, columns):
+        for row in _rows(table, form, columns):
             if rows == 0:
                 zero_ns = _zero(row.time_ns)
                 facts: dict[str, str | int] = {"table": table.name, "time_zero_ns": zero_ns}
@@ -147,15 +155,30 @@ def import_csv(
             rows += 1
             measured += row.is_measured(columns)
             if rows % ROWS_A_REPORT == 0:
-                progress(rows, total)
+                progress(rows, form.total)
         if rows == 0:
             raise InputError(f"{table}: no rows below the column names")
         if measured == 0:
             raise InputError(f"{table}: nothing is measured in any of its {rows} rows")
     progress(rows, rows)
     return Imported(
-        Path(output), rows, measured, tuple(columns.temperatures), tuple(columns.covariates)
+        Path(output),
+        rows,
+        measured,
+        tuple(columns.temperatures),
+        tuple(columns.covariates),
+        form.cut_row,
     )
+
+
+@dataclass(frozen=True)
+class _Form:
+    """Column names, what separates them, whole lines below the first, and the row that is cut."""
+
+    header: list[str]
+    separator: str
+    total: int
+    cut_row: int
 
 
 @dataclass(frozen=True)
@@ -176,29 +199,29 @@ class _Row:
         return bool(np.isfinite(self.of(columns.pose)).any())
 
 
-def _survey(table: Path) -> tuple[int, list[str]]:
-    """Return the number of lines below the first, and the column names."""
+def _survey(table: Path) -> _Form:
+    """Return how the table is written."""
     try:
         with _opened(table) as stream:
-            first = stream.readline(LONGEST_LINE + 1)
+            first = last = stream.readline(LONGEST_LINE + 1)
             if len(first) > LONGEST_LINE:
                 raise InputError(f"{table}: row 1 has more than {LONGEST_LINE} characters")
-            total = sum(1 for _ in stream)
+            total = 0
+            for line in stream:
+                total, last = total + 1, line
     except OSError as error:
         raise InputError(f"{table}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{table}: is no text in UTF-8") from error
+    separator = next((mark for mark in SEPARATORS if mark in first), ",")
     try:
-        header = [name.strip() for name in next(csv.reader([first]), [])]
+        header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
     except csv.Error as error:
         raise InputError(f"{table}: row 1: {error}") from error
-    for mark, name in ((";", "';'"), ("\t", "tabs")):
-        if len(header) < 2 and mark in first:
-            raise InputError(
-                f"{table}: columns are separated by {name}: save it with commas, and points in "
-                "numbers"
-            )
-    return total, header
+    cut = total > 0 and last.strip() and not last.endswith(("\n", "\r"))
+    if cut and last.count(separator) < len(header) - 1:
+        return _Form(header, separator, total - 1, total + 1)
+    return _Form(header, separator, total, 0)
 
 
 def _opened(table: Path) -> TextIOWrapper:
@@ -217,22 +240,27 @@ def _columns(header: list[str], unloaded: bool) -> Columns:
     return columns
 
 
-def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
+def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
     """Read the rows one by one and check them."""
+    header, mark = form.header, ""
     readers = {name: reader_of(name) for name in header if name != TIME}
     required = {*MOTORS, *(LOAD if columns.loads else ())}
     before: tuple[int, str] | None = None
     zero_ns = 0
     with _opened(table) as stream:
-        lines = csv.reader(stream)
+        lines = csv.reader(stream, delimiter=form.separator)
         next(lines)
         while (cells := _next(lines, table)) is not None:
             place = f"{table}: row {lines.line_num}"
+            if form.cut_row and lines.line_num >= form.cut_row:
+                return
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) != len(header):
                 raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns")
-            text = dict(zip(header, cells, strict=True))
+            text = dict(zip(header, map(_blank_if_nan, cells), strict=True))
+            if form.separator != ",":
+                mark = _with_points(place, text, mark)
             try:
                 time_ns = nanoseconds(text[TIME])
             except ValueError as error:
@@ -261,6 +289,30 @@ def _rows(table: Path, header: list[str], columns: Columns) -> Iterator[_Row]:
                 except ValueError as error:
                     raise InputError(f"{place}, column {name}: {error}") from error
             yield _checked(place, _Row(time_ns, values))
+
+
+def _blank_if_nan(cell: str) -> str:
+    return "" if cell.strip().lower() == "nan" else cell
+
+
+def _with_points(place: str, text: dict[str, str], mark: str) -> str:
+    """Write decimal commas of a row as points, and return the table's decimal mark.
+
+    Raises
+    ------
+    InputError
+        If the table has both: one of them then stands between thousands.
+    """
+    for name, cell in text.items():
+        if found := DECIMAL.fullmatch(cell.strip()):
+            if mark and found[1] != mark:
+                raise InputError(
+                    f"{place}, column {name}: {cell.strip()} has a decimal {found[1]!r}, numbers "
+                    f"before it {mark!r}: write all of them with one"
+                )
+            mark = found[1]
+            text[name] = cell.replace(",", ".")
+    return mark
 
 
 def _next(lines: Any, table: Path) -> list[str] | None:

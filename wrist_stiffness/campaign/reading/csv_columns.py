@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from decimal import Context, Decimal, InvalidOperation, Overflow
 from math import inf
 
@@ -33,6 +34,12 @@ LARGEST_EXPONENT = 300
 """Of ten, in a number that still is one in SI."""
 
 NANOSECONDS = Decimal(1_000_000_000)
+DATE = re.compile(
+    r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?(Z|[+-]\d\d:\d\d)?", re.ASCII
+)
+"""ISO 8601 with a date and seconds; Python's own reader drops digits behind the microsecond."""
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 TURN_DEG = 360.0
 LARGEST_LOAD = 10_000.0
@@ -222,7 +229,13 @@ def writer_of(column: str) -> Callable[[float], str]:
 
 
 def nanoseconds(text: str) -> int:
-    """Return the stamp of a time in seconds [ns]; ValueError where it has none exactly."""
+    """Return the stamp [ns] of a time in seconds or of a date; ValueError where it has none.
+
+    A date without an offset is taken as UTC.
+    """
+    if date := DATE.fullmatch(text.strip()):
+        since = datetime.fromisoformat(date[1] + (date[3] or "Z")) - EPOCH
+        return since // timedelta(seconds=1) * 1_000_000_000 + int((date[2] or "").ljust(9, "0"))
     try:
         exact = EXACT.multiply(Decimal(text.strip()), NANOSECONDS)
     except (InvalidOperation, Overflow) as error:
