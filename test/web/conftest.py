@@ -36,7 +36,7 @@ def address(tmp_path_factory):
         env={k: v for k, v in os.environ.items() if not k.startswith(("NICEGUI", "PYTEST"))},
     )
     url = f"http://127.0.0.1:{port}/"
-    for _ in range(300):
+    for _ in range(1200):
         try:
             urllib.request.urlopen(url, timeout=1.0).close()
             break

@@ -6,7 +6,7 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
-LONG_MS = 40_000
+LONG_MS = 240_000
 IDLE = "getComputedStyle(document.querySelector('#busy')).display === 'none'"
 
 
