@@ -125,13 +125,12 @@ def probabilities(search: Search) -> dict[Names, float]:
     """Return the probability of each set, of single effects that were not fitted to first order.
 
     A candidate of which the data say nothing keeps its prior probability, whatever is recorded: it
-    does not count.
+    does not count.  What slopes only promise is never more probable than the best fit.
     """
     logs = {names: state.log for names, state in search.states.items()}
-    for name, each in search.first_order.items():
-        if each.gain > 0.0:
-            first = search.base.log + each.gain - search.price
-            logs.setdefault(frozenset((name,)), first)
+    for name, promise in search.promised.items():
+        if promise > search.base.evidence.log:
+            logs.setdefault(frozenset((name,)), min(promise - search.price, search.best.log))
     values = np.array(list(logs.values()))
     weights = np.exp(values - values.max())
     return dict(zip(logs, (weights / weights.sum()).tolist(), strict=True))
@@ -240,8 +239,8 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
             gain = state.evidence.log - nominal
             fitted[name] = max(gain, fitted.get(name, gain))
     found = []
-    for name, first in search.first_order.items():
-        gain = fitted.get(name, first.gain)
+    for name in {**fitted, **search.promised}:
+        gain = fitted[name] if name in fitted else search.promised[name] - nominal
         probability = chance.get(name, 0.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
         found.append(Standing(name, probability, gain, name in fitted, why))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -173,8 +173,9 @@ class Search:
         self._falls, self._costly = falls, falls < np.inf
         self._end = time.monotonic() + seconds
         self.states: dict[Names, State] = {}
-        self.first_order: dict[str, Ranked] = {}
+        self.promised: dict[str, float] = {}
         self.in_time = True
+        self._grown_from: dict[Names, State] = {}
         self._fits = 0
         self._catalogue = 0
         tell("fitting the nominal model with its tolerances")
@@ -186,7 +187,7 @@ class Search:
         for _ in range(self._most):
             for name in sorted(best.names):
                 less = self._less(best, name)
-                if less.names:
+                if self._grown_from.get(less.names) is not less:
                     self._grown(less, best.names)
             better = self.best
             if better.log <= best.log:
@@ -222,15 +223,16 @@ class Search:
     def _grown(self, state: State, not_again: Collection[str] = ()) -> list[State]:
         """Return the sets with one effect more that were worth a fit."""
         self._tell(f"asking every candidate{_beside(state.names)}")
+        self._grown_from[state.names] = state
         trials = [each for each in self._problem.trials(state.fit) if each.name not in not_again]
         self._catalogue = max(self._catalogue, len(trials) + len(state.names))
         as_noise = ranked(state.evidence.without_discrepancy(), trials)
         beyond = ranked(state.evidence, trials)
         if not state.names:
-            for each in (*as_noise, *beyond):
-                known = self.first_order.get(each.trial.name)
-                if known is None or known.gain < each.gain:
-                    self.first_order[each.trial.name] = each
+            self.promised = {}
+            for each in (*beyond, *as_noise):
+                known = self.promised.get(each.trial.name, -np.inf)
+                self.promised[each.trial.name] = max(known, state.evidence.log + each.gain)
         chosen = self._worth_a_fit(state, as_noise, beyond)
         found: list[State] = []
         settled, kept = False, 0.0
@@ -245,19 +247,15 @@ class Search:
             self._tell(f"fitting {each.trial.name}{_beside(state.names)}")
             fit = self._problem.added(state.fit, each)
             if fit is None:
-                self._impossible(each)
+                if not state.names:
+                    # What slopes promised, no fit allows.
+                    self.promised[each.trial.name] = state.evidence.log
                 continue
             found.append(self._known(fit, state))
             # Slopes may promise more than a fit keeps.
             kept = max(kept, min(each.gain, found[-1].evidence.log - state.evidence.log))
             settled = settled or not found[-1].rough
         return found
-
-    def _impossible(self, ranked: Ranked) -> None:
-        """Take back what slopes promised of a candidate that no fit allows."""
-        first = self.first_order.get(ranked.trial.name)
-        if first is not None:
-            self.first_order[ranked.trial.name] = replace(first, gain=0.0)
 
     def _worth_a_fit(
         self, state: State, as_noise: Sequence[Ranked], beyond: Sequence[Ranked]
