@@ -26,6 +26,7 @@ PART = Payload(0.2, (0.01, -0.02, 0.03))
 NOTHING = np.zeros(6)
 TRUST = SupervisorSettings().trust
 MOTION = 1e-3  # rad, some encoder steps: such a motion may bring a contact
+BROUGHT = 5e-5  # rad, of a correction by which the wall of a test is touched
 AGREED = 1e-5  # N m, of thresholds of 2e-3: what the first guess of the centre leaves
 
 
@@ -289,6 +290,32 @@ def test_after_loads_were_lost_the_payload_must_be_seen_again(cell):
     assert cell.feel(3.0, PART).payload.centre_m == pytest.approx(PART.centre_m)
 
 
+def test_a_contact_beyond_the_table_that_the_correction_brings_does_not_come_and_go(table):
+    stream = CorrectionStream(
+        ErrorModel("as the wrist", table, "closed_form"), StreamSettings(), enabled=True
+    )
+    cell, limits = Cell(table), table.geometry.limits
+    weight, applied = cell.weight(PART), []
+    for i in range(600):
+        stamp = SECOND + i * SECOND // 100
+        pressed = i >= 300 and np.abs(stream.applied).max() > BROUGHT
+        wall = side(1.1 * limits.force) if pressed else NOTHING
+        load = weight + wall
+        stream.loads.add(stamp, "wrist_base", load[:3], load[3:])
+        stream.on_command(stamp, "", NAMES, HERE.tolist())
+        applied.append(np.abs(stream.applied).max())
+    assert applied[299] > BROUGHT
+    assert np.max(applied[-250:]) < BROUGHT
+    assert not stream.supervision.valid
+    cell.theta = THERE
+    load = cell.weight(PART)
+    for _ in range(300):
+        stamp += SECOND // 100
+        stream.loads.add(stamp, "wrist_base", load[:3], load[3:])
+        stream.on_command(stamp, "", NAMES, THERE.tolist())
+    assert stream.supervision.valid, "it comes back at another place"
+
+
 def test_a_light_contact_does_not_come_and_go(cell):
     cell.feel(2.0, NOTHING)
     for _ in range(5):
@@ -361,15 +388,13 @@ def test_a_payload_is_learned_by_time_not_by_the_number_of_readings(table, hertz
 
 
 @settings(max_examples=50, deadline=None)
-@given(doubt=st.floats(1.0, 10.0), other=st.floats(0.0, 1.0))
-def test_the_trust_leaves_least_of_the_error_in_the_worst_case(doubt, other):
-    softer = np.geomspace(1.0 / doubt, doubt, 1001)
-
-    def worst(share):
-        return np.max(np.abs(1.0 - share * softer))
-
+@given(doubt=st.floats(1.0, 10.0), stop=st.floats(-2.0, 2.0), place=st.floats(0.0, 1.0))
+def test_beside_any_stop_the_trusted_part_leaves_no_more_than_no_correction(doubt, stop, place):
+    softer = doubt ** (2.0 * place - 1.0)
     trust = SupervisorSettings(model_doubt=doubt).trust
-    assert worst(trust) <= min(worst(other), 1.0) + 1e-12
+    # An error of 1 before correction, and a rigid stop that bears what is beyond it.
+    without, left = min(1.0, stop), min(1.0 - trust * softer, stop)
+    assert abs(left) <= abs(without) + 1e-12
     assert SupervisorSettings(model_doubt=doubt, follow=True).trust == 1.0
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.supervisor import Supervisor
+from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import Load
@@ -29,7 +30,11 @@ def judged_load(
     if settings.supervisor.follow:
         supervisor.follow(stamp_ns, measured)
         return measured
-    reading = supervisor.scales(table.geometry).read(table, theta, measured)
+    try:
+        reading = supervisor.scales(table.geometry).read(table, theta, measured)
+    except LoadRangeError:
+        supervisor.overloaded(stamp_ns, theta.tolist())
+        raise
     judged = supervisor.judge(
         stamp_ns, theta.tolist(), reading, settings.supervisor, settings.correction_limit
     )

@@ -225,7 +225,7 @@ CORRECTION = (
         "model_doubt",
         2.0,
         "the wrist may be so many times stiffer or softer than the model; with load_policy judge "
-        "2/(x + 1/x) of the correction is applied, which leaves least in the worst case [-]",
+        "1/x of the correction is applied, which never goes past the aim [-]",
         lower=1.0,
         upper=10.0,
     ),

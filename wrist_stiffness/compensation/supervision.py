@@ -39,15 +39,15 @@ class SupervisorSettings:
 
     @property
     def trust(self) -> float:
-        """Part of the predicted correction that leaves least of the error in the worst case [-].
+        """Part of the predicted correction that never goes past the aim [-].
 
         Of an error e a model that is r times too soft predicts r e, and a part c of that leaves
-        |1 - c r| e.  Over all r from 1/q to q the largest is least where both ends leave the same,
-        at c = 2 / (q + 1/q): (q^2 - 1) / (q^2 + 1) of the error, and never as much as without
-        correction.  The whole correction, c = 1, of a model twice too soft turns the error round:
-        as large as before, but away from the obstacle that would have borne a part of it.
+        (1 - c r) e.  With c = 1/q that stays between 0 and e for all r from 1/q to q: the platform
+        comes nearer to its aim and never gets past it.  Past the aim it could leave an obstacle
+        that bears a part of the error without correction, and would be farther off than that; no
+        sensor would see it, for nothing touches any more.
         """
-        return 1.0 if self.follow else 2.0 / (self.model_doubt + 1.0 / self.model_doubt)
+        return 1.0 if self.follow else 1.0 / self.model_doubt
 
 
 @dataclass(frozen=True)

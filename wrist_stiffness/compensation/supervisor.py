@@ -79,11 +79,26 @@ class Supervisor(Belief):
 
     def lost(self) -> None:
         """Hear that no load is known: the payload must be seen again."""
-        if self._payload is not None and self._scales is not None:
-            self._expected = self._scales.payload(self._payload)
+        self._expect()
         if self._state is not State.UNSURE:
             self._enter(State.UNSURE)
         self._text = NO_LOAD
+
+    def overloaded(self, stamp_ns: int, theta: list[float]) -> None:
+        """Hear of a load beyond the table at a command (2,) [rad]: a contact that all yields to."""
+        self._begin(stamp_ns)
+        self._expect()
+        if self._state is not State.IN_CONTACT:
+            self._enter(State.IN_CONTACT)
+        self._payload, self._weight = None, 1.0
+        self._seen, self._seen_s = State.IN_CONTACT, 0.0
+        share = self._share
+        share.value, share.sure, share.place, share.against = 0.0, False, theta, None
+
+    def _expect(self) -> None:
+        """Let the payload count again once the load agrees."""
+        if self._payload is not None and self._scales is not None:
+            self._expected = self._scales.payload(self._payload)
 
     @property
     def supervision(self) -> Supervision:
