@@ -30,7 +30,7 @@ def node_of_this_process(name):
     children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
     for child in children.read_text().split():
         command = Path(f"/proc/{child}/cmdline").read_bytes()
-        if f"wrist_stiffness.ros.{name}\0".encode() in command:
+        if f"__node:={name}\0".encode() in command:
             return int(child)
     raise AssertionError(f"no process of {name}")
 
