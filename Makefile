@@ -1,7 +1,7 @@
 # Every target sets up what it needs. Another Python: make test PYTHON=python3.12 VENV=.venv312
 PYTHON ?= python3
 VENV ?= .venv
-EXTRAS = ros,fem,plot,progress,web,fleet,bench,verify,test,dev
+EXTRAS = ros,fem,plot,progress,web,fleet,bench,docs,verify,test,dev
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 READY = $(VENV)/.ready-$(VERSION)
 OTHER = $(filter-out $(READY),$(wildcard $(VENV)/.ready-*))
@@ -13,12 +13,13 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 ROS_DOMAIN_ID ?= $(shell echo $$(( $$$$ % 90 + 1 )))
 export ROS_DOMAIN_ID
 
-.PHONY: help demo test lint bench tables clean
+.PHONY: help demo test lint docs bench tables clean
 
 help:
 	@echo "make demo    start the nodes with a virtual cell, record, replay, compare; see demo/"
 	@echo "make test    run all tests"
 	@echo "make lint    ruff and mypy"
+	@echo "make docs    the documents as a site; open site/index.html"
 	@echo "make bench   measure speed, some twenty minutes; see bench-results/speed.md"
 	@echo "make tables  compute the shipped tables again from their geometry"
 	@echo "make clean   remove what make made, the virtual environment included"
@@ -36,6 +37,9 @@ lint: $(READY)
 	$(RUN) ruff format --check .
 	$(RUN) mypy
 
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(RUN) mkdocs build --quiet
+
 bench: $(READY)
 	$(VENV)/bin/python bench/page.py $(BENCH_ARGS)
 
@@ -44,7 +48,7 @@ tables: $(READY)
 	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015_25_poses.npz --grid 5 --kernel sandwell
 
 clean:
-	rm -rf $(VENV) demo build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) demo site build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find wrist_stiffness test -name __pycache__ -prune -exec rm -rf {} +
 
 $(READY): setup.py constraints.txt $(wildcard wrist_stiffness/*/native/*)

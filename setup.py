@@ -85,6 +85,7 @@ setup(
         "web": ["nicegui>=3.0"],
         "fleet": ["distributed>=2024.5", "cloudpickle>=3"],
         "bench": ["scikit-learn>=1.3"],
+        "docs": ["mkdocs-material>=9.6", "mkdocstrings[python]>=0.29"],
         "verify": ["acrod>=1.2", "rosbags>=0.10", "mcap-ros2-support>=0.5"],
         # colcon finds pytest through this extra and would run no test without it.
         "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6.100", "playwright>=1.49"],
