@@ -38,7 +38,8 @@ def allowed(table, setting, theta):
     wrench = setting.load.wrench(workspace.mechanism.forward(way).platform)
     limits = table.geometry.limits
     force, moment = (np.linalg.norm(wrench[:, i : i + 3], axis=1).max() for i in (0, 3))
-    return force <= limits.force and moment <= limits.moment
+    # A gripper may press to the very end of the range: turning its couple rounds.
+    return force <= limits.force * (1.0 + 1e-12) and moment <= limits.moment * (1.0 + 1e-12)
 
 
 def test_a_setting_moves_straight_outward_and_no_further_than_it_may(table, pairs):

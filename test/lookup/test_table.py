@@ -137,6 +137,14 @@ def test_wrist_without_flanges_has_a_linear_response(shipped, poses):
     assert np.allclose(response.twist, np.einsum("nij,nj->ni", operators.compliance, wrench))
 
 
+def test_a_load_at_the_very_limit_may_turn_with_the_platform(shipped, poses):
+    most = np.array([0.0, 0.0, -5.0, 0.0, 0.0, -0.1]).reshape(2, 3, 1)
+    for platform in shipped.mechanism.platform_rotation(poses):
+        shipped.check_load((platform @ most).ravel())
+    with pytest.raises(LoadRangeError, match="5.00001 N at O, the table ends at 5 N"):
+        shipped.check_load(np.array([0.0, 0.0, -5.00001, 0.0, 0.0, 0.0]))
+
+
 def test_load_range(shipped):
     shipped.check_load(np.array([0.0, 0.0, -5.0, 0.0, 0.0, 0.0]))
     with pytest.raises(LoadRangeError, match="5.1 N at O, the table ends at 5 N"):

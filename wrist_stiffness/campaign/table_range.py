@@ -27,8 +27,8 @@ def beyond_range(table: Table, block: Block) -> list[str]:
     limits, of = table.geometry.limits, len(block)
     out = []
     for name, columns, limit, unit in (
-        ("force", slice(0, 3), limits.force, "N"),
-        ("moment", slice(3, 6), limits.moment, "N m"),
+        ("force", slice(0, 3), limits.most_load[0], "N"),
+        ("moment", slice(3, 6), limits.most_load[1], "N m"),
     ):
         size = np.linalg.norm(block.load[:, columns], axis=1)
         if beyond := int(np.sum(size > limit)):

@@ -157,11 +157,12 @@ class Table:
         limits = self.geometry.limits
         components = wrench.tolist()
         force, moment = hypot(*components[:3]), hypot(*components[3:])
-        if not force <= limits.force:
+        most_force, most_moment = limits.most_load
+        if not force <= most_force:
             raise LoadRangeError(
-                f"load: force {force:.3g} N at O, the table ends at {limits.force:g} N"
+                f"load: force {force:.6g} N at O, the table ends at {limits.force:g} N"
             )
-        if not moment <= limits.moment:
+        if not moment <= most_moment:
             raise LoadRangeError(
-                f"load: moment {moment:.3g} N m at O, the table ends at {limits.moment:g} N m"
+                f"load: moment {moment:.6g} N m at O, the table ends at {limits.moment:g} N m"
             )

@@ -47,7 +47,7 @@ def mechanism_constants(
             [mechanism.b0 @ mechanism.c0, mechanism.c0 @ mechanism.d0],
             [mechanism.assembly_mode, GRAM_ROUNDING],
             np.transpose(rectangle).ravel(),
-            [limits.singularity, limits.force, limits.moment],
+            [limits.singularity, *limits.most_load],
         ]
     )
 

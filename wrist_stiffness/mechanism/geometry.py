@@ -12,6 +12,9 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ENDS, Array
 
+ROUNDING = 1e-9
+"""Share by which a number may pass a limit that it stands at."""
+
 
 @dataclass(frozen=True)
 class Material:
@@ -168,6 +171,14 @@ class Limits:
         lowest = (self.joint_lower - self.encoder_step).tolist()
         highest = (self.joint_upper + self.encoder_step).tolist()
         return tuple(zip(lowest, highest, strict=True))
+
+    @cached_property
+    def most_load(self) -> tuple[float, float]:
+        """Largest force and moment at O that are taken [N, N m]: the limits, but for rounding.
+
+        A load at the very limit rounds beyond it when it is turned with the platform.
+        """
+        return self.force * (1.0 + ROUNDING), self.moment * (1.0 + ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)

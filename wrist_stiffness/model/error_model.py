@@ -337,7 +337,8 @@ class ErrorModel:
             finite &= np.isfinite(block.theta_dot).all(axis=1)
         finite[finite] = self.table.workspace.domain(block.theta[finite])
         force, moment = lengths(block.load[:, :3]), lengths(block.load[:, 3:])
-        return finite & (force <= limits.force) & (moment <= limits.moment)
+        most_force, most_moment = limits.most_load
+        return finite & (force <= most_force) & (moment <= most_moment)
 
     def table_covariance(self, configuration: Configuration, twist: Array) -> Array:
         """Variance of the table's stated error and of an encoder count spread over its step.

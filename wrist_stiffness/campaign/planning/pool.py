@@ -220,8 +220,8 @@ def _draw_load(
 
 def within(wrench: Array, limits: Limits) -> bool:
     """Tell whether wrenches (..., 6) at O lie in the table's load range."""
-    force, moment = (np.linalg.norm(wrench[..., i : i + 3], axis=-1) for i in (0, 3))
-    return bool(np.all(force <= limits.force) and np.all(moment <= limits.moment))
+    sizes = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2)
+    return bool(np.all(sizes <= limits.most_load))
 
 
 def fixed_visits(settings: Sequence[Setting], pace: Pace, workspace: Workspace) -> list[Visit]:
