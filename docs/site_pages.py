@@ -6,7 +6,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
-SHOWN = ("*.md", "docs/*.md", "docs/pictures/*", "bench/*.md", "config/*.yaml", "LICENSE")
+SHOWN = ("*.md", "docs/*.md", "docs/pictures/*", "bench/**/*.md", "config/*.yaml", "LICENSE")
 
 
 def on_files(files: Files, config: Any) -> Files:
