@@ -26,19 +26,19 @@ import numpy as np
 from closed_loop_drive import Corrected, Motion, cell_of
 from closed_loop_page import write_page
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.refitted import BUILT, SET_UP
-from wrist_stiffness.campaign.searching.calibrate import calibrate, said_calibrated
-from wrist_stiffness.campaign.searching.candidates import compensable
-from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.campaign.searching.extend import extend
-from wrist_stiffness.campaign.searching.free_effects import commissioning
+from wrist_stiffness.identification.calibration import calibrate, said_calibrated
+from wrist_stiffness.identification.candidates import compensable
+from wrist_stiffness.identification.extension import extend
+from wrist_stiffness.identification.free_effects import commissioning
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.refitted import BUILT, SET_UP
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect
 from wrist_stiffness.simulation.cell import SENSED, CellSettings

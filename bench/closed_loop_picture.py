@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
-from wrist_stiffness.workflows.pictures.palette import FLOOR, colour
+from wrist_stiffness.report.pictures.figure import new_figure, save_figure
+from wrist_stiffness.report.pictures.palette import FLOOR, colour
 
 Rows = Mapping[tuple[str, ...], Mapping[str, Any]]
 

@@ -15,11 +15,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument

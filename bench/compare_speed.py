@@ -20,16 +20,16 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.comparing.sentences import sentences
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.commands.simulate import simulate_recording
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows.simulate import simulate_recording
 
 RATE_HZ = 1000.0
 

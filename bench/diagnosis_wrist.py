@@ -15,11 +15,11 @@ import time
 # The matrices are small: on a busy machine further threads wait for each other, and waiting counts.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
+from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
 
 

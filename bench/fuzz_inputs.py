@@ -27,8 +27,8 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
-from wrist_stiffness.campaign.planning.loads_file import read_loads
-from wrist_stiffness.campaign.planning.rivals import read_rivals
+from wrist_stiffness.commands.import_csv import import_csv
+from wrist_stiffness.commands.parameter_file import node_settings
 from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.inputs.document import yaml_node
@@ -36,13 +36,13 @@ from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.geometry_file import load_geometry
 from wrist_stiffness.model.formula import Formula
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.loads_file import read_loads
+from wrist_stiffness.planning.rivals import read_rivals
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
 from wrist_stiffness.recording.fixed_layout import FixedReader
 from wrist_stiffness.recording.messages import MESSAGE_TYPES
-from wrist_stiffness.workflows.import_csv import import_csv
-from wrist_stiffness.workflows.parameter_file import node_settings
 
 PROJECT = Path(__file__).parents[1]
 SLOW_S, LARGE_BYTES = 2.0, 500 << 20

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wrist_stiffness.campaign.searching.free_effects import commissioning
+from wrist_stiffness.identification.free_effects import commissioning
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

@@ -21,6 +21,8 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from wrist_stiffness.commands.parameter_file import node_settings
+from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
@@ -35,8 +37,6 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.parameter_file import node_settings
-from wrist_stiffness.workflows.replay import replay
 
 MODEL = shipped_file("config/palmieri2015_model.yaml")
 MOTORS = ("motor_1_joint", "motor_2_joint")

@@ -26,10 +26,10 @@ from geometry_msgs.msg import WrenchStamped
 from ros_round_trip import DOWN, NAMES
 from sensor_msgs.msg import JointState
 
+from wrist_stiffness.commands.node_list import WRIST_NODES
 from wrist_stiffness.ros.conversions import joint_message, wrench_message
 from wrist_stiffness.ros.qos import RELIABLE_QOS
 from wrist_stiffness.ros.run import END_S
-from wrist_stiffness.workflows.node_list import WRIST_NODES
 
 LATEST_S = 6.0
 """Nodes are told to end at random moments up to this time after they were started [s]."""

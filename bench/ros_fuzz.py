@@ -46,7 +46,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from wrist_stiffness.workflows.node_list import WRIST_NODES, NodeEntry
+from wrist_stiffness.commands.node_list import WRIST_NODES, NodeEntry
 
 DEADLINE_S = 30.0
 NAMES = ("motor_1_joint", "motor_2_joint")

@@ -19,15 +19,15 @@ from pathlib import Path
 # Workers inherit it: two processes with two threads each wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from wrist_stiffness.commands.compare import compare
+from wrist_stiffness.commands.fleet import map_recordings
+from wrist_stiffness.commands.provenance import Run
+from wrist_stiffness.commands.read_sessions import Recordings
+from wrist_stiffness.commands.simulate import simulate_recording
+from wrist_stiffness.commands.tolerances import study_tolerances
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows.compare import compare
-from wrist_stiffness.workflows.fleet import map_recordings
-from wrist_stiffness.workflows.provenance import Run
-from wrist_stiffness.workflows.read_sessions import Recordings
-from wrist_stiffness.workflows.simulate import simulate_recording
-from wrist_stiffness.workflows.tolerances import study_tolerances
 
 MODEL = Path(shipped_file("config/palmieri2015_model.yaml"))
 DOWN = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)

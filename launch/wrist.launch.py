@@ -4,7 +4,7 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch_ros.actions import Node
 
-from wrist_stiffness.workflows.node_list import (
+from wrist_stiffness.commands.node_list import (
     CELL_PARAMETERS,
     LAUNCH_ARGUMENTS,
     SIMULATOR_NODE,

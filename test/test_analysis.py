@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.analysis import Analysis, Cancelled
-from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell

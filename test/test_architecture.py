@@ -8,7 +8,9 @@ PACKAGE = "wrist_stiffness"
 SOURCE = Path(__file__).parents[1] / PACKAGE
 
 ONLINE = {"mechanism", "lookup", "model"}
-CORE = ONLINE | {"fem", "campaign", "compensation", "inference", "recording", "simulation"}
+MEASURED = ONLINE | {"sessions", "inference"}
+STATISTICS = MEASURED | {"identification", "comparing", "planning"}
+CORE = STATISTICS | {"fem", "compensation", "recording", "simulation"}
 ROOMS_USED = {
     "mechanism": set(),
     "lookup": {"mechanism"},
@@ -16,14 +18,18 @@ ROOMS_USED = {
     "model": {"mechanism", "lookup"},
     "compensation": ONLINE,
     "inference": set(),
-    "campaign": ONLINE | {"compensation", "inference", "recording"},
+    "sessions": ONLINE | {"compensation", "inference", "recording"},
+    "identification": MEASURED,
+    "comparing": MEASURED | {"identification", "compensation"},
+    "planning": MEASURED | {"compensation"},
     "recording": set(),
     "simulation": {"mechanism", "lookup", "recording"},
     "analysis": CORE,
-    "workflows": CORE | {"analysis", "shipped"},
-    "web": CORE | {"analysis", "workflows", "shipped"},
-    "cli": CORE | {"workflows", "shipped", "web"},
-    "ros": CORE | {"workflows", "shipped"},
+    "report": CORE | {"commands"},
+    "commands": CORE | {"analysis", "report", "shipped"},
+    "web": CORE | {"analysis", "commands", "report", "shipped"},
+    "cli": CORE | {"commands", "report", "shipped", "web"},
+    "ros": CORE | {"commands", "shipped"},
     "errors": set(),
     "progress": set(),
     "atomic_file": set(),
@@ -40,7 +46,7 @@ LIBRARIES_USED = {
     "fem": ROBOT | {"netgen", "skfem", "pymetis"},
     "cli": ROBOT | {"tqdm"},  # the extra `progress`
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
-    "workflows": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
+    "commands": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
     "web": ROBOT | {"nicegui"},  # the extra `web`; Plotly's JavaScript comes with it
 }
 DRAWING = "matplotlib"
@@ -70,53 +76,13 @@ def violations(module, text):
             if second in ROOMS_USED and second not in ROOMS_USED[room] | COMMON | {room}:
                 found.append(f"{module}: {room} uses {second}")
         elif first == DRAWING:
-            if not (room == "workflows" and inside) and Path(module).stem != "plotting":
-                found.append(f"{module}: imports {first} outside a function of workflows")
+            if not (room == "report" and inside) and Path(module).stem != "plotting":
+                found.append(f"{module}: imports {first} outside a function of report")
         elif first not in LIBRARIES_USED.get(room, ROBOT) | sys.stdlib_module_names and not (
             room == "ros" and first.endswith(("_msgs", "_srvs", "_interfaces"))
         ):
             found.append(f"{module}: {room} uses {first}")
     return found
-
-
-ROOMS_OF_CAMPAIGN = {
-    "reading": set(),
-    "comparing": {"searching"},
-    "searching": set(),
-    "planning": set(),
-}
-
-
-def crossings(module, text):
-    """Return what a module of campaign (path below it) imports against the rules of its rooms."""
-    room = Path(module).parts[0]
-    allowed = ROOMS_OF_CAMPAIGN.get(room, set()) | {room}
-    prefix = f"{PACKAGE}.campaign."
-    used = [name for name, _ in imports(ast.parse(text)) if name.startswith(prefix)]
-    into = [(name, name.removeprefix(prefix).split(".")[0]) for name in used]
-    return [
-        f"campaign/{module} imports {name}"
-        for name, other in into
-        if other in ROOMS_OF_CAMPAIGN and other not in allowed
-    ]
-
-
-def test_the_rooms_of_campaign_keep_to_their_directions():
-    campaign = SOURCE / "campaign"
-    rooms = {path.parent.name for path in campaign.glob("*/__init__.py")}
-    assert rooms == set(ROOMS_OF_CAMPAIGN)
-    found = []
-    for path in campaign.rglob("*.py"):
-        found += crossings(path.relative_to(campaign), path.read_text())
-    assert found == []
-
-
-def test_a_wrong_way_between_the_rooms_of_campaign_is_found():
-    line = "from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions"
-    assert crossings("reading/session.py", line)
-    assert crossings("units.py", line)
-    assert not crossings("searching/screening.py", line)
-    assert not crossings("comparing/compare.py", "from wrist_stiffness.campaign.units import cut")
 
 
 def test_every_module_keeps_to_the_import_directions():
@@ -140,7 +106,7 @@ def test_every_module_keeps_to_the_import_directions():
         ("lookup/arm.py", "import skfem"),
         ("recording/arm.py", "from wrist_stiffness.mechanism import geometry"),
         ("cli/arm.py", "import rclpy"),
-        ("workflows/arm.py", "import matplotlib.pyplot as plt"),
+        ("report/arm.py", "import matplotlib.pyplot as plt"),
         ("cli/arm.py", "def f():\n    import matplotlib"),
     ],
 )
@@ -154,7 +120,7 @@ def test_planted_violation_is_found(module, line):
         ("lookup/arm.py", "from wrist_stiffness.errors import TableError\nimport json, numpy"),
         ("fem/arm.py", "from netgen.occ import Cylinder\nfrom wrist_stiffness import __version__"),
         ("ros/arm.py", "import rclpy\nfrom std_srvs.srv import Trigger"),
-        ("workflows/arm.py", "def f():\n    if 1:\n        import matplotlib.pyplot as plt"),
+        ("report/arm.py", "def f():\n    if 1:\n        import matplotlib.pyplot as plt"),
     ],
 )
 def test_permitted_import_is_not_reported(module, line):

@@ -14,9 +14,9 @@ import pytest
 
 import wrist_stiffness
 from wrist_stiffness import shipped
+from wrist_stiffness.commands.node_list import SIMULATOR_NODE, WRIST_NODES, NodeEntry
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.node_list import SIMULATOR_NODE, WRIST_NODES, NodeEntry
 
 ROOT = Path(__file__).parents[1]
 PROBE = "config/probe.yaml"
@@ -182,7 +182,7 @@ def test_launch_file_starts_the_node_list():
     (imported,) = (
         node
         for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.module == "wrist_stiffness.workflows.node_list"
+        if isinstance(node, ast.ImportFrom) and node.module == "wrist_stiffness.commands.node_list"
     )
     names = {alias.name for alias in imported.names}
     used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}

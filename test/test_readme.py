@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.planning.loads_file import read_loads
+from wrist_stiffness.commands.node_list import LAUNCH_ARGUMENTS
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.node_list import LAUNCH_ARGUMENTS
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = ("README.md", "docs/commands.md", "docs/find-the-missing-effect.md")

@@ -20,22 +20,16 @@ from threading import Event
 
 import numpy as np
 
-from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.comparing.comparison import Comparison
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.planning.earlier import as_experiment
-from wrist_stiffness.campaign.planning.plan import Conditions, Plan, plan
-from wrist_stiffness.campaign.planning.question import between
-from wrist_stiffness.campaign.refitted import SET_UP, names_of
-from wrist_stiffness.campaign.searching.calibrate import calibrate
-from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis, diagnose_sessions
-from wrist_stiffness.campaign.searching.extend import extend
-from wrist_stiffness.campaign.searching.free_effects import unfitted
-from wrist_stiffness.campaign.searching.held_out import Judge
-from wrist_stiffness.campaign.searching.result import Fit
-from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.comparison import Comparison
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.identification.extension import extend
+from wrist_stiffness.identification.free_effects import unfitted
+from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.result import Fit
+from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
+from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.mechanism.components import Array
@@ -43,7 +37,13 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.planning.earlier import as_experiment
+from wrist_stiffness.planning.plan import Conditions, Plan, plan
+from wrist_stiffness.planning.question import between
 from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.refitted import SET_UP, names_of
+from wrist_stiffness.sessions.unit_session import as_units
 
 
 class Cancelled(WristError):

@@ -25,11 +25,11 @@ TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.residual
 
 PACKAGE = Path(wrist_stiffness.__file__).parent
 
-READING = "wrist_stiffness.campaign.reading.session"
+READING = "wrist_stiffness.sessions.reading.session"
 """Module that reads a session."""
 
 OWN = (
-    "wrist_stiffness.campaign.searching.diagnose",
+    "wrist_stiffness.identification.wrist_diagnosis",
     READING,
     # The registry finds the laws by their files, no import names them.
     *(f"wrist_stiffness.model.effects.{p.stem}" for p in (PACKAGE / "model/effects").glob("*.py")),

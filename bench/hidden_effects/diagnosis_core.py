@@ -17,9 +17,9 @@ from solvers import Answer, explained, nothing
 from whitened import whitened
 
 from wrist_stiffness.inference.candidates import Candidate, Parameter
-from wrist_stiffness.inference.diagnose import diagnose
 from wrist_stiffness.inference.nuisance import Nuisance
 from wrist_stiffness.inference.observations import Observations, Quantity
+from wrist_stiffness.inference.table_diagnosis import diagnose
 
 CONDITIONS = (
     *("theta_1", "theta_2", "speed_1", "speed_2", "sense_1", "sense_2"),

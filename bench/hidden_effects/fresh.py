@@ -36,8 +36,8 @@ from observe import observe as observe_day
 from own_diagnosis import diagnosed_sessions
 from score import Judge
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS
 
 LIST = Path(__file__).with_name("fresh_cases.json")

@@ -27,8 +27,8 @@ from observe import hidden_effects, observe
 from own_diagnosis import version_of_own
 from tables import newcombe
 
-from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.model.error_model import ErrorModel
 
 MINUTES = (2, 10)

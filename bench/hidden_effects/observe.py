@@ -12,14 +12,14 @@ from cases import WRISTS, Case
 from registered import Registration, difference, register
 from units import last_sense, lost_samples, unit_labels, unit_means
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.reading.machine_signals import MachineSignals
-from wrist_stiffness.campaign.reading.pose_track import PoseTrack
-from wrist_stiffness.campaign.reading.session import session_of
-from wrist_stiffness.campaign.reading.signals import Signal
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
+from wrist_stiffness.sessions.reading.pose_track import PoseTrack
+from wrist_stiffness.sessions.reading.session import session_of
+from wrist_stiffness.sessions.reading.signals import Signal
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument

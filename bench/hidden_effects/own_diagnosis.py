@@ -14,15 +14,15 @@ from dictionary import Dictionary
 from observe import Day, Riddle, noise_seed, settings_of
 from solvers import Answer
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.searching.base_fit import BaseFit, fit_base
-from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.commands.simulate import simulate_recording
+from wrist_stiffness.identification.base_fit import BaseFit, fit_base
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.workflows.simulate import simulate_recording
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.unit_session import as_units
 
 
 def version_of_own() -> str:

@@ -18,7 +18,7 @@ from score import wilson
 from tables import Line, by_solver, of_one_solver, paired
 
 from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
+from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 SHOWN = {CEILING: "D", OWN: "o", "elastic_net": "^", "stepwise_bic": "v"}
 SHOWN_SIZES = (TINY, *SIZES)

@@ -102,16 +102,16 @@ def version_of(solver: str) -> str:
         "own_diagnosis": OWN,
         "own_diagnosis_mcap": (
             *OWN,
-            "wrist_stiffness.workflows.simulate",
+            "wrist_stiffness.commands.simulate",
         ),
         "told_the_name": (
             *OWN,
-            "wrist_stiffness.campaign.searching.calibrate",
-            "wrist_stiffness.campaign.searching.extend",
+            "wrist_stiffness.identification.calibration",
+            "wrist_stiffness.identification.extension",
         ),
     }.get(solver, ())
     # The project's calibration of what is read is in the floor of every score.
-    modules = (*modules, "wrist_stiffness.campaign.searching.base_fit", READING)
+    modules = (*modules, "wrist_stiffness.identification.base_fit", READING)
     return code_version((*TRUTH, *modules), (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 

@@ -16,11 +16,11 @@ from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, Entry, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.size import Scale
-from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
 
 SECONDS, RATE_HZ = 40.0, 50.0
 SIZE = 3.0

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from score import wilson
 
-from wrist_stiffness.workflows.pictures.figure import new_figure, save_figure
+from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 Line = dict[str, Any]
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from observe import Riddle
 from own_diagnosis import predicted
 from solvers import Answer, nothing
 
-from wrist_stiffness.campaign.searching.extend import extend
+from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law

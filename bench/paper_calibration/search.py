@@ -25,6 +25,7 @@ import yaml
 from beam_link import link_flexibility
 from bushing_catalogue import Condensed, load
 from candidate import CHOICES, NAMES, SCHEMES, Candidate, decode, mirrored
+from paper_figures import PUBLISHED, Figures, PaperExperiment
 from scipy.optimize import differential_evolution
 
 from wrist_stiffness.errors import WristError
@@ -33,7 +34,6 @@ from wrist_stiffness.fem.parts import wrist_parts
 from wrist_stiffness.fem.superelement import Superelement
 from wrist_stiffness.mechanism.components import LINKS, Array
 from wrist_stiffness.mechanism.geometry_file import geometry_from_values
-from wrist_stiffness.workflows.paper_figures import PUBLISHED, Figures, PaperExperiment
 
 TOLERANCE = np.array(
     [

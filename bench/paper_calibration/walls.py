@@ -14,6 +14,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+from paper_page import insert_blocks
 from scipy.optimize import brentq
 
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
@@ -25,7 +26,6 @@ from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, Array, Elastic
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
-from wrist_stiffness.workflows.paper_page import insert_blocks
 
 COARSER = 1.5
 """Element sizes over the shipped ones; s then lacks some 0.7 %."""

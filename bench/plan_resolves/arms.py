@@ -9,9 +9,10 @@ import numpy as np
 from twins import Case, Catalogue
 from wrist import LOADS, MODEL, NOISE, PACE, TABLE, WORKSPACE, left_by, once_each, performance
 
-from wrist_stiffness.campaign.planning import plan as planning
-from wrist_stiffness.campaign.planning import pool
-from wrist_stiffness.campaign.planning.information import (
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.planning import plan as planning
+from wrist_stiffness.planning import pool
+from wrist_stiffness.planning.information import (
     CHARGE,
     RESOLVED,
     Goal,
@@ -21,13 +22,12 @@ from wrist_stiffness.campaign.planning.information import (
     discrimination,
     information,
 )
-from wrist_stiffness.campaign.planning.plan import Conditions, plan
-from wrist_stiffness.campaign.planning.pool import draw_settings
-from wrist_stiffness.campaign.planning.question import SESSION, TARE, WRIST, between, effect_named
-from wrist_stiffness.campaign.planning.refit import Measured, fitted
-from wrist_stiffness.campaign.planning.signatures import signatures
-from wrist_stiffness.campaign.planning.timeline import Visit
-from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.planning.plan import Conditions, plan
+from wrist_stiffness.planning.pool import draw_settings
+from wrist_stiffness.planning.question import SESSION, TARE, WRIST, between, effect_named
+from wrist_stiffness.planning.refit import Measured, fitted
+from wrist_stiffness.planning.signatures import signatures
+from wrist_stiffness.planning.timeline import Visit
 
 EXTRA = 100
 """Extra poses at most: as many settings as a pool has."""

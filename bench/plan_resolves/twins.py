@@ -8,7 +8,10 @@ from functools import cached_property
 import numpy as np
 from wrist import MODEL, NOISE, TABLE, left_by, paper_design
 
-from wrist_stiffness.campaign.planning.information import (
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.planning.information import (
     CHARGE,
     FREE,
     Goal,
@@ -18,12 +21,9 @@ from wrist_stiffness.campaign.planning.information import (
     discrimination,
     information,
 )
-from wrist_stiffness.campaign.planning.question import SESSION, WRIST, drawn, effect_named
-from wrist_stiffness.campaign.planning.signatures import Signature, signatures
-from wrist_stiffness.campaign.planning.timeline import Timeline
-from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.planning.question import SESSION, WRIST, drawn, effect_named
+from wrist_stiffness.planning.signatures import Signature, signatures
+from wrist_stiffness.planning.timeline import Timeline
 from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, places
 
 HIDDEN = (

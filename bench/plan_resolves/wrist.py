@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from wrist_stiffness.campaign.planning.information import MeasurementNoise
-from wrist_stiffness.campaign.planning.loads_file import Actuator, AppliedLoad, Weight
-from wrist_stiffness.campaign.planning.timeline import Pace, Timeline, Visit, run_through
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.information import MeasurementNoise
+from wrist_stiffness.planning.loads_file import Actuator, AppliedLoad, Weight
+from wrist_stiffness.planning.timeline import Pace, Timeline, Visit, run_through
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import QUANTITIES
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.block import Block
@@ -29,6 +27,8 @@ from wrist_stiffness.recording.messages import (
     Wrench,
     WrenchStamped,
 )
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import SENSED, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument

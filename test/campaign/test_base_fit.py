@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.searching.base_fit import fit_base, free_base
-from wrist_stiffness.campaign.searching.problem import SILENT
-from wrist_stiffness.campaign.searching.taken_up import taken_up
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.identification.base_fit import fit_base, free_base
+from wrist_stiffness.identification.problem import SILENT
+from wrist_stiffness.identification.taken_up import taken_up
 from wrist_stiffness.model.effect import Effect, Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.base import AXIS_SHIFT, AXIS_TILT, LOAD_SCALE, STIFFNESS
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.searching.calibrate import calibrate
+from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.base import base_laws

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.clocks import clock_offset
-from wrist_stiffness.campaign.reading.signals import Signal
+from wrist_stiffness.sessions.reading.clocks import clock_offset
+from wrist_stiffness.sessions.reading.signals import Signal
 
 NANOSECONDS = 1_000_000_000
 NOISE = np.radians(0.02)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.observing import observe
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
 
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.comparing import set_up as fitted_anew
-from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.comparing.set_up import refit_set_up, refitted_values
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import observe
+from wrist_stiffness.comparing import set_up as fitted_anew
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.set_up import refit_set_up, refitted_values
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import observe
 
 POSES = 60
 NOISE = np.repeat([0.3e-6, 3e-6], 3)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.comparing.comparison import ComparedModel, Comparison
-from wrist_stiffness.campaign.comparing.explained import explain
-from wrist_stiffness.campaign.comparing.sentences import sentences
-from wrist_stiffness.campaign.comparing.set_up import without_set_up
-from wrist_stiffness.campaign.comparing.worst_poses import worst_poses
-from wrist_stiffness.campaign.searching.calibrate import calibrate
-from wrist_stiffness.campaign.searching.likelihood import KNOWN, SURE_OF_NOISE
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.comparing.explained import explain
+from wrist_stiffness.comparing.sentences import sentences
+from wrist_stiffness.comparing.set_up import without_set_up
+from wrist_stiffness.comparing.worst_poses import worst_poses
+from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.identification.likelihood import KNOWN, SURE_OF_NOISE
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 

@@ -6,7 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.csv_columns import (
+from wrist_stiffness.commands.export_csv import export_csv
+from wrist_stiffness.commands.import_csv import import_csv
+from wrist_stiffness.compensation.intake import Frames, SensorFrame
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import InputError, RecordingError, WristError
+from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.sessions.reading.csv_columns import (
     column_of,
     covariate_of,
     nanoseconds,
@@ -14,15 +21,8 @@ from wrist_stiffness.campaign.reading.csv_columns import (
     seconds,
     writer_of,
 )
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.compensation.intake import Frames, SensorFrame
-from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.errors import InputError, RecordingError, WristError
-from wrist_stiffness.lookup.table_file import load_table
-from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.export_csv import export_csv
-from wrist_stiffness.workflows.import_csv import import_csv
 
 MACHINE = "time_s,motor_1_deg,motor_2_deg,fx_N,fy_N,fz_N,mx_Nm,my_Nm,mz_Nm"
 COUNTS = [(0.0, 0.0), (12.345, -7.5), (-20.015, 11.25), (3.3, 3.3), (0.1, 0.2), (9.99, -14.4)]

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.searching.extend import extend
+from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.refitted import AXES, GAPS
-from wrist_stiffness.campaign.searching.base_fit import fit_cleaned
-from wrist_stiffness.campaign.searching.calibrate import fitted, told_model
-from wrist_stiffness.campaign.searching.free_effects import FreeEffect, commissioning, free_all
-from wrist_stiffness.campaign.searching.problem import FitProblem
-from wrist_stiffness.campaign.searching.result import told_parameters
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.identification.base_fit import fit_cleaned
+from wrist_stiffness.identification.calibration import fitted, told_model
+from wrist_stiffness.identification.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.identification.result import told_parameters
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.refitted import AXES, GAPS
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise

@@ -2,8 +2,8 @@
 
 import pytest
 
-from wrist_stiffness.campaign.reading.folder import recordings_in
 from wrist_stiffness.errors import RecordingError
+from wrist_stiffness.sessions.reading.folder import recordings_in
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.reading.held_angles import without_held
-from wrist_stiffness.campaign.reading.signals import Signal
+from wrist_stiffness.sessions.reading.held_angles import without_held
+from wrist_stiffness.sessions.reading.signals import Signal
 
 COUNT = np.radians(0.015)
 TIME_NS = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(2000)

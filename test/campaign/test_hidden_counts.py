@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.hidden_counts import hidden_counts, stands_of
-from wrist_stiffness.campaign.units import cut
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.sessions.hidden_counts import hidden_counts, stands_of
+from wrist_stiffness.sessions.units import cut
 
 DRAWS = 4000
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign import in_pieces as pieces
+from wrist_stiffness.sessions import in_pieces as pieces
 
 
 @pytest.mark.parametrize("rows", [0, 1, 6, 7, 8, 20])

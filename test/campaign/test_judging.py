@@ -6,17 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import QUANTITIES
-from wrist_stiffness.campaign.searching.base_fit import fit_cleaned
-from wrist_stiffness.campaign.searching.free_effects import FreeEffect
-from wrist_stiffness.campaign.searching.held_out import ANOTHER_SESSION, THIS_SESSION, Judge
-from wrist_stiffness.campaign.searching.problem import FitProblem
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.identification.base_fit import fit_cleaned
+from wrist_stiffness.identification.free_effects import FreeEffect
+from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION, Judge
+from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import QUANTITIES
+from wrist_stiffness.sessions.unit_session import as_units
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 POSES = 60

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.lost_beams import lost_beams
-from wrist_stiffness.campaign.reading.machine_signals import MachineSignals
-from wrist_stiffness.campaign.reading.pose_track import PoseTrack
-from wrist_stiffness.campaign.reading.session import read_session, session_of
-from wrist_stiffness.campaign.reading.signals import Signal
-from wrist_stiffness.campaign.rigid_rotation import rigid_rotation
+from wrist_stiffness.commands.simulate import simulate_recording
+from wrist_stiffness.sessions.reading.lost_beams import lost_beams
+from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
+from wrist_stiffness.sessions.reading.pose_track import PoseTrack
+from wrist_stiffness.sessions.reading.session import read_session, session_of
+from wrist_stiffness.sessions.reading.signals import Signal
+from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.workflows.simulate import simulate_recording
 
 
 def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, table):

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.searching.free_effects import free_all
-from wrist_stiffness.campaign.searching.result import Fit
-from wrist_stiffness.campaign.searching.wrist_problem import WristProblem
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.identification.free_effects import free_all
+from wrist_stiffness.identification.result import Fit
+from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.columns import tangents
@@ -17,6 +15,8 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.unit_session import as_units
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 POSES = 60

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.hidden_counts import counts_known
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.observing import observe
-from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.shared import own_covariance
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.columns import SessionModel
+from wrist_stiffness.sessions.hidden_counts import counts_known
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.unit_session import as_units
 
 POSES_DEG = ((0, 0), (20, 10), (-15, 25), (20, 10))
 ADDED = np.array([3e-6, -2e-6, 5e-6, 2e-4, -1e-4, 3e-4])

@@ -6,11 +6,11 @@ from inspect import getsource
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.searching.base_fit import fit_base
-from wrist_stiffness.campaign.searching.candidates import Point, searched, wrist_candidates
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.identification.base_fit import fit_base
+from wrist_stiffness.identification.candidates import Point, searched, wrist_candidates
 from wrist_stiffness.model import registry
 from wrist_stiffness.model.effects import joint_friction
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.cell import CellSettings
 
 LAW = "joint_friction"

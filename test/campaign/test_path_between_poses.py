@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from wrist_stiffness.campaign.observing import observe
-from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.commands.export_csv import export_csv
+from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.export_csv import export_csv
-from wrist_stiffness.workflows.import_csv import import_csv
 
 
 def test_each_pose_measured_at_rest_is_a_unit_and_knows_its_approach(tmp_path, campaign, table):

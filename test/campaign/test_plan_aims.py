@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.planning.aims import Aims
-from wrist_stiffness.campaign.planning.information import Goal, Information, Layout
-from wrist_stiffness.campaign.planning.truths import Truths
+from wrist_stiffness.planning.aims import Aims
+from wrist_stiffness.planning.information import Goal, Information, Layout
+from wrist_stiffness.planning.truths import Truths
 
 SEEN = Goal("a", "")
 NOTHING = np.zeros((2, 2))

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.planning.earlier import as_experiment
-from wrist_stiffness.campaign.planning.information import (
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.earlier import as_experiment
+from wrist_stiffness.planning.information import (
     CHARGE,
     FREE,
     MOTION_NOISE,
@@ -22,20 +24,18 @@ from wrist_stiffness.campaign.planning.information import (
     information,
     whitened,
 )
-from wrist_stiffness.campaign.planning.loads_file import NO_LOAD, AppliedLoad
-from wrist_stiffness.campaign.planning.question import (
+from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad
+from wrist_stiffness.planning.question import (
     SESSION,
     between,
     commissioning,
     effect_named,
 )
-from wrist_stiffness.campaign.planning.rivals import LEAST_WHITE, Rivals
-from wrist_stiffness.campaign.planning.signatures import plausible, signatures
-from wrist_stiffness.campaign.planning.timeline import LOAD_RAMP_S, Pace, Visit, run_through
-from wrist_stiffness.campaign.planning.truths import after_data, as_asked
-from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.rivals import LEAST_WHITE, Rivals
+from wrist_stiffness.planning.signatures import plausible, signatures
+from wrist_stiffness.planning.timeline import LOAD_RAMP_S, Pace, Visit, run_through
+from wrist_stiffness.planning.truths import after_data, as_asked
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 
 LOAD = AppliedLoad(

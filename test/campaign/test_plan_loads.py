@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.planning.loads_file import read_loads
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.planning.loads_file import read_loads
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 TURNS = Rotation.random(20, random_state=1).as_matrix()

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.planning.loads_file import Actuator, Weight
-from wrist_stiffness.campaign.planning.pool import TILT_SHARE, draw_settings, moved_outward
-from wrist_stiffness.campaign.planning.timeline import APPROACH, straight
+from wrist_stiffness.planning.loads_file import Actuator, Weight
+from wrist_stiffness.planning.pool import TILT_SHARE, draw_settings, moved_outward
+from wrist_stiffness.planning.timeline import APPROACH, straight
 
 HANDLE = np.array([0.0, 0.0, -0.018])
 

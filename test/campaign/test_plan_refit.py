@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.planning import pool
-from wrist_stiffness.campaign.planning.information import (
+from wrist_stiffness.planning import pool
+from wrist_stiffness.planning.information import (
     RESOLVED,
     Goal,
     MeasurementNoise,
@@ -15,12 +15,12 @@ from wrist_stiffness.campaign.planning.information import (
     discrimination,
     information,
 )
-from wrist_stiffness.campaign.planning.loads_file import AppliedLoad, Weight
-from wrist_stiffness.campaign.planning.plan import Conditions, plan
-from wrist_stiffness.campaign.planning.question import SESSION, between, effect_named
-from wrist_stiffness.campaign.planning.refit import Measured, fitted, rivals_alike
-from wrist_stiffness.campaign.planning.signatures import signatures
-from wrist_stiffness.campaign.planning.timeline import Pace, Visit, run_through
+from wrist_stiffness.planning.loads_file import AppliedLoad, Weight
+from wrist_stiffness.planning.plan import Conditions, plan
+from wrist_stiffness.planning.question import SESSION, between, effect_named
+from wrist_stiffness.planning.refit import Measured, fitted, rivals_alike
+from wrist_stiffness.planning.signatures import signatures
+from wrist_stiffness.planning.timeline import Pace, Visit, run_through
 
 PACE = Pace(np.radians(30.0), 2.0, False)
 HEAVY = {"mass_g": 150.0, "x_mm": -12.0, "y_mm": 6.0, "z_mm": -25.0}
@@ -119,7 +119,7 @@ def test_a_plan_ends_where_half_of_what_may_be_is_settled(model, noise, earlier,
         told.append(by_truth(*given))
         return told[-1]
 
-    monkeypatch.setattr("wrist_stiffness.campaign.planning.aims.by_truth", spy)
+    monkeypatch.setattr("wrist_stiffness.planning.aims.by_truth", spy)
     weight = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
     conditions = Conditions((weight,), PACE, noise, None, 0)
     question = asked("gravity@platform", HEAVY, "gravity@link_3")
@@ -137,7 +137,7 @@ def test_what_was_asked_is_open_however_settled_it_is_reckoned(model, noise, ear
     """
     monkeypatch.setattr(pool, "POOL", 10)
     monkeypatch.setattr(
-        "wrist_stiffness.campaign.planning.aims.carried_over",
+        "wrist_stiffness.planning.aims.carried_over",
         lambda *given: 4.0 * carried_over(*given),
     )
     weight = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)
@@ -153,9 +153,9 @@ def test_earlier_data_put_nothing_in_reach(model, noise, earlier, monkeypatch):
     """Else a plan would ask for the longest time what its loads never tell."""
     monkeypatch.setattr(pool, "POOL", 10)
     # As if the pool told nothing, however long, and the earlier data all.
-    monkeypatch.setattr("wrist_stiffness.campaign.planning.aims.LONGER", 0.0)
+    monkeypatch.setattr("wrist_stiffness.planning.aims.LONGER", 0.0)
     monkeypatch.setattr(
-        "wrist_stiffness.campaign.planning.aims.carried_over",
+        "wrist_stiffness.planning.aims.carried_over",
         lambda *given: 4.0 * carried_over(*given),
     )
     question = asked("gravity@platform", HEAVY, "gravity@link_3")

@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.machine_signals import _speeds, machine_signals
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.reading.signals import Signal, in_order
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.load_history import LoadHistory
 from wrist_stiffness.errors import FrameError, StaleLoadError
@@ -20,6 +17,9 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovarianceStamped,
 )
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
+from wrist_stiffness.sessions.reading.machine_signals import _speeds, machine_signals
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.reading.signals import Signal, in_order
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.refusals import LEAST_POSES
-from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.recording.messages import PoseStamped
+from wrist_stiffness.sessions.reading.refusals import LEAST_POSES
+from wrist_stiffness.sessions.reading.session import read_session
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.reading.machine_signals import MachineSignals
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.reading.signals import Signal
 from wrist_stiffness.recording.messages import Header, JointState
+from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.reading.signals import Signal
 
 MILLISECOND = 1_000_000
 MOTORS = ("motor_1_joint", "motor_2_joint")

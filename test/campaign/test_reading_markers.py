@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.marker_poses import poses_from_markers
-from wrist_stiffness.campaign.reading.session import read_session
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.readout import fit_markers
+from wrist_stiffness.sessions.reading.marker_poses import poses_from_markers
+from wrist_stiffness.sessions.reading.session import read_session
 
 NAN = float("nan")
 

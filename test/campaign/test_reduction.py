@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign import units as units_module
-from wrist_stiffness.campaign.columns import SessionModel
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.unit_session import as_units
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions import units as units_module
+from wrist_stiffness.sessions.columns import SessionModel
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.commands.export_csv import export_csv
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.errors import FrameError
 from wrist_stiffness.recording.messages import (
@@ -15,7 +15,7 @@ from wrist_stiffness.recording.messages import (
     TransformStamped,
     Vector3,
 )
-from wrist_stiffness.workflows.export_csv import export_csv
+from wrist_stiffness.sessions.reading.session import read_session
 
 TURN = Rotation.from_euler("xyz", [40.0, -25.0, 70.0], degrees=True)
 ORIGIN = np.array([1.2, -0.4, 0.3])

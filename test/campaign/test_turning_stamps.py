@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from wrist_stiffness.campaign.reading.path import turning_stamps
-from wrist_stiffness.campaign.reading.signals import Signal
+from wrist_stiffness.sessions.reading.path import turning_stamps
+from wrist_stiffness.sessions.reading.signals import Signal
 
 SECOND = 1_000_000_000
 TIME_NS = np.arange(0, 4 * SECOND, SECOND // 100)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.hidden_counts import _stands
-from wrist_stiffness.campaign.units import MOST_MOVING, PATH_S, UNIT_S, cut
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.sessions.hidden_counts import _stands
+from wrist_stiffness.sessions.units import MOST_MOVING, PATH_S, UNIT_S, cut
 
 STEP = np.radians(0.015)
 

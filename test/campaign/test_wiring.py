@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.campaign.comparing.compare import compare_models
-from wrist_stiffness.campaign.comparing.wiring import _share
-from wrist_stiffness.campaign.measured_session import MeasuredSession
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.wiring import _share
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 POSES = 60
 NOISE = np.repeat([0.7e-6, np.radians(1e-3)], 3)

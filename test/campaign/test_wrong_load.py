@@ -6,17 +6,17 @@ from types import SimpleNamespace
 
 import pytest
 
-from wrist_stiffness.campaign.comparing import wrong_load as module
-from wrist_stiffness.campaign.comparing.wiring import LOAD_MISTAKES, MISTAKES, Suspicion
-from wrist_stiffness.campaign.comparing.wrong_load import doubts_load, wrong_load
-from wrist_stiffness.campaign.searching.base_fit import fit_base
-from wrist_stiffness.campaign.searching.calibrate import calibrate
-from wrist_stiffness.campaign.searching.taken_up import TakenUp, taken_up
-from wrist_stiffness.campaign.unit_session import as_units
+from wrist_stiffness.commands import diagnose
+from wrist_stiffness.commands.diagnose import mistake_beside
+from wrist_stiffness.comparing import wrong_load as module
+from wrist_stiffness.comparing.wiring import LOAD_MISTAKES, MISTAKES, Suspicion
+from wrist_stiffness.comparing.wrong_load import doubts_load, wrong_load
+from wrist_stiffness.identification.base_fit import fit_base
+from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.identification.taken_up import TakenUp, taken_up
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows import diagnose
-from wrist_stiffness.workflows.diagnose import mistake_beside
 
 FLOOR = {"s_um": 1.0, "phi_mdeg": 5.0}
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from wrist_stiffness.commands.compare import compare
+from wrist_stiffness.commands.provenance import Run
+from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.workflows.compare import compare
-from wrist_stiffness.workflows.pictures.dependence import draw_against
-from wrist_stiffness.workflows.pictures.errors import Bars, draw_bars
-from wrist_stiffness.workflows.provenance import Run
-from wrist_stiffness.workflows.read_sessions import Recordings
-from wrist_stiffness.workflows.report.parts import against, unit_of
+from wrist_stiffness.report.parts import against, unit_of
+from wrist_stiffness.report.pictures.dependence import draw_against
+from wrist_stiffness.report.pictures.errors import Bars, draw_bars
 
 RECORDINGS = Path(__file__).parent / "tutorial"
 PICTURES = Path(__file__).parents[2] / "docs/pictures"

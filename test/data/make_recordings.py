@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from wrist_stiffness.commands.simulate import hide, simulate_recording
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows.simulate import hide, simulate_recording
 
 SECONDS, RATE_HZ = 120.0, 20.0
 

@@ -18,6 +18,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from wrist_stiffness.commands.parameter_file import node_settings
+from wrist_stiffness.commands.replay import OUTPUTS, replay
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
@@ -33,8 +35,6 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.recording.reader import open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.parameter_file import node_settings
-from wrist_stiffness.workflows.replay import OUTPUTS, replay
 
 FOLDER = Path(__file__).parent / "replay"
 RECORDING, PARAMETERS = FOLDER / "recording.mcap", FOLDER / "parameters.yaml"

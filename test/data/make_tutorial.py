@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness import topics
+from wrist_stiffness.commands.simulate import hide, simulate_recording
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -27,7 +28,6 @@ from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.program import Track
-from wrist_stiffness.workflows.simulate import hide, simulate_recording
 
 FOLDER = Path(__file__).parent / "tutorial"
 RATE_HZ, SEED = 10.0, 21

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from wrist_stiffness.commands.table_check import check
 from wrist_stiffness.errors import TableError
 from wrist_stiffness.fem import sweep
 from wrist_stiffness.fem.condensed_store import CondensedStore, condense_solid
@@ -17,7 +18,6 @@ from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table_file import load_table, save_table
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows.table_check import check
 
 COARSE = BuildSettings(
     sizes=MeshSettings(

@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.cli.main import main
+from wrist_stiffness.commands.explain import explain
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Load, Sample
 from wrist_stiffness.model.budget import budget
 from wrist_stiffness.model.model_file import save_model
-from wrist_stiffness.workflows.explain import explain
 
 POSE = np.radians([20.0, -10.0])
 LOAD = Load(np.array([0.4, -0.3, -1.0, 0.01, -0.02, 0.005]))

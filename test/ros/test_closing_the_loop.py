@@ -19,20 +19,20 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from wrist_stiffness.campaign.reading.session import read_session
-from wrist_stiffness.campaign.searching.diagnose import diagnose_sessions
+from wrist_stiffness.commands.extend import CatalogueEffect, extend_model
+from wrist_stiffness.commands.provenance import Run
+from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.safety import SafetySettings
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, pose_message_stamped
 from wrist_stiffness.ros.qos import NOTES_QOS
 from wrist_stiffness.ros.recorder import Recorder
+from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.workflows.extend import CatalogueEffect, extend_model
-from wrist_stiffness.workflows.provenance import Run
-from wrist_stiffness.workflows.read_sessions import Recordings
 
 pytestmark = pytest.mark.slow
 

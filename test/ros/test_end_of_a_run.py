@@ -12,13 +12,13 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
+from wrist_stiffness.commands.node_list import UNANSWERED
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.ros import cell_simulator, executor
 from wrist_stiffness.ros.answer_count import AnswerCount
 from wrist_stiffness.ros.cell_simulator import CellSimulator
 from wrist_stiffness.ros.recorder import Recorder
-from wrist_stiffness.workflows.node_list import UNANSWERED
 
 QUIET_S = 0.5
 RATE_HZ = 50.0

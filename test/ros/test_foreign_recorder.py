@@ -10,9 +10,9 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
+from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.ros.qos import RELIABLE_QOS
-from wrist_stiffness.workflows.replay import replay
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 TYPES = {

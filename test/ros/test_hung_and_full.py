@@ -13,10 +13,10 @@ from std_msgs.msg import Float64MultiArray
 
 from wrist_stiffness.cli import main as command_line
 from wrist_stiffness.cli import progress
+from wrist_stiffness.commands import cell
+from wrist_stiffness.commands.node_list import RECORDER_NODE
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording import open_recording
-from wrist_stiffness.workflows import cell
-from wrist_stiffness.workflows.node_list import RECORDER_NODE
 
 DEADLINE_S = 60.0
 SMALL_FILE = 4096

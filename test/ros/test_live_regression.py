@@ -9,6 +9,7 @@ from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory
 
+from wrist_stiffness.commands.output_changes import output_changes
 from wrist_stiffness.recording import messages
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.reader import open_recording
@@ -16,7 +17,6 @@ from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import nanoseconds, time_message
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
-from wrist_stiffness.workflows.output_changes import output_changes
 
 FOLDER = Path(__file__).parents[1] / "data/replay"
 HUMIDITY = "/covariates/humidity"

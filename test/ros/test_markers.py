@@ -6,11 +6,11 @@ from scipy.spatial.transform import Rotation
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
+from wrist_stiffness.commands.wrist_drawing import WristDrawing
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.ros.body_transforms import body_transforms
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 from wrist_stiffness.ros.qos import STATE_QOS
-from wrist_stiffness.workflows.wrist_drawing import WristDrawing
 
 SECOND = 1_000_000_000
 DOWN = Load(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))

@@ -11,13 +11,13 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from wrist_stiffness.cli import main as command_line
+from wrist_stiffness.commands import cell
+from wrist_stiffness.commands.node_list import CELL_PARAMETERS, WRIST_NODES
+from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording
 from wrist_stiffness.ros.conversions import nanoseconds
-from wrist_stiffness.workflows import cell
-from wrist_stiffness.workflows.node_list import CELL_PARAMETERS, WRIST_NODES
-from wrist_stiffness.workflows.replay import replay
 
 DEADLINE_S = 60.0
 NODES = {node.name: node for node in WRIST_NODES}

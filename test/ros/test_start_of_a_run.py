@@ -8,10 +8,10 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
+from wrist_stiffness.commands import cell
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.ros import cell_simulator
 from wrist_stiffness.ros.cell_simulator import NAMELESS, CellSimulator
-from wrist_stiffness.workflows import cell
 
 GREETED = "/silent/get_parameters"
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, kstest
 
-from wrist_stiffness.campaign.reading.session import read_session
+from wrist_stiffness.commands.simulate import simulate_recording
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.simulation.residual import BasePose
-from wrist_stiffness.workflows.simulate import simulate_recording
 
 
 @pytest.mark.parametrize("sees", ["pose", "points", "pointing"])
@@ -169,7 +169,7 @@ def test_another_reading_or_delay_makes_old_answers_stale(solver, bench, monkeyp
     run.version_of(solver)
     [(modules, files)] = asked
     sources = {path.relative_to(tools.PACKAGE).as_posix() for path in tools._sources(modules)}
-    assert {"campaign/reading/spikes.py", "simulation/laws/time_delay.py"} <= sources
+    assert {"sessions/reading/spikes.py", "simulation/laws/time_delay.py"} <= sources
     assert {"observe.py", "own_diagnosis.py"} <= set(files)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.commands.cell_messages import CellMessages
 from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples
 from wrist_stiffness.simulation.cell import SENSED, CellSample
-from wrist_stiffness.workflows.cell_messages import CellMessages
 
 
 def test_a_quaternion_does_not_jump_while_the_platform_turns_far(tmp_path):

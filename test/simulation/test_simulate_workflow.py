@@ -12,13 +12,13 @@ from wrist_stiffness import topics
 from wrist_stiffness.cli import simulate as command
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.cli.simulate import in_usual_units
+from wrist_stiffness.commands import simulate as workflow
+from wrist_stiffness.commands.simulate import hide, hide_blind, simulate_recording
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.simulation.catalogue import CATALOGUE
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.workflows import simulate as workflow
-from wrist_stiffness.workflows.simulate import hide, hide_blind, simulate_recording
 
 SETTINGS = CellSettings(rate_hz=50.0)
 

@@ -6,7 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import paper_page
 import pytest
+from paper_figures import (
+    COLUMNS,
+    PUBLISHED,
+    TO_PAPER_UNITS,
+    Figures,
+    PaperExperiment,
+)
+from paper_predictions import energy_budget, predictions
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
@@ -16,15 +25,6 @@ from wrist_stiffness.mechanism.components import LINKS
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.workflows import paper_page
-from wrist_stiffness.workflows.paper_figures import (
-    COLUMNS,
-    PUBLISHED,
-    TO_PAPER_UNITS,
-    Figures,
-    PaperExperiment,
-)
-from wrist_stiffness.workflows.paper_predictions import energy_budget, predictions
 
 MEANS_BAND, MAXIMA_BAND = 0.03, 0.15
 """What the calibration promises of the means of s, phi and s_z, and of the whole-map maxima."""

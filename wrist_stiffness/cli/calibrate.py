@@ -76,9 +76,9 @@ def require_new_model(arguments: argparse.Namespace) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.commands.calibrate import calibrate_model
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.calibrate import calibrate_model
-    from wrist_stiffness.workflows.json_file import write_json
 
     require_new_model(arguments)
     found = calibrate_model(

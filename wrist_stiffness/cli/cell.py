@@ -49,7 +49,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.workflows.cell import run_cell
+    from wrist_stiffness.commands.cell import run_cell
 
     sound = run_cell(
         arguments.model,

@@ -51,27 +51,27 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.json_file import write_json
 
     models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
     recordings = recordings_named(arguments.recordings, arguments)
     if for_each(arguments):
-        from wrist_stiffness.workflows.compare_fleet import compare_each
+        from wrist_stiffness.commands.compare_fleet import compare_each
 
         fleet = compare_each(
             models, recordings, this_run(), arguments.scheduler, Progress("recordings")
         )
         lines, values = fleet.lines(), fleet.as_values()
     else:
-        from wrist_stiffness.workflows.compare import compare
+        from wrist_stiffness.commands.compare import compare
 
         found = compare(models, recordings, this_run(), Progress)
         lines, values = found.lines(), found.as_values()
     print("\n".join(lines))
     if arguments.report:
-        from wrist_stiffness.workflows.report.comparison_report import report_of_comparison
-        from wrist_stiffness.workflows.report.page import write_page
+        from wrist_stiffness.report.comparison_report import report_of_comparison
+        from wrist_stiffness.report.page import write_page
 
         write_page(arguments.report, report_of_comparison(found))
     if arguments.json:

@@ -34,10 +34,10 @@ def main() -> int:
 def _run(output: str, seconds: float) -> int:
     import numpy as np
 
+    from wrist_stiffness.commands.before_after import rms
+    from wrist_stiffness.commands.demo import beyond, run_demo
+    from wrist_stiffness.commands.table import facts
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.before_after import rms
-    from wrist_stiffness.workflows.demo import beyond, run_demo
-    from wrist_stiffness.workflows.table import facts
 
     model = shipped_file("config/palmieri2015_model.yaml")
     print(f"Live: predictor, corrector and a virtual wrist as ROS 2 nodes, {seconds:g} s ...")

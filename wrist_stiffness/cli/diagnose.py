@@ -68,14 +68,14 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress, Status
     from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.commands.diagnose import diagnose_recordings
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.diagnose import diagnose_recordings
-    from wrist_stiffness.workflows.json_file import write_json
 
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
     recordings = recordings_named(arguments.recordings, arguments)
     if for_each(arguments):
-        from wrist_stiffness.workflows.diagnose_fleet import diagnose_each
+        from wrist_stiffness.commands.diagnose_fleet import diagnose_each
 
         fleet = diagnose_each(
             model, recordings, this_run(), arguments.scheduler, Progress("recordings")
@@ -95,7 +95,7 @@ def _run(arguments: argparse.Namespace) -> int:
         lines, values = found.lines(), found.as_values(arguments.ranking)
     print("\n".join(lines))
     if arguments.report:
-        from wrist_stiffness.workflows.report.page import write_page
+        from wrist_stiffness.report.page import write_page
 
         write_page(arguments.report, found.report())
     if arguments.json:

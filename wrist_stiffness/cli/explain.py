@@ -58,10 +58,10 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
+    from wrist_stiffness.commands.explain import explain
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.model.block import Load
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.explain import explain
-    from wrist_stiffness.workflows.json_file import write_json
 
     load = np.array(whole_load(arguments.load))
     measured = arguments.measured

@@ -40,10 +40,10 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.commands.export_csv import export_csv
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.export_csv import export_csv
-    from wrist_stiffness.workflows.json_file import write_json
 
     named = recordings_named([arguments.recording], arguments)
     exported = export_csv(

@@ -10,7 +10,7 @@ from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser, named_numbers
 from wrist_stiffness.cli.recording_options import recordings_named
 
 if TYPE_CHECKING:
-    from wrist_stiffness.workflows.extend import Addition
+    from wrist_stiffness.commands.extend import Addition
 
 DESCRIPTION = """\
 Add one effect to a model, fit it to recordings together with everything that is there, and write
@@ -73,9 +73,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.commands.extend import extend_model
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.extend import extend_model
-    from wrist_stiffness.workflows.json_file import write_json
 
     require_new_model(arguments)
     found = extend_model(
@@ -94,13 +94,13 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _addition(arguments: argparse.Namespace) -> Addition:
-    from wrist_stiffness.errors import InputError
-    from wrist_stiffness.workflows.extend import (
+    from wrist_stiffness.commands.extend import (
         CatalogueEffect,
         FileEffect,
         FormulaEffect,
         direction_of,
     )
+    from wrist_stiffness.errors import InputError
 
     if arguments.formula is None:
         if arguments.component or arguments.direction or arguments.start:

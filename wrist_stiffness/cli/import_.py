@@ -58,8 +58,8 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.workflows.import_csv import import_csv
-    from wrist_stiffness.workflows.json_file import write_json
+    from wrist_stiffness.commands.import_csv import import_csv
+    from wrist_stiffness.commands.json_file import write_json
 
     imported = import_csv(
         arguments.table,

@@ -90,15 +90,15 @@ def _run(arguments: argparse.Namespace) -> int:
     from pathlib import Path
 
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.errors import InputError
-    from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.plan import (
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.commands.plan import (
         Options,
         plan_between_rivals,
         plan_commissioning,
         write_plan,
     )
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.shipped import shipped_file
 
     output = Path(arguments.output)
     if not output.resolve().parent.is_dir():

@@ -36,9 +36,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.commands.predict import predict
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.predict import predict
 
     load = whole_load(arguments.load)
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")

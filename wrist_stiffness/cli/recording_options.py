@@ -6,8 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wrist_stiffness.commands.read_sessions import Recordings
     from wrist_stiffness.compensation.settings import StreamSettings
-    from wrist_stiffness.workflows.read_sessions import Recordings
 
 
 def add_recording_options(
@@ -43,8 +43,8 @@ def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordi
     InputError
         If an option cannot be read.
     """
+    from wrist_stiffness.commands.read_sessions import Recordings
     from wrist_stiffness.topics import parse_topic_remaps
-    from wrist_stiffness.workflows.read_sessions import Recordings
 
     settings, _ = settings_named(arguments)
     return Recordings(paths, parse_topic_remaps(arguments.topic), settings)
@@ -58,8 +58,8 @@ def settings_named(arguments: argparse.Namespace) -> tuple[StreamSettings, Strea
     InputError
         If an option cannot be read.
     """
+    from wrist_stiffness.commands.parameter_file import node_settings
     from wrist_stiffness.errors import InputError
-    from wrist_stiffness.workflows.parameter_file import node_settings
 
     if len(arguments.joint) not in (0, 2):
         raise InputError(f"--joint names both motors or none, not {len(arguments.joint)}")

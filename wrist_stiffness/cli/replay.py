@@ -11,8 +11,8 @@ from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
 from wrist_stiffness.cli.recording_options import add_recording_options, settings_named
 
 if TYPE_CHECKING:
-    from wrist_stiffness.workflows.output_changes import TopicChanges
-    from wrist_stiffness.workflows.replay_summary import ReplaySummary
+    from wrist_stiffness.commands.output_changes import TopicChanges
+    from wrist_stiffness.report.replay_summary import ReplaySummary
 
 DESCRIPTION = """\
 Run the very code of the nodes over a recording and write it again with predicted pose errors and
@@ -53,13 +53,13 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.commands.output_changes import output_changes
+    from wrist_stiffness.commands.replay import replay
     from wrist_stiffness.errors import InputError
     from wrist_stiffness.recording.reader import open_recording
     from wrist_stiffness.shipped import shipped_file
     from wrist_stiffness.topics import parse_topic_remaps
-    from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.output_changes import output_changes
-    from wrist_stiffness.workflows.replay import replay
 
     settings = settings_named(arguments)
     if arguments.against is not None:

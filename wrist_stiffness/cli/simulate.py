@@ -108,12 +108,8 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress, Status
-    from wrist_stiffness.errors import InputError
-    from wrist_stiffness.lookup.table_file import load_table
-    from wrist_stiffness.recording import RecordingWriter
-    from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.simulate import (
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.commands.simulate import (
         DAY_SEEDS,
         check_bounds,
         hide,
@@ -121,6 +117,10 @@ def _run(arguments: argparse.Namespace) -> int:
         on_day,
         simulate_recording,
     )
+    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.lookup.table_file import load_table
+    from wrist_stiffness.recording import RecordingWriter
+    from wrist_stiffness.shipped import shipped_file
 
     if arguments.reveal is not None and arguments.output is not None:
         raise InputError("--reveal tells a secret and writes no recording: leave out -o")
@@ -187,11 +187,11 @@ def _settings(arguments: argparse.Namespace) -> CellSettings:
 def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
     from dataclasses import asdict
 
-    from wrist_stiffness.campaign.refitted import SET_UP
     from wrist_stiffness.cli.progress import Status
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.sessions.refitted import SET_UP
     from wrist_stiffness.simulation.blind import draw
     from wrist_stiffness.simulation.catalogue import ALL
-    from wrist_stiffness.workflows.json_file import write_json
 
     with Status() as status:
         secret = draw(arguments.reveal, table, settings, arguments.seconds, status)

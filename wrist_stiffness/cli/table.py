@@ -133,9 +133,9 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 
 def _build(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.commands import table
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows import table
-    from wrist_stiffness.workflows.json_file import write_json
 
     geometry = arguments.geometry or shipped_file("config/palmieri2015.yaml")
     built = table.build(
@@ -157,9 +157,9 @@ def _build(arguments: argparse.Namespace) -> int:
 
 def _check(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.commands.table_check import check
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.table_check import check
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
     findings = check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
@@ -176,11 +176,11 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _show(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.commands import table
+    from wrist_stiffness.commands.budget import Push
+    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows import table
-    from wrist_stiffness.workflows.budget import Push
-    from wrist_stiffness.workflows.json_file import write_json
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
     shown, push = load_table(path), None
@@ -206,7 +206,7 @@ def _show(arguments: argparse.Namespace) -> int:
 
 
 def _print_facts(shown: Table) -> None:
-    from wrist_stiffness.workflows import table
+    from wrist_stiffness.commands import table
 
     for name, text in table.facts(shown):
         print(f"{name + ':':26} {text}")

@@ -7,7 +7,7 @@ import sys
 from datetime import UTC, datetime
 
 from wrist_stiffness.cli.parser import PROG
-from wrist_stiffness.workflows.provenance import Run
+from wrist_stiffness.commands.provenance import Run
 
 
 def this_run() -> Run:

@@ -65,9 +65,9 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from wrist_stiffness.cli.pose_options import whole_load
     from wrist_stiffness.cli.progress import Progress
+    from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.commands.tolerances import study_tolerances
     from wrist_stiffness.shipped import shipped_file
-    from wrist_stiffness.workflows.json_file import write_json
-    from wrist_stiffness.workflows.tolerances import study_tolerances
 
     study = study_tolerances(
         arguments.model or shipped_file("config/palmieri2015_model.yaml"),
@@ -80,7 +80,7 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     print("\n".join(study.lines()))
     if arguments.picture:
-        from wrist_stiffness.workflows.pictures.tolerances import draw_tolerances
+        from wrist_stiffness.report.pictures.tolerances import draw_tolerances
 
         draw_tolerances(study, Path(arguments.picture))
         print(f"written: {arguments.picture}")

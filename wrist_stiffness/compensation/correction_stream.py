@@ -20,13 +20,13 @@ from wrist_stiffness.compensation.judged_load import judged_load
 from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
 from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.compensation.perishable import require_within_limits, within_limits
-from wrist_stiffness.compensation.plan import PlanCorrector
 from wrist_stiffness.compensation.scales import Held
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.compensation.supervision import Supervision
 from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.compensation.trajectory import PlannedPoint
+from wrist_stiffness.compensation.trajectory_plan import PlanCorrector
 from wrist_stiffness.errors import InputError, StaleLoadError, WristError
 from wrist_stiffness.mechanism.compiled import CompiledCommands, CompiledSupervisor
 from wrist_stiffness.mechanism.components import Array

@@ -5,10 +5,10 @@ Knows neither ROS nor this mechanism; `docs/inference.md` explains it.
 
 from wrist_stiffness.inference.answer import Diagnosis, Finding
 from wrist_stiffness.inference.candidates import Candidate, Parameter, ShapeParameter
-from wrist_stiffness.inference.diagnose import TableDiagnosis, diagnose
 from wrist_stiffness.inference.nuisance import Nuisance
 from wrist_stiffness.inference.observations import Observations, Quantity
 from wrist_stiffness.inference.predictor import Predictor, load_predictor
+from wrist_stiffness.inference.table_diagnosis import TableDiagnosis, diagnose
 
 __all__ = [
     "Candidate",

@@ -15,9 +15,9 @@ from wrist_stiffness.inference.candidates import Candidate
 from wrist_stiffness.inference.evidence import size_weight
 from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Observations
+from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
 from wrist_stiffness.inference.search import Ranked, Trial
-from wrist_stiffness.inference.table import Table
 
 FREE = 30.0
 """Standard deviation of a parameter that has no prior, in the size at which it alone would do as

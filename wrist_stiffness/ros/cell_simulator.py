@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
+from wrist_stiffness.commands.node_list import LARGEST_SEED, RATES_HZ, UNANSWERED
 from wrist_stiffness.compensation.intake import MotorNames, checked_prefix
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import FRAMES_PREFIXED, ParameterEntry
@@ -48,7 +49,6 @@ from wrist_stiffness.topics import (
     RECORDING_NOTES,
     relative,
 )
-from wrist_stiffness.workflows.node_list import LARGEST_SEED, RATES_HZ, UNANSWERED
 
 PARAMETERS = (
     ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 
-from wrist_stiffness.workflows.node_list import PARENT_PID
+from wrist_stiffness.commands.node_list import PARENT_PID
 
 PR_SET_PDEATHSIG = 1
 """From linux/prctl.h; ctypes is the standard library's way to it."""

@@ -13,6 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from wrist_stiffness.commands.wrist_drawing import Pace, WristDrawing
 from wrist_stiffness.compensation.parameters import PREDICTION, prediction_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
@@ -41,7 +42,6 @@ from wrist_stiffness.topics import (
     TF,
     WRIST_MARKERS,
 )
-from wrist_stiffness.workflows.wrist_drawing import Pace, WristDrawing
 
 MICROMETRES = 1e6
 MILLIDEGREES = 1e3 * float(np.degrees(1.0))

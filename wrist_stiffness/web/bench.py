@@ -15,27 +15,27 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import Analysis, Version
-from wrist_stiffness.campaign.comparing.comparison import ComparedModel
-from wrist_stiffness.campaign.comparing.curve import Curve
-from wrist_stiffness.campaign.comparing.sentences import sentences
-from wrist_stiffness.campaign.measured_session import MeasuredSession
-from wrist_stiffness.campaign.planning.loads_file import Weight
-from wrist_stiffness.campaign.planning.plan import Conditions
-from wrist_stiffness.campaign.planning.rivals import Rivals
-from wrist_stiffness.campaign.planning.timeline import Pace
-from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis
+from wrist_stiffness.commands.extend import FormulaEffect
+from wrist_stiffness.commands.import_csv import import_csv
+from wrist_stiffness.commands.plan import Planned, write_plan
+from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
+from wrist_stiffness.comparing.comparison import ComparedModel
+from wrist_stiffness.comparing.curve import Curve
+from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.loads_file import Weight
+from wrist_stiffness.planning.plan import Conditions
+from wrist_stiffness.planning.rivals import Rivals
+from wrist_stiffness.planning.timeline import Pace
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.web.examples import EXAMPLES, recordings_of
 from wrist_stiffness.web.results import as_commands, told_plan, write_result
 from wrist_stiffness.web.workspace import Workspace
-from wrist_stiffness.workflows.extend import FormulaEffect
-from wrist_stiffness.workflows.import_csv import import_csv
-from wrist_stiffness.workflows.plan import Planned, write_plan
-from wrist_stiffness.workflows.read_sessions import Recordings, read_sessions
 
 USUAL_PACE = Pace(float(np.radians(30.0)), 2.0, True)
 HANG_S = 10.0

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from wrist_stiffness.commands.simulate import hide, on_day, simulate_recording
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.workflows.simulate import hide, on_day, simulate_recording
 
 RATE_HZ, SEED = 10.0, 21
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import View
-from wrist_stiffness.campaign.comparing.curve import Curve, condition_label, condition_shown
+from wrist_stiffness.comparing.curve import Curve, condition_label, condition_shown
 from wrist_stiffness.inference.observations import Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.report.pictures.palette import COLOURS, FLOOR
 from wrist_stiffness.web.bench import Row
-from wrist_stiffness.workflows.pictures.palette import COLOURS, FLOOR
 
 Figure = dict[str, Any]
 

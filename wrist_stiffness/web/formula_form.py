@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
+from wrist_stiffness.commands.extend import FormulaEffect, direction_of
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.formula_law import SIGNALS
 from wrist_stiffness.model.places import LIMB
-from wrist_stiffness.workflows.extend import FormulaEffect, direction_of
 
 if TYPE_CHECKING:
-    from wrist_stiffness.campaign.comparing.curve import Curve
+    from wrist_stiffness.comparing.curve import Curve
     from wrist_stiffness.web.page import Workbench
 
 

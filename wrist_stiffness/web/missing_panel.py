@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from wrist_stiffness.campaign.comparing.sentences import percent
+from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.model.formula_law import SIGNALS
+from wrist_stiffness.report.verdict import verdict_lines
 from wrist_stiffness.web.formula_form import FormulaForm
-from wrist_stiffness.workflows.verdict import verdict_lines
 
 if TYPE_CHECKING:
     from wrist_stiffness.inference.answer import Diagnosis, Standing

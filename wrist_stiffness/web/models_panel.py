@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from nicegui import events, ui
 
+from wrist_stiffness.report.fit_report import plus_minus
 from wrist_stiffness.web.figures import number
-from wrist_stiffness.workflows.fit_report import plus_minus
 
 if TYPE_CHECKING:
     from wrist_stiffness.web.page import Workbench

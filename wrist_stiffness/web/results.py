@@ -8,15 +8,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.campaign.planning.plan import Plan
-from wrist_stiffness.campaign.searching.diagnose import WristDiagnosis
+from wrist_stiffness.commands.diagnose import Diagnosed
+from wrist_stiffness.commands.provenance import Provenance
+from wrist_stiffness.commands.read_sessions import recording_sha256
+from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, save_model
+from wrist_stiffness.planning.plan import Plan
+from wrist_stiffness.report.page import write_page
 from wrist_stiffness.web.workspace import Workspace
-from wrist_stiffness.workflows.diagnose import Diagnosed
-from wrist_stiffness.workflows.provenance import Provenance
-from wrist_stiffness.workflows.read_sessions import recording_sha256
-from wrist_stiffness.workflows.report.page import write_page
 
 
 def as_commands(model: Path, recordings: Sequence[Path], added: Sequence[str]) -> list[str]:

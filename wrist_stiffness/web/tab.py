@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import View
-from wrist_stiffness.campaign.comparing.curve import Curve
+from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.inference.answer import Diagnosis
 from wrist_stiffness.inference.observations import Mask, Quantity
 from wrist_stiffness.lookup.table import Table

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from nicegui import events, ui
 
-from wrist_stiffness.campaign.comparing.curve import condition_label
+from wrist_stiffness.comparing.curve import condition_label
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.web.figures import (

@@ -8,8 +8,8 @@ from itertools import count
 from pathlib import Path
 
 from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.campaign.reading.folder import is_recording
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.sessions.reading.folder import is_recording
 
 MODEL, TABLE = (".yaml", ".yml"), (".npz",)
 TAKEN = (".mcap", ".csv", *MODEL, *TABLE)

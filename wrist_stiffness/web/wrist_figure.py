@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from wrist_stiffness.commands.budget import Push
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.energy import strain_energies
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes
 from wrist_stiffness.web.figures import MAP, RED, Figure
-from wrist_stiffness.workflows.budget import Push
-from wrist_stiffness.workflows.pictures.bent_wrist import Shape, bent_shapes
 
 MM = 1e3
 SEEN_M = 0.008

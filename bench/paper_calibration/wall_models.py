@@ -1,0 +1,261 @@
+"""How the wall of a bushing is held: judged, refined, and lifted off, on the shipped wrist.
+
+    python bench/paper_calibration/wall_models.py judge | mesh | patches | lifting | pressure
+
+Each word writes one block or picture of docs/walls.md; none does all.  `judge` needs
+CalculiX (Debian package calculix-ccx).  Minutes each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from paper_page import insert_blocks
+
+from wrist_stiffness.fem.calculix import run_deck, write_deck
+from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
+from wrist_stiffness.fem.condensed_store import condense_solid
+from wrist_stiffness.fem.convergence import richardson
+from wrist_stiffness.fem.monolithic import Disturbance, solve_pose
+from wrist_stiffness.fem.one_sided import PatchedBushing, PatchedWrist, patch_bushing, solve_patches
+from wrist_stiffness.fem.parts import assemble_body, wrist_parts
+from wrist_stiffness.fem.solids import MeshSettings
+from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
+from wrist_stiffness.lookup.rated_load import rated_map, rated_wrench
+from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.mechanism.workspace import Workspace
+
+GEOMETRY = "config/palmieri2015.yaml"
+CONDENSE = cache(condense_solid)
+HALVES = (slice(0, 3), slice(3, 6))
+PATCHED = 1.5
+"""Element sizes of the wrists in patches, over the shipped ones."""
+
+UM, CENTIDEGREES = 1e6, 100.0 * 180.0 / np.pi
+
+
+def main() -> None:
+    """Compute what is asked for and write it into the page."""
+    stages: dict[str, Callable[[Geometry], str]] = {
+        "judge": judge,
+        "mesh": mesh,
+        "patches": patches,
+        "lifting": lifting,
+    }
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("stage", nargs="*", choices=[*stages, "pressure", []])
+    parser.add_argument("-o", "--output", default="docs", help="folder of the page")
+    arguments = parser.parse_args()
+    folder, geometry = Path(arguments.output), load_geometry(GEOMETRY)
+    for stage in arguments.stage or [*stages, "pressure"]:
+        if stage == "pressure":
+            draw_pressure(geometry, folder / "pictures" / "wall-pressure.png")
+            continue
+        block = stages[stage](geometry)
+        print(block, flush=True)
+        page = folder / "walls.md"
+        page.write_text(insert_blocks(page.read_text(), {stage: block}))
+
+
+def scaled(factor: float) -> MeshSettings:
+    """Return element sizes that are a multiple of the shipped ones."""
+    return MeshSettings(**{name: factor * size for name, size in asdict(SHIPPED_SIZES).items()})
+
+
+def poses(geometry: Geometry, count: int, seed: int) -> Array:
+    """Return random poses of the operative workspace (n, 2) [rad]."""
+    workspace = Workspace(mechanism_of(geometry), geometry.limits)
+    lower, upper = workspace.rectangle
+    drawn = np.random.default_rng(seed).uniform(lower, upper, (20 * count, 2))
+    return drawn[workspace.operative(drawn)][:count]
+
+
+def judge(geometry: Geometry) -> str:
+    """Condensed, solved whole and by CalculiX: the same mesh, 20 random poses and loads."""
+    sizes, mechanism = scaled(5.0), mechanism_of(geometry)
+    rng = np.random.default_rng(20)
+    limits = (geometry.limits.force, geometry.limits.moment)
+    rows = []
+    for interface in ("sliding", "rigid"):
+        components, made = elastic_components(geometry, sizes, interface)
+        wrist = build_wrist(geometry, sizes, interface == "sliding")
+        whole, calculix, touching = [], [], 0
+        for theta in poses(geometry, 20, 11):
+            pose = mechanism.forward(theta)
+            load = rng.normal(size=6)
+            for half, most in zip(HALVES, limits, strict=True):
+                load[half] *= rng.uniform(0.1, 1.0) * most / np.linalg.norm(load[half])
+            operators = contact_operators(pose, components, geometry.gravity)
+            condensed = respond(operators, load).twist
+            model = factor_pose(wrist, pose)
+            solution = solve_pose(model, load, Disturbance(gravity=geometry.gravity))
+            closed = solution.forces > 0.0
+            touching += int(closed.any())
+            with tempfile.TemporaryDirectory() as folder:
+                deck = Path(folder) / "pose.inp"
+                write_deck(model, deck, load, geometry.gravity, closed)
+                by_calculix = run_deck(deck)
+            whole.append(difference(condensed, solution.twist))
+            calculix.append(difference(condensed, by_calculix))
+            print(interface, theta, f"{whole[-1]:.1e} {calculix[-1]:.1e}", flush=True)
+        rows.append(
+            f"| `{interface}` | {sum(made.elements.values())} | {touching} | "
+            f"{np.max(whole):.1e} | {np.max(calculix):.1e} |"
+        )
+    head = "| wall | elements | poses with contact | against the whole wrist | against CalculiX |"
+    return "\n".join([head, "| --- | --- | --- | --- | --- |", *rows])
+
+
+def difference(twist: Array, other: Array) -> float:
+    """Largest relative difference of two twists, shift and rotation apart."""
+    return max(float(np.linalg.norm((twist - other)[h]) / np.linalg.norm(other[h])) for h in HALVES)
+
+
+def mesh(geometry: Geometry) -> str:
+    """Mean s and phi of the rated load for each wall on a sequence of meshes."""
+    configuration = mechanism_of(geometry).forward(poses(geometry, 100, 12))
+    factors = (2.25, 1.5, 1.0)
+    rows = []
+    for interface in ("rigid", "sliding"):
+        values = []
+        for factor in factors:
+            components, _ = elastic_components(geometry, scaled(factor), interface)
+            operators = contact_operators(configuration, components, np.zeros(3))
+            values.append(rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0))
+        table = np.array(values) * [UM, CENTIDEGREES]
+        order, limit = richardson(table, factors[0] / factors[1])
+        for k, name in enumerate(("s [µm]", "φ [10⁻² °]")):
+            cells = " | ".join(f"{value:.3f}" for value in table[:, k])
+            left = 100 * (table[-1, k] / limit[k] - 1)
+            rows.append(f"| `{interface}` | {name} | {cells} | {order[k]:.2f} | {left:+.2f} % |")
+    head = "| wall | mean | 2.25 × | 1.5 × | shipped sizes | order | left |"
+    return "\n".join([head, "| --- | --- | --- | --- | --- | --- | --- |", *rows])
+
+
+def patched(
+    geometry: Geometry, sizes: MeshSettings, wall_rings: int, flange_rings: int
+) -> PatchedWrist:
+    """Return the wrist with its bushings cut into patches."""
+    parts = wrist_parts(geometry)
+    components, _ = elastic_components(geometry, sizes, "sliding", condenser=CONDENSE)
+    bushings = {
+        part.name: patch_bushing(assemble_body(part.solid, sizes), wall_rings, flange_rings)
+        for part in parts
+        if part.solid.is_bushing
+    }
+    return PatchedWrist(geometry, parts, components, bushings)
+
+
+def rated(wrist: PatchedWrist, thetas: Array, clearance: float = 0.0, lifts: bool = True) -> Array:
+    """Mean |s| [um] and phi [1e-2 deg] of the rated load, walls in patches."""
+    mechanism = mechanism_of(wrist.geometry)
+    sizes = []
+    for theta in thetas:
+        pose = mechanism.forward(theta)
+        load = rated_wrench(pose, wrist.geometry)
+        twist = solve_patches(wrist, pose, load, clearance, lifts).twist
+        sizes.append([np.linalg.norm(twist[half]) for half in HALVES])
+    return np.mean(sizes, axis=0) * [UM, CENTIDEGREES]
+
+
+def patches(geometry: Geometry) -> str:
+    """Patches along the wall, over the flange and around: what each step changes."""
+    thetas, rows = poses(geometry, 6, 13), []
+    coarse = asdict(scaled(PATCHED))
+    for arc, wall, flange in (
+        (1.0, 2, 1), (1.0, 4, 1), (1.0, 8, 1), (1.0, 16, 1), (1.0, 4, 2), (1.0, 4, 4), (0.5, 4, 1)
+    ):  # fmt: skip
+        sizes = MeshSettings(**{**coarse, "bushing_arc": arc * coarse["bushing_arc"]})
+        wrist = patched(geometry, sizes, wall, flange)
+        around = [len(np.unique(b.angle.round(9))) for b in wrist.bushings.values()]
+        two, one = rated(wrist, thetas, lifts=False), rated(wrist, thetas)
+        rows.append(
+            f"| {min(around)}–{max(around)} | {wall} | {flange} | {two[0]:.2f} / {two[1]:.3f} | "
+            f"{one[0]:.2f} / {one[1]:.3f} | {one[0] / two[0]:.3f} |"
+        )
+        print(rows[-1], flush=True)
+    components, _ = elastic_components(geometry, scaled(PATCHED), "sliding", condenser=CONDENSE)
+    configuration = mechanism_of(geometry).forward(thetas)
+    operators = contact_operators(configuration, components, np.zeros(3))
+    nodal = rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0) * [UM, CENTIDEGREES]
+    rows.append(f"| every node | | 1 | {nodal[0]:.2f} / {nodal[1]:.3f} | | |")
+    head = (
+        "| around | along the wall | over the flange | two-sided s / φ | one-sided s / φ | ratio |"
+    )
+    return "\n".join([head, "| --- | --- | --- | --- | --- | --- |", *rows])
+
+
+def lifting(geometry: Geometry) -> str:
+    """Compare a table's two-sided walls with those that lift off, with and without clearance."""
+    wrist, thetas = patched(geometry, scaled(PATCHED), 8, 2), poses(geometry, 24, 14)
+    rows = []
+    two = rated(wrist, thetas, lifts=False)
+    rows.append(f"| two-sided (`sliding`) | {two[0]:.1f} | {two[1]:.2f} | 1 |")
+    for clearance in (0.0, 1e-6, 5e-6, 20e-6):
+        one = rated(wrist, thetas, clearance)
+        name = f"lifts off, clearance {UM * clearance:g} µm"
+        rows.append(f"| {name} | {one[0]:.1f} | {one[1]:.2f} | {one[0] / two[0]:.2f} |")
+    head = "| wall | mean s [µm] | mean φ [10⁻² °] | s over two-sided |"
+    return "\n".join([head, "| --- | --- | --- | --- |", *rows])
+
+
+def draw_pressure(geometry: Geometry, path: Path) -> None:
+    """Pressure on the wall of joint_2's bushing at home under the rated load, unrolled."""
+    from wrist_stiffness.report.pictures.figure import new_figure, save_figure
+
+    joint = "joint_2"
+    wrist = patched(geometry, scaled(1.0), 12, 2)
+    pose = mechanism_of(geometry).forward(np.zeros(2))
+    load = rated_wrench(pose, geometry)
+    figure = new_figure(13.0, 4.2)
+    cases = {
+        "two-sided: pulls on one side": solve_patches(wrist, pose, load, lifts=False),
+        "lifts off, no clearance": solve_patches(wrist, pose, load),
+        "lifts off, clearance 2 µm": solve_patches(wrist, pose, load, 2e-6),
+    }
+    bushing = wrist.bushings[joint]
+    on_wall = bushing.surface == "wall"
+    fields = {
+        name: 1e-6 * solved.forces[joint][on_wall] / bushing.area[on_wall]
+        for name, solved in cases.items()
+    }
+    for axes, (name, field) in zip(
+        figure.subplots(1, len(cases), sharey=True), fields.items(), strict=True
+    ):
+        # The singular ends would hide the rest.
+        most = float(np.quantile(np.abs(field[field != 0.0]), 0.9))
+        drawn = draw_patches(axes, bushing, on_wall, field, most)
+        figure.colorbar(drawn, ax=axes, extend="both", label="pressure [MPa]")
+        axes.set_title(f"{name}\n{field.min():.2f} to {field.max():.2f} MPa", fontsize=10)
+        axes.set_xlabel("around the pin [deg]")
+    figure.axes[0].set_ylabel("along the bushing [mm]")
+    save_figure(figure, path)
+
+
+def draw_patches(axes, bushing: PatchedBushing, which: Array, field: Array, most: float):  # type: ignore[no-untyped-def]
+    """Draw a field over the patches of a wall, one coloured cell each."""
+    angles = np.unique(bushing.angle[which].round(9))
+    heights = bushing.height[which].reshape(len(angles), -1)[0]
+    order = np.argsort(heights)
+    radius = bushing.area[which].sum() / (2.0 * np.pi * np.ptp(heights))
+    widths = bushing.area[which][: len(heights)][order] * len(angles) / (2.0 * np.pi * radius)
+    edges = np.concatenate([[0.0], np.cumsum(widths)])
+    edges += heights[order][0] - widths[0] / 2.0
+    turn = angles[1] - angles[0]
+    around = np.degrees(np.concatenate([angles - turn / 2.0, angles[-1:] + turn / 2.0]))
+    cells = field.reshape(len(angles), -1)[:, order].T
+    return axes.pcolormesh(around, 1e3 * edges, cells, cmap="RdBu_r", vmin=-most, vmax=most)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,192 @@
+"""`compare` on recordings whose hidden effects are known (test/data/make_recordings.py)."""
+
+import base64
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.commands.compare_fleet import FleetComparison
+from wrist_stiffness.commands.fleet import FleetRow
+from wrist_stiffness.shipped import shipped_file
+
+DATA = Path(__file__).parents[1] / "data"
+BACKLASH = """\
+schema: 1
+name: with backlash
+table: {{path: {table}}}
+effects:
+  - effect: backlash
+    component: motor_2
+    parameters: {{width_mdeg: [90, 1]}}
+"""
+
+
+@pytest.fixture(scope="module")
+def with_backlash(tmp_path_factory):
+    path = tmp_path_factory.mktemp("models") / "with_backlash.yaml"
+    table = shipped_file("precomputed/palmieri2015.npz")
+    path.write_text(BACKLASH.format(table=table))
+    return path
+
+
+@pytest.fixture(scope="module")
+def compared(with_backlash, tmp_path_factory):
+    """Exit code, what was printed, values and page of the shipped model against the right one."""
+    folder = tmp_path_factory.mktemp("compared")
+    shipped = shipped_file("config/palmieri2015_model.yaml")
+    arguments = [str(DATA / "wrist_b.mcap"), "--model", str(shipped), "--model", str(with_backlash)]
+    files = ["--json", str(folder / "b.json"), "--report", str(folder / "b.html")]
+    with pytest.MonkeyPatch.context() as patch:
+        lines = []
+        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
+        assert main(["compare", *arguments, *files]) == 0
+    values = json.loads((folder / "b.json").read_text())
+    return "\n".join(lines), values, (folder / "b.html").read_text()
+
+
+@pytest.mark.slow
+def test_the_hidden_backlash_is_the_first_thing_that_is_told(compared):
+    _, values, _ = compared
+    first = values["models"][0]["depends_on"][0]
+    assert first["condition"] == "the side of approach"
+    assert first["probability"] > 0.999
+    assert "When motor 2 is approached with rising rather than falling angle" in first["sentence"]
+    change, sigma = re.search(r"turns by ([\d.]+) \+- ([\d.]+) mdeg", first["sentence"]).groups()
+    # Means of both sides are 70 mdeg apart; speed goes with the side, and takes a part of it.
+    assert 45 < float(change) < 75
+    assert float(change) > 10 * float(sigma)
+
+
+def test_the_error_falls_to_the_noise_with_the_right_model(compared):
+    printed, values, _ = compared
+    before, after = (model["after_registration"]["phi_mdeg"]["rms"] for model in values["models"])
+    noise = values["instrument_noise"]["phi_mdeg"]
+    assert before > 5 * noise
+    assert after < 1.15 * noise
+    assert values["models"][1]["explained_headroom"]["phi_mdeg"] > 0.9
+    assert values["models"][1]["depends_on"] == []
+    assert "with_backlash is off by" in printed
+    assert "noise and drift of the instrument, no more (" in printed
+
+
+def test_a_model_as_drawn_that_fails_is_to_be_calibrated_first(compared, tmp_path):
+    told = "was never fitted to a wrist"
+    printed, values, _ = compared
+    assert not any(told in note for note in values["notes"])  # The last one does not fail.
+    out = tmp_path / "drawn.json"
+    assert main(["compare", str(DATA / "wrist_b.mcap"), "--json", str(out)]) == 0
+    (note,) = (n for n in json.loads(out.read_text())["notes"] if told in n)
+    assert note.startswith("palmieri2015_model ")
+    assert note.endswith("calibrate first, then compare again")
+
+
+def test_terminal_file_and_page_say_the_same(compared):
+    printed, values, page = compared
+    for line in values["verdict"]:
+        assert line in printed
+        assert line.replace(" um", " µm").replace("+-", "±") in page
+    sentence = values["models"][0]["depends_on"][0]["sentence"]
+    assert sentence.replace("+-", "±").replace(" um", " µm") in page
+    assert len(values["provenance"]["recordings"]["wrist_b.mcap"]) == 64
+
+
+def test_the_page_has_its_pictures_in_itself(compared):
+    _, _, page = compared
+    pictures = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
+    assert len(pictures) == 4
+    assert all(b"</svg>" in base64.b64decode(picture) for picture in pictures)
+    assert 'src="http' not in page
+
+
+def test_the_same_recording_gives_the_same_answer(compared, with_backlash, tmp_path):
+    _, values, _ = compared
+    shipped = shipped_file("config/palmieri2015_model.yaml")
+    out = tmp_path / "again.json"
+    arguments = [str(DATA / "wrist_b.mcap"), "--model", str(shipped), "--model", str(with_backlash)]
+    assert main(["compare", *arguments, "--json", str(out)]) == 0
+    again = json.loads(out.read_text())
+    assert again["models"] == values["models"]
+
+
+def test_a_model_fitted_to_the_recording_is_said_to_be(with_backlash, tmp_path, capsys):
+    from wrist_stiffness.commands.read_sessions import recording_sha256
+
+    sha = recording_sha256(DATA / "wrist_b.mcap")
+    lineage = (
+        "lineage:\n  - {command: extend, date: '2026-01-01', "
+        f"parent_sha256: '{'0' * 64}', recordings: {{b: '{sha}'}}}}\n"
+    )
+    model = tmp_path / "fitted.yaml"
+    model.write_text(with_backlash.read_text() + lineage)
+    assert main(["compare", str(DATA / "wrist_b.mcap"), "--model", str(model)]) == 0
+    assert "fitted was fitted to one of these recordings" in capsys.readouterr().out
+
+
+def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong():
+    mistake = "Look at the set-up first: with positions times 1000 the error falls"
+    model = {"model": "wrist_7", "after_registration": {"s_um": {"rms": 4.9}}, "depends_on": []}
+    values = {"models": [model], "instrument_noise": {"s_um": 0.004}, "verdict": ["off", mistake]}
+    rows = (FleetRow(Path("a"), values), FleetRow(Path("b"), None, "no recording"))
+    title, _, row, _, _, told = FleetComparison(rows).lines()
+    assert title.startswith("wrist_7, RMS with registrations")
+    assert row.split()[:3] == ["a", "4.9", "0.004"]
+    assert told == f"a: {mistake}"
+    assert FleetComparison(rows[1:]).lines()[-1].split(maxsplit=1) == [
+        "b",
+        "not compared: no recording",
+    ]
+
+
+@pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])
+def test_a_fleet_names_each_recording_once(error):
+    rows = (FleetRow(Path("b/c.mcap"), None, error),)
+    assert FleetComparison(rows).lines()[-1].split(maxsplit=1) == [
+        "b/c.mcap",
+        "not compared: no pose",
+    ]
+
+
+@pytest.mark.slow
+def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
+    pytest.importorskip("distributed", reason="the extra fleet")
+    folder = tmp_path / "wrists"
+    folder.mkdir()
+    shutil.copy(DATA / "wrist_b.mcap", folder)
+    (folder / "wrist_x.mcap").write_bytes(b"no recording")
+    out = tmp_path / "fleet.json"
+    assert main(["compare", str(folder), "--each", "--json", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "the side of approach" in next(line for line in lines if "wrist_b" in line)
+    assert "not compared: " in next(line for line in lines if "wrist_x" in line)
+    rows = json.loads(out.read_text())["recordings"]
+    assert [row["comparison"] is None for row in rows] == [False, True]
+    assert np.isfinite(rows[0]["comparison"]["instrument_noise"]["s_um"])
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--each", "--report", "x.html"], "--report draws one wrist"),
+        (["--scheduler", "tcp://localhost:1"], "add --each"),
+        (["--model", "missing.yaml"], "missing.yaml"),
+        (["--report", "no folder/x.html"], "no folder/x.html: folder no folder does not exist"),
+        (["--json", "."], ".: cannot be written: it is a folder"),
+    ],
+)
+def test_wrong_use_is_one_line_before_any_work(options, named, capsys):
+    assert main(["compare", str(DATA / "wrist_a.mcap"), *options]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert named in captured.err
+    assert captured.err.count("\n") == 1
+
+
+def test_what_was_not_measured_is_no_number_on_a_page():
+    from wrist_stiffness.report.parts import number
+
+    assert [number(float("nan")), number(12345.6), number(0.01234)] == ["-", "12346", "0.0123"]

@@ -1,0 +1,73 @@
+"""Many wrists diagnosed at once: one line for each."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.commands.diagnose_fleet import FleetDiagnosis
+from wrist_stiffness.commands.fleet import FleetRow
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+def diagnosed(verdict, *classes, mistake="", keys=("s_um", "phi_mdeg")):
+    members = [[name.split("@") for name in names] for names in classes]
+    return {
+        "verdict": verdict,
+        "findings": [
+            {"class": [{"effect": law, "component": place} for law, place in own]}
+            for own in members
+        ],
+        "before": {f"rms_{key}": 12.34 for key in keys},
+        "after": {f"rms_{key}": 1.234 for key in keys},
+        "noise": dict.fromkeys(keys, 1.1),
+        "set_up_mistake": mistake,
+    }
+
+
+def test_each_wrist_has_a_line_that_says_what_is_missing():
+    look = "Look at the set-up first: with the load's sign turned a fit leaves less"
+    rows = (
+        FleetRow(Path("a.mcap"), diagnosed("none")),
+        FleetRow(Path("b.mcap"), diagnosed("effect", ["backlash@motor_2"])),
+        FleetRow(
+            Path("c.mcap"),
+            diagnosed("unknown", ["creep@joint_1", "drift@pose_sensor"], mistake=look),
+        ),
+        FleetRow(Path("d.mcap"), diagnosed("unknown", keys=("phi_mdeg",))),
+        FleetRow(Path("e.mcap"), None, "e.mcap: no measured pose"),
+    )
+    lines = FleetDiagnosis(rows).lines()
+    said = {line.split()[0]: line for line in lines[2:7]}
+    assert said["a.mcap"].endswith("  nothing")
+    assert said["b.mcap"].endswith("  backlash@motor_2")
+    assert said["b.mcap"].split()[1:5] == ["12.3", "->", "1.23", "1.1"]
+    assert said["c.mcap"].endswith("  creep@joint_1 (or 1 more), something unknown")
+    assert said["d.mcap"].split()[1:7] == ["-", "-", "12.3", "->", "1.23", "1.1"]
+    assert said["d.mcap"].endswith("  something unknown")
+    assert said["e.mcap"].split(maxsplit=1)[1] == "not diagnosed: no measured pose"
+    assert lines[7:] == ["", f"c.mcap: {look}"]
+    # All lines of the table are aligned.
+    assert len({line.index("  nothing") for line in lines if line.endswith("  nothing")}) == 1
+    assert lines[1].index("  missing") == said["b.mcap"].index("  backlash")
+
+
+@pytest.mark.slow
+def test_a_folder_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
+    pytest.importorskip("distributed", reason="the extra fleet")
+    folder = tmp_path / "wrists"
+    folder.mkdir()
+    shutil.copy(DATA / "wrist_b.mcap", folder)
+    (folder / "wrist_x.mcap").write_bytes(b"no recording")
+    out = tmp_path / "fleet.json"
+    assert main(["diagnose", str(folder), "--each", "--json", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "backlash@motor_2" in next(line for line in lines if "wrist_b" in line)
+    assert "not diagnosed: " in next(line for line in lines if "wrist_x" in line)
+    rows = json.loads(out.read_text())["recordings"]
+    assert [row["diagnosis"] is None for row in rows] == [False, True]
+    assert rows[0]["diagnosis"]["verdict"] == "effect"
+    assert "no recording" in rows[1]["error"] or "MCAP" in rows[1]["error"]

@@ -1,0 +1,320 @@
+"""One more effect from the catalogue, a file or a formula: found, judged, written, used."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.cli.main import main
+from wrist_stiffness.commands import extend as workflow
+from wrist_stiffness.commands.extend import (
+    CatalogueEffect,
+    FileEffect,
+    FormulaEffect,
+    direction_of,
+    extend_model,
+)
+from wrist_stiffness.commands.provenance import Run
+from wrist_stiffness.commands.read_sessions import Recordings
+from wrist_stiffness.commands.replay import replay
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.sentences import sentences
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.model.python_laws import python_laws
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.simulation.instrument import instrument
+
+RECORDING = Path(__file__).parents[1] / "data" / "wrist_b.mcap"
+"""Hides backlash at motor 2."""
+
+SET_UP = ["measurement_frame", "target_mounting", "load_bias"]
+BUILT = [
+    *("axis_misalignment", "flange_contact", "link_stiffness", "bushing_stiffness"),
+    "load_scale",
+]
+
+SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
+
+OWN = '''
+import numpy as np
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.parameters import Parameter
+
+
+class Bow(Law):
+    """Bows under the load's vertical force."""
+
+    id = "bow"
+    stage = "reaction"
+    places = ("platform",)
+    sentence = "{place} bows"
+    check = "look"
+    excited_by = "loads"
+
+    def parameters(self, place):
+        return (Parameter("bow_um_per_N", -100.0, 100.0, 3.0),)
+
+    def advance(self, at, place, values, state):
+        home = np.zeros((len(at.block), 6))
+        home[:, 0] = values["bow_um_per_N"] * at.wrench[:, 2]
+        return at.screw(place, home), None
+'''
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def session_of(model, effect, seed=1, n=60):
+    """Return poses of a wrist with one effect, measured one by one; all but the zeros are known."""
+    rng = np.random.default_rng(seed)
+    theta = np.radians(rng.uniform(-30.0, 30.0, (n, 2)))
+    load = rng.normal(size=(n, 6)) * np.repeat([0.7, 0.01], 3)
+    block = Block(2.0 * np.arange(n), theta, load, covariates={"humidity": rng.uniform(30, 60, n)})
+    twist = model.with_effects(effect).batch(block).measured + rng.normal(size=(n, 6)) * SIGMA
+    rotation, shift = exp_twist(twist)
+    counts = model.table.geometry.limits.encoder_step * rng.uniform(-0.5, 0.5, theta.shape)
+    nominal = model.table.mechanism.forward(theta + counts).platform
+    notes = {"calibrated": [*SET_UP, *BUILT]}
+    return MeasuredSession("s", block, shift, rotation @ nominal, np.diag(SIGMA**2), notes)
+
+
+@pytest.fixture
+def extend_by(model, tmp_path, monkeypatch):
+    """Extend the shipped model by an addition from a session that is not read from a file."""
+
+    def run(addition, session):
+        source = tmp_path / "s.mcap"
+        source.write_bytes(b"measured")
+        monkeypatch.setattr(workflow, "read_sessions", lambda *_: {source: session})
+        monkeypatch.chdir(tmp_path)
+        output = tmp_path / "model2.yaml"
+        parent = shipped_file("config/palmieri2015_model.yaml")
+        run = Run("extend ...", "2026-01-01T00:00:00+00:00")
+        return extend_model(parent, addition, Recordings([source], {}), output, run), output
+
+    return run
+
+
+def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
+    addition = FormulaEffect(
+        "sag", "link_2", [0, 0, 0, 1, 0, 0], "sag_mdeg * tanh(W_fz / soft_N)", {"soft_N": 0.5}
+    )
+    true = addition.effect([]).with_values({"sag_mdeg": 150.0, "soft_N": 0.2})
+    found, output = extend_by(addition, session_of(model, true))
+    size, soft = (
+        next(p for p in found.extension.own if p.key == key) for key in ("sag_mdeg", "soft_N")
+    )
+    # The sign of both together is that of neither.
+    assert abs(abs(size.value) - 150.0) < 3.5 * size.sigma
+    assert abs(abs(soft.value) - 0.2) < 3.5 * soft.sigma
+    assert size.value * soft.value > 0.0
+    (line,) = (line for line in found.lines() if "sag_mdeg  " in line)
+    assert "usual size" not in line
+    before, after = found.errors.rows.values()
+    assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
+    assert before["phi_mdeg"] > 1.5 * after["phi_mdeg"]
+    again = {effect.name: effect for effect in load_model(output).effects}["sag@link_2"]
+    assert again.law.formula.text == "sag_mdeg * tanh(W_fz / soft_N)"
+    assert again.estimates["sag_mdeg"].value == pytest.approx(size.value)
+    assert again.estimates["sag_mdeg"].sigma == pytest.approx(size.sigma)
+
+
+def test_a_formula_may_divide_by_its_parameter(model, extend_by):
+    addition = FormulaEffect(
+        "lean", "link_2", [0, 0, 0, 1, 0, 0], "lean_mdeg * theta_1 / far_deg", {"far_deg": 20.0}
+    )
+    true = addition.effect([]).with_values({"lean_mdeg": 150.0})
+    found, _ = extend_by(addition, session_of(model, true))
+    assert {each.key for each in found.extension.own} == {"lean_mdeg", "far_deg"}
+
+
+def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    addition = FileEffect("own.py:Bow@platform")
+    (tmp_path / "true").mkdir()
+    (tmp_path / "true" / "own.py").write_text(OWN)
+    planted = FileEffect(f"{tmp_path}/true/own.py:Bow@platform").effect([])
+    found, output = extend_by(
+        addition, session_of(model, planted.with_values({"bow_um_per_N": 20.0}))
+    )
+    (bow,) = found.extension.own
+    # Of any law a share is in doubt, 5 % where it does not say how much.
+    assert abs(bow.value - 20.0) < 3.0 * bow.sigma < 0.2 * bow.value
+    assert [text for text in found.extension.warnings if "usual size" not in text] == []
+    with python_laws(True):
+        again = load_model(output)
+    assert again.effects[-1].name == "bow@platform"
+    assert again.lineage[-1].recordings == {"s": file_sha256(tmp_path / "s.mcap")}
+    assert again.lineage[-1].parent_sha256 == file_sha256(
+        shipped_file("config/palmieri2015_model.yaml")
+    )
+
+
+def test_an_effect_that_is_not_there_is_added_with_a_word(model, extend_by):
+    nothing = CatalogueEffect("load_scale@load_sensor").effect([])
+    found, output = extend_by(
+        CatalogueEffect("frame_compliance@frame"), session_of(model, nothing, seed=4)
+    )
+    words = " ".join(found.extension.warnings)
+    # Some of its compliances lie on their lower bound, nothing: that is what they are.
+    assert any(each.at_bound for each in found.extension.own)
+    assert "on its bound" not in words
+    assert words.count("not told by these recordings") < 2
+    assert "does not fall beyond chance" in words or "GROWS" in words
+    assert any(line.startswith("WARNING") for line in found.lines())
+    assert "frame_compliance@frame" in {effect.name for effect in load_model(output).effects}
+
+
+def test_what_moved_in_the_base_is_told(model, extend_by):
+    """A wave over the angle that an offset alone had to stand for."""
+    wave = CatalogueEffect("encoder_eccentricity@motor_1").effect([])
+    session = session_of(model, wave.with_values({"cos_1_mdeg": 300.0}))
+    found, _ = extend_by(CatalogueEffect("encoder_eccentricity@motor_1"), session)
+    moved = {before.effect for before, _ in found.extension.base_moved}
+    assert moved == {"encoder_offset@motor_1"}
+    assert "what the effect moved in the rest of the model:" in found.lines()
+
+
+@pytest.mark.parametrize(
+    ("addition", "message"),
+    [
+        (CatalogueEffect("backlash"), "write NAME@COMPONENT"),
+        (CatalogueEffect("backlash@joint_1"), "component 'joint_1' is not one of"),
+        (CatalogueEffect("rust@joint_1"), "unknown effect 'rust'"),
+        (CatalogueEffect("encoder_offset@motor_1"), "'calibrate' fits it"),
+        (CatalogueEffect("thermal_expansion@link_1"), "temperature of ambient is missing"),
+        (FileEffect("nothing.py:Bow@platform"), "no file"),
+        (FileEffect("nothing.py:Bow"), "of your own, laws.py:Twist@platform"),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "sin(theta_1)", {}),
+            "has no parameter to fit",
+        ),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg", {"b_mdeg": 1.0}),
+            "start value of b_mdeg",
+        ),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * fzz", {}),
+            "fzz is neither a signal .* nor a covariate .*--start fzz=VALUE",
+        ),
+        (FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * (", {}), "formula"),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * mean(fz)", {}),
+            "unknown function mean; known are sin, cos",
+        ),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * __import__('os').x()", {}),
+            "only numbers, names, .* and the functions sin, cos, .* are allowed",
+        ),
+    ],
+)
+def test_what_cannot_be_added_is_one_clear_line(model, extend_by, addition, message, tmp_path):
+    session = session_of(model, CatalogueEffect("load_scale@load_sensor").effect([]))
+    with pytest.raises(InputError, match=message):
+        extend_by(addition, session)
+    assert not (tmp_path / "model2.yaml").exists()
+
+
+def test_covariates_of_the_recordings_are_no_parameters():
+    addition = FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "swell_um * humidity * fx", {})
+    effect = addition.effect(["humidity", "air"])
+    assert list(effect.estimates) == ["swell_um"]
+    assert effect.law.covariates == ("humidity",)
+
+
+@pytest.mark.slow
+def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys):
+    output, report = tmp_path / "b.yaml", tmp_path / "b.json"
+    arguments = ["--effect", "backlash@motor_2", "--fit", str(RECORDING), "-o", str(output)]
+    assert main(["extend", *arguments, "--json", str(report)]) == 0
+    told = json.loads(report.read_text())
+    assert told["before"]["rmse_phi_mdeg"] > 4.0 * told["noise"]["phi_mdeg"]
+    # Half a second at 10 Hz: of the true noise the wander stays whole.
+    shift = instrument("interferometer").shift
+    true_um = 1e6 * np.sqrt(3.0 * (shift.white**2 / 5.0 + shift.wander**2))
+    assert told["after"]["rmse_s_um"] < 1.1 * true_um
+    assert told["after"]["rmse_phi_mdeg"] < 1.2 * told["noise"]["phi_mdeg"]
+    assert "what is left is no more than the noise" in capsys.readouterr().out
+    summary = replay(RECORDING, output, tmp_path / "out.mcap")
+    assert summary.predictions == summary.joint_states > 0
+
+
+def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_by):
+    backlash = CatalogueEffect("backlash@motor_1")
+    session = session_of(model, backlash.effect([]).with_values({"width_mdeg": 60.0}))
+    notes = {"calibrated": [*SET_UP, *BUILT, "encoder_offset"]}
+    found, output = extend_by(backlash, replace(session, notes=notes))
+    (width,) = found.extension.parameters
+    assert abs(width.value - 60.0) < 3.0 * width.sigma < 0.25 * width.value
+    before, after = found.errors.rows.values()
+    assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
+    assert before["phi_mdeg"] > 2.0 * after["phi_mdeg"]
+    assert [effect.name for effect in load_model(output).effects] == ["backlash@motor_1"]
+    with pytest.raises(InputError, match="nothing is left to calibrate: .*'calibrated'"):
+        calibrate(model, [replace(session, notes=notes)])
+
+
+@pytest.mark.parametrize(
+    ("words", "direction"),
+    [
+        (["along +z"], [0, 0, 1, 0, 0, 0]),
+        (["along", "y"], [0, 1, 0, 0, 0, 0]),
+        (["about -x"], [0, 0, 0, -1, 0, 0]),
+        (["about (-0.38, -0.88, 0.29)"], [0, 0, 0, -0.3795, -0.8787, 0.2896]),
+        (["along (1, -2, 2)"], [1 / 3, -2 / 3, 2 / 3, 0, 0, 0]),
+        (["along", "0.6", "0", "-0.8"], [0.6, 0, -0.8, 0, 0, 0]),
+        (["0", "0", "1e-6", "-1", "0", "0"], [0, 0, 1e-6, -1, 0, 0]),
+    ],
+)
+def test_a_direction_is_taken_in_the_words_of_compare(words, direction):
+    assert direction_of(words) == pytest.approx(direction, abs=1e-4)
+
+
+@pytest.mark.parametrize("words", ["along (0, 0, 0)", "about (1, inf, 0)", "along nan nan nan"])
+def test_an_axis_without_a_direction_is_refused(words):
+    with pytest.raises(InputError, match="an axis of length .* has no direction"):
+        direction_of([words])
+
+
+@pytest.mark.parametrize(
+    "words", ["", "up", "along", "along +w", "along 1 2", "about 1 2 3 4", "1 2 3", "0 0 1 0 0 z"]
+)
+def test_a_direction_that_is_none_is_one_line(words):
+    with pytest.raises(InputError, match="write six numbers .* or as compare says 'along"):
+        direction_of(words.split())
+
+
+@pytest.mark.parametrize(
+    ("screw", "kind"),
+    [([0, 0, -1, 0, 0, 0], "along"), ([0, 0, 0, 0.6, 0, -0.8], "about")],
+    ids=["shift", "turn"],
+)
+def test_what_compare_prints_is_what_extend_takes(model, extend_by, screw, kind):
+    """A plate moves with the humidity; the sentence's own words name its direction."""
+    true = FormulaEffect("plate", "frame", screw, f"plate_{UNIT[kind]} * humidity", {}).effect(
+        ["humidity"]
+    )
+    session = session_of(model, true.with_values({f"plate_{UNIT[kind]}": 2.0}))
+    found = compare_models([("m", model)], [session])
+    (told,) = (t for t in sentences(found.models[0].explained) if "depends on humidity" in t)
+    words = re.search(rf"{kind} (\(.*?\)|[+-][xyz])", told)[0]
+    assert direction_of([words]) == pytest.approx(screw, abs=0.07)
+    addition = FormulaEffect(
+        "plate", "frame", direction_of([words]), f"plate_{UNIT[kind]} * humidity", {}
+    )
+    extended, _ = extend_by(addition, session)
+    (size,) = extended.extension.own
+    assert size.value == pytest.approx(2.0, rel=0.05)
+
+
+UNIT = {"along": "um", "about": "mdeg"}

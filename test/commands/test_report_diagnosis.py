@@ -1,0 +1,170 @@
+"""The page of a diagnosis made by hand: everything of the result is on it, in words."""
+
+import re
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wrist_stiffness.commands import diagnose
+from wrist_stiffness.commands.diagnose import Diagnosed
+from wrist_stiffness.commands.provenance import Provenance, Run
+from wrist_stiffness.commands.read_sessions import Recordings
+from wrist_stiffness.comparing.explained import explain
+from wrist_stiffness.inference import Diagnosis, Finding, Observations
+from wrist_stiffness.inference.answer import NotExcited, Standing
+from wrist_stiffness.report.diagnosis_report import Shown, report_of_diagnosis
+from wrist_stiffness.report.page import html_of
+from wrist_stiffness.sessions.observing import QUANTITIES
+from wrist_stiffness.shipped import shipped_file
+
+FINDING = Finding(
+    (("joint_clearance", "joint_3", 0.8), ("joint_clearance", "joint_4", 0.2)),
+    0.993,
+    {"clearance_um": (12.1, 0.4)},
+    123.4,
+    0.98,
+    {"s_um": (3.2, 0.3), "phi_mdeg": (14.0, 2.0)},
+    "needs_signal",
+    "joint_3 has play",
+    "rock it by hand",
+)
+RESULT = Diagnosis(
+    "effect",
+    0.993,
+    {"s_um": 1.2, "phi_mdeg": 6.3},
+    {"s_um": 0.0, "phi_mdeg": 0.0},
+    {"s_um": 7.5, "phi_mdeg": 20.0},
+    {"s_um": 1.3, "phi_mdeg": 6.5},
+    (FINDING,),
+    (),
+    {},
+    0.0,
+    (
+        Standing("joint_clearance@joint_3", 0.8, 123.4, True, ""),
+        Standing("creep@joint_1", 0.0, 2.1, False, "others explain far more, to first order"),
+    ),
+    (
+        NotExcited("creep", "joint_2", "hold a load for 60 s"),
+        NotExcited("creep", "joint_5", "hold a load for 60 s"),
+    ),
+    ("registration: 700 um of s",),
+    "another session",
+    ("the time was over",),
+)
+
+
+@pytest.fixture(scope="module")
+def observations():
+    rng = np.random.default_rng(0)
+    n = 120
+    names = ("theta_1", "theta_2", "fx", "fy", "fz", "mx", "my", "mz", "held_s", "moment")
+    conditions = {name: rng.uniform(0.1, 1.0, n) for name in names}
+    conditions |= {f"approach_{motor}": rng.choice([-1.0, 1.0], n) for motor in (1, 2)}
+    conditions |= {"speed_1": np.zeros(n), "speed_2": np.zeros(n)}
+    conditions |= {"force": rng.uniform(0, 1, n), "loaded_at_rest": rng.integers(0, 2, n) * 1.0}
+    conditions["time_s"] = 3.0 * np.arange(n)
+    scatter = np.repeat([1e-6, 1e-4], 3)
+    values = scatter * rng.normal(size=(n, 6))
+    values[:, 2] += 5e-6 * conditions["approach_1"]
+    time = conditions["time_s"]
+    return Observations(values, conditions, np.diag(scatter**2), time, quantities=QUANTITIES)
+
+
+MISTAKE = "Look at the set-up first: with the load's sign turned the error falls from 9 to 1 um"
+
+
+class Units:
+    """What is asked of a session beside its table: the scatter of one measurement."""
+
+    wander, white = np.zeros(6), np.repeat([1e-6, 1e-4], 3)
+
+    def __init__(self, n):
+        self.measured = np.ones(n, dtype=bool)
+
+    def __len__(self):
+        return len(self.measured)
+
+
+def page_of(result, observations, notes=(), mistake=""):
+    n = observations.n_units
+    registration = np.broadcast_to(np.diag(np.repeat(1e-3, 6)), (n, 6, 6))
+    weights = np.full((n, 6), 1.0 / np.repeat([1e-6, 1e-4], 3) ** 2)
+    left = explain(observations, [Units(n)], registration, np.zeros(6), weights)
+    shown = Shown(left, 0.1 * observations.values)
+    provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
+    told = (mistake, notes, provenance)
+    page = report_of_diagnosis(result, shown, ["monday"], *told)
+    return unescape(html_of(page))
+
+
+def test_everything_of_a_finding_is_on_the_page(observations):
+    page = page_of(RESULT, observations, ["monday: 5 spikes"])
+    for words in (
+        "Missing in the model: joint_clearance@joint_3 (80 %; or joint_clearance@joint_4 20 %), "
+        "99.3 % sure.",
+        "s from 7.5 to 1.3 µm (instrument noise 1.2)",
+        "joint_3 has play",
+        "To be sure: rock it by hand",
+        "12.10 ± 0.40",
+        "3.20 ± 0.30 µm",
+        "the nodes can correct it where they get its signal",
+        "another session",
+        "registration: 700 µm of s",
+        "the time was over",
+        "others explain far more, to first order",
+        "monday: 5 spikes",
+        "creep at joint_2, creep at joint_5",
+        "hold a load for 60 s",
+        "When motor 1 is approached",
+    ):
+        assert words in page, words
+    # The fall, and the residual against its condition.
+    assert page.count("data:image/svg+xml") == 2
+    assert re.search(r"log evidence against the model without it\W+td\W+td\W+\+123", page)
+
+
+def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
+    """No effect is as large, and whatever is named stands in for it."""
+    page = page_of(RESULT, observations, mistake=MISTAKE)
+    assert 0 < page.index("Look at the set-up first") < page.index("Missing in the model")
+    answer = SimpleNamespace(diagnosis=RESULT, absorbed=())
+    provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
+    told = Diagnosed(answer, ("monday",), MISTAKE, (), provenance)
+    assert told.lines()[:2] == [MISTAKE, ""]
+    assert told.lines()[2].startswith("Missing in the model")
+    assert told.as_values()["set_up_mistake"] == MISTAKE
+
+
+@pytest.mark.parametrize(("left", "asked"), [(1.9, 0), (2.1, 1)])
+def test_a_mistake_is_looked_for_where_much_is_left(monkeypatch, left, asked):
+    """It takes seconds of a long recording, and what effects explain was no mistake."""
+    noise = {"s_um": 1.0, "phi_mdeg": 5.0}
+    result = replace(RESULT, noise=noise, after={"s_um": 1.0, "phi_mdeg": 5.0 * left})
+    found = SimpleNamespace(diagnosis=result, absorbed=())
+    done = []
+    monkeypatch.setattr(diagnose, "diagnose_sessions", lambda *_, **__: found)
+    monkeypatch.setattr(diagnose, "suspicion_in", lambda *_: done.append(1))
+    monkeypatch.setattr(diagnose, "told_mistake", lambda _: MISTAKE)
+    recordings = Recordings([Path(__file__).parents[1] / "data" / "wrist_b.mcap"], {})
+    model = shipped_file("config/palmieri2015_model.yaml")
+    told = diagnose.diagnose_recordings(model, recordings, Run("diagnose", "2026-01-01"))
+    assert (len(done), told.mistake) == (asked, MISTAKE if asked else "")
+
+
+def test_nothing_missing_is_said_first(observations):
+    page = page_of(replace(RESULT, verdict="none", findings=()), observations)
+    assert "Nothing is missing: what is left is noise" in page
+    assert "Missing in the model" not in page
+
+
+def test_unknown_tells_on_what_it_depends(observations):
+    left = {"s_um": 3.0, "phi_mdeg": 9.0}
+    rest = replace(RESULT, findings=(), depends_on={"humidity": 0.7, "the speed": 0.3})
+    page = page_of(replace(rest, verdict="unknown", discrepancy=left), observations)
+    assert "no effect in the catalogue explains it" in page
+    assert "It depends on humidity (70 %), the speed (30 %)." in page
+    assert "Left above the noise: s 3 µm, phi 9 mdeg." in page

@@ -1,0 +1,78 @@
+"""What a diagnosis says in words."""
+
+from dataclasses import replace
+
+import pytest
+
+from wrist_stiffness.comparing.sentences import percent
+from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.report.verdict import class_of, correction_of, verdict_lines
+
+GROWTH = Finding(
+    (("thermal_expansion", "platform", 1.0),), 0.97, {}, 25.0, 0.9, {}, "no", "it grows", ""
+)
+SIZES = {"s_um": 1.0, "phi_mdeg": 3.0}
+
+
+def answer(verdict, findings=(), depends_on=None, probability=0.97):
+    return Diagnosis(
+        verdict,
+        probability,
+        SIZES,
+        {"s_um": 4.0, "phi_mdeg": 8.0} if depends_on else {"s_um": 0.0, "phi_mdeg": 0.0},
+        SIZES,
+        SIZES,
+        tuple(findings),
+        (),
+        depends_on or {},
+        0.3 if depends_on else 0.0,
+        (),
+        (),
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.004, "under 1 %"), (0.07, "7 %"), (0.97, "97 %"), (0.995, "99.5 %"), (1.0, "over 99.9 %")],
+)
+def test_no_probability_is_rounded_to_certainty(share, words):
+    assert percent(share) == words
+
+
+def test_nothing_missing_says_how_sure_that_is():
+    (line,) = verdict_lines(answer("none"))
+    assert line == "Nothing is missing: what is left is noise (97 % sure)."
+
+
+def test_what_is_named_comes_with_its_probability_and_with_what_is_left():
+    lines = verdict_lines(answer("effect", [GROWTH], {"the load": 0.8, "the speed": 0.2}))
+    assert lines[0] == "Missing in the model: thermal_expansion@platform, 97 % sure."
+    assert lines[1] == (
+        "Left above the noise: s 4 um, phi 8 mdeg. It depends on the load (80 %), the speed (20 %)."
+    )
+
+
+@pytest.mark.parametrize(
+    ("depends_on", "words"),
+    [
+        ({"the pose": 1.0}, "The error is real, but no effect in the catalogue explains it."),
+        ({}, "An effect is missing, but these recordings do not say which."),
+    ],
+)
+def test_unknown_is_an_error_without_a_name_or_a_name_without_an_answer(depends_on, words):
+    assert verdict_lines(answer("unknown", (), depends_on))[0] == words
+
+
+def test_the_members_of_a_class_have_their_shares():
+    members = (("creep", "joint_1", 0.6), ("creep", "joint_2", 0.4))
+    assert class_of(replace(GROWTH, members=members)) == (
+        "creep@joint_1 (60 %; or creep@joint_2 40 %)"
+    )
+
+
+def test_why_nothing_can_be_corrected_is_told_apart():
+    assert "only the manipulator" in correction_of(GROWTH)
+    drift = replace(GROWTH, members=(("drift", "pose_sensor", 1.0),))
+    assert "in the instrument" in correction_of(drift)
+    assert "its signal" in correction_of(replace(GROWTH, compensable="needs_signal"))
+    assert correction_of(replace(GROWTH, compensable="yes")) == "the nodes can correct it"

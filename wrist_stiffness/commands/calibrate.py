@@ -1,0 +1,178 @@
+"""Fit a model to one wrist as it was set up, and write it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from wrist_stiffness.atomic_file import require_room
+from wrist_stiffness.commands.provenance import Run
+from wrist_stiffness.commands.read_sessions import (
+    Recordings,
+    read_sessions,
+    was_fitted_to,
+)
+from wrist_stiffness.comparing.compare import suspicion_in
+from wrist_stiffness.comparing.wiring import told_mistake
+from wrist_stiffness.comparing.wrong_load import doubts_load, wrong_load
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.calibration import Calibration, calibrate
+from wrist_stiffness.identification.free_effects import unfitted
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.report.fit_report import (
+    Errors,
+    far_lines,
+    fit_values,
+    left_lines,
+    parameter_values,
+    told_lines,
+    untold_lines,
+    used_lines,
+)
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A calibration and what it was made from.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What was found.
+    sessions : tuple of MeasuredSession
+        What was measured, in the order of time.
+    output : Path
+        The model file that was written.
+    mistake : str
+        Of signs, units or names, where one explains most of what is left; else empty.
+    """
+
+    calibration: Calibration
+    sessions: tuple[MeasuredSession, ...]
+    output: Path
+    mistake: str
+
+    @property
+    def errors(self) -> Errors:
+        """Before and after."""
+        found = self.calibration
+        rows = {"model as it stands": found.before, "calibrated": found.after}
+        return Errors(rows, found.fit)
+
+    def lines(self) -> list[str]:
+        """Return what a technician reads."""
+        found = self.calibration
+        parameters = found.parameters
+        lines = used_lines(self.sessions, found.fit)
+        lines += ["", *self.errors.lines(), *left_lines(found.fit, found.judged_by)]
+        lines += [self.mistake] if self.mistake else []
+        for session in self.sessions:
+            own = told_lines(each for each in parameters if each.session == session.name)
+            lines += ["", f"set up in {session.name}:", *(own or ["  nothing that the data tell"])]
+        wrist = told_lines(each for each in parameters if each.session is None)
+        lines += ["", "of this wrist:", *(wrist or ["  nothing that the data tell"])]
+        for title, part in (
+            ("farther off than usual:", far_lines(found.fit, parameters)),
+            ("not told by these recordings:", untold_lines(found.fit, parameters)),
+        ):
+            lines += ["", title, *part] if part else []
+        if found.calibrated:
+            lines += ["", f"not fitted, calibrated as the notes say: {', '.join(found.calibrated)}"]
+        return lines
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        found = self.calibration
+        return {
+            **fit_values(self.errors, found.judged_by, self.sessions, found.fit),
+            "set_up_mistake": self.mistake,
+            "calibrated_otherwise": list(found.calibrated),
+            "parameters": parameter_values(found.parameters),
+        }
+
+
+def calibrate_model(
+    model: str | Path,
+    recordings: Recordings,
+    output: str | Path,
+    run: Run,
+    progress: Progress = silent,
+    asking: Progress = silent,
+) -> Calibrated:
+    """Fit a model to recordings and write it as it holds for the newest one.
+
+    Parameters
+    ----------
+    model : path
+        Model file.
+    recordings : Recordings
+        With measured poses, of one wrist.
+    output : path
+        Model file to write.
+    run : Run
+        For the lineage.
+    progress : callable
+        Told steps done and steps at most.
+    asking : callable
+        The same of a second fit, where a mistake of the load is likely.
+
+    Returns
+    -------
+    Calibrated
+        What was found.
+
+    Raises
+    ------
+    WristError
+        If a file cannot be read, used or written; then no model is written.
+    """
+    output = writable(output)
+    parent = load_model(model)
+    sessions = read_sessions(recordings, [parent], progress)
+    step = run.step(model, sessions)
+    again = was_fitted_to(parent, sessions)
+    found = calibrate(parent, tuple(sessions.values()), progress, again)
+    child = replace(found.model, lineage=(*parent.lineage, step))
+    calibrated = Calibrated(found, tuple(sessions.values()), output, "")
+    start = unfitted(parent) if again else parent
+    calibrated = replace(calibrated, mistake=_mistake(start, child, calibrated, asking))
+    save_model(child, output)
+    return calibrated
+
+
+def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, asking: Progress) -> str:
+    """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
+
+    What is wrong with positions or angles shows in the model as it was; what is wrong with the load
+    hides there behind axes that are a little off their drawing.
+    """
+    sessions, mistake, much = calibrated.sessions, "", calibrated.calibration.fit.rough
+    if much:
+        mistake = told_mistake(suspicion_in(start, sessions))
+    if not mistake and (much or doubts_load(calibrated.calibration)):
+        mistake = wrong_load(start, child, sessions, calibrated.calibration, asking)
+    return mistake
+
+
+def writable(output: str | Path) -> Path:
+    """Return the path of a model to write, so that no fit ends in a typing error.
+
+    Raises
+    ------
+    InputError
+        If its folder does not exist or takes no file, it is a folder, or its name is that of a
+        recording.
+    """
+    output = Path(output)
+    if not output.parent.is_dir():
+        raise InputError(f"{output}: there is no folder {output.parent}")
+    if output.is_dir():
+        raise InputError(f"{output}: cannot be written: it is a folder")
+    if output.suffix == ".mcap":
+        raise InputError(f"{output}: a model is no recording; choose another name")
+    require_room(output)
+    return output

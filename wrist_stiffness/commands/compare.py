@@ -1,0 +1,218 @@
+"""How far models are off from recordings, where and under which condition."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.commands.provenance import Provenance, Run
+from wrist_stiffness.commands.read_sessions import (
+    Recordings,
+    read_sessions,
+    sha256_by_name,
+    was_fitted_to,
+)
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, Size
+from wrist_stiffness.comparing.sentences import sentences
+from wrist_stiffness.comparing.wiring import WORTH_ASKING
+from wrist_stiffness.comparing.worst_poses import WorstPose, worst_poses
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A comparison and what it was made from.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What was found.
+    border : (b, 2) float
+        Motor angles on the border of the operative workspace [rad].
+    remarks : tuple of str
+        What could not be used of the recordings.
+    fitted_here : tuple of str
+        Models that were fitted to one of these very recordings.
+    as_drawn : bool
+        Whether the last model was never fitted to any recording.
+    provenance : Provenance
+        Files and versions.
+    """
+
+    comparison: Comparison
+    border: Array
+    remarks: tuple[str, ...]
+    fitted_here: tuple[str, ...]
+    as_drawn: bool
+    provenance: Provenance
+
+    def worst(self, model: ComparedModel) -> tuple[WorstPose, ...]:
+        """Return the poses at which a model fails worst."""
+        found = self.comparison
+        return worst_poses(model.refitted, found.noise, found.sessions)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the numbers."""
+        fitted = tuple(
+            f"{name} was fitted to one of these recordings: its error here flatters it"
+            for name in self.fitted_here
+        )
+        last, found = self.comparison.models[-1], self.comparison
+        if not self.as_drawn or found.over_noise(last) < WORTH_ASKING:
+            return (*self.remarks, *fitted)
+        drawn = (
+            f"{last.name} was never fitted to a wrist, and each is built a little off its drawing: "
+            "calibrate first, then compare again"
+        )
+        return (*self.remarks, *fitted, drawn)
+
+    def lines(self) -> list[str]:
+        """Return the answer for a terminal."""
+        found = self.comparison
+        out = [*found.verdict, "", *self._table()]
+        last = found.models[-1]
+        out += ["", f"{last.name}: on what the error depends"]
+        out += [f"  - {sentence}" for sentence in sentences(last.explained)]
+        out += ["", f"{last.name}: worst poses", *self._worst_lines(last)]
+        if self.notes:
+            out += ["", *(f"note: {note}" for note in self.notes)]
+        return out
+
+    def _table(self) -> list[str]:
+        found = self.comparison
+        wide = max(38, *(len(model.name) + 4 for model in found.models))
+        keys = [q.key for q in found.quantities]
+        heads = "".join(f"{f'{q.name} [{q.unit}]':>29}" for q in found.quantities)
+        out = [" " * wide + heads, " " * wide + f"{'mean':>11}{'RMS':>9}{'max':>9}" * len(keys)]
+        for title, stage in (
+            ("as it stands", "before"),
+            ("registrations, zeros, tare refitted", "after"),
+        ):
+            out.append(title)
+            for model in found.models:
+                sizes: dict[str, Size] = getattr(model, stage)
+                cells = "".join(
+                    f"{_shown(sizes[k].mean, 4):>11}{_shown(sizes[k].rms, 4):>9}"
+                    f"{_shown(sizes[k].maximum, 4):>9}"
+                    for k in keys
+                )
+                out.append(f"  {model.name:{wide - 2}}{cells}")
+        for title, level in self.levels():
+            cells = "".join(f"{'':11}{_shown(level[k], 4):>9}{'':9}" for k in keys)
+            out.append(f"{title:{wide}}{cells}".rstrip())
+        return out
+
+    def levels(self) -> list[tuple[str, dict[str, float]]]:
+        """Return what the errors are to be compared with, by name."""
+        found, last = self.comparison, self.comparison.models[-1].explained
+        levels = [
+            ("above noise and drift", last.above),
+            ("instrument noise", last.noise),
+            ("drift of the instrument", last.drift),
+        ]
+        if found.repeated_by_side:
+            levels.append(("repeatability, from the same side", found.repeated_by_side))
+        if found.repeated:
+            levels.append(("repeatability, from any side", found.repeated))
+        return [*levels, ("laws of the conditions, unseen part", found.reachable)]
+
+    def _worst_lines(self, model: ComparedModel) -> list[str]:
+        keys = [q.key for q in self.comparison.quantities]
+        titles = "".join(f"{f'{q.name} [{q.unit}]':>13}" for q in self.comparison.quantities)
+        out = [f"{'time [s]':>10}{'motors [deg]':>18}{'force [N]':>24}{titles}  session"]
+        for pose in self.worst(model):
+            motors = " ".join(f"{angle:.1f}" for angle in pose.theta_deg)
+            force = " ".join(f"{value:.2f}" for value in np.round(pose.load[:3], 2) + 0.0)
+            errors = "".join(f"{_shown(pose.errors[key], 3):>13}" for key in keys)
+            out.append(f"{pose.time_s:10.1f}{motors:>18}{force:>24}{errors}  {pose.session}")
+        return out
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        values = self.comparison.as_values()
+        for model, own in zip(self.comparison.models, values["models"], strict=True):
+            own["worst_poses"] = [pose.as_values() for pose in self.worst(model)]
+        return {
+            **values,
+            "notes": list(self.notes),
+            "provenance": self.provenance.as_values(),
+        }
+
+
+def compare(
+    models: Sequence[str | Path],
+    recordings: Recordings,
+    run: Run,
+    progress: Callable[[str], Progress] = lambda label: silent,
+) -> Compared:
+    """Compare models with recordings of one wrist.
+
+    Parameters
+    ----------
+    models : sequence of path
+        Model files, the one to be improved upon first.
+    recordings : Recordings
+        Each a session.
+    run : Run
+        For the report.
+    progress : callable
+        From a label to a function that is told steps done and in all.
+
+    Returns
+    -------
+    Compared
+        Errors, on what they depend, worst poses.
+
+    Raises
+    ------
+    WristError
+        If a model or a recording cannot be used.
+    """
+    names = unique_names(models)
+    loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]
+    table = loaded[0][1].table
+    sessions = read_sessions(recordings, [model for _, model in loaded], progress("reading"))
+    comparison = compare_models(loaded, list(sessions.values()), progress("comparing"))
+    hashes = sha256_by_name(sessions)
+    fitted_here = tuple(name for name, model in loaded if was_fitted_to(model, sessions))
+    files = {name: file_sha256(path) for name, path in zip(names, models, strict=True)}
+    return Compared(
+        comparison,
+        table.workspace.operative_border,
+        remarks_of(sessions.values()),
+        fitted_here,
+        not loaded[-1][1].lineage,
+        Provenance(run.command, run.date, files, hashes),
+    )
+
+
+def unique_names(paths: Sequence[str | Path]) -> list[str]:
+    """Return file names without suffix, whole paths where two are alike."""
+    stems = [Path(path).stem for path in paths]
+    count = Counter(stems)
+    return [
+        stem if count[stem] == 1 else str(path) for stem, path in zip(stems, paths, strict=True)
+    ]
+
+
+def _shown(value: float, digits: int) -> str:
+    """Return a number without an exponent, so that columns stay apart; "-" for what is unknown."""
+    if isnan(value):
+        return "-"
+    return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.{digits}g}"
+
+
+def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
+    """Return what the sessions say of themselves, each with its session's name."""
+    return tuple(f"{session.name}: {remark}" for session in sessions for remark in session.remarks)

@@ -1,0 +1,249 @@
+"""A recording becomes a campaign's table: one measured pose, one row."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import compress
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording.samples import Samples
+from wrist_stiffness.sessions.reading.csv_columns import (
+    LOAD,
+    MOTORS,
+    POSITION,
+    QUATERNION,
+    TIME,
+    Columns,
+    column_of,
+    marker_columns,
+    seconds,
+    writer_of,
+)
+from wrist_stiffness.sessions.reading.machine_signals import machine_signals
+from wrist_stiffness.sessions.reading.pose_track import (
+    base_transform,
+    last_of_equal,
+    measured_components,
+)
+from wrist_stiffness.sessions.reading.refusals import require_topics
+from wrist_stiffness.sessions.reading.session import notes_of, path_stamps
+from wrist_stiffness.sessions.reading.signals import Stamps
+from wrist_stiffness.sessions.reading.static_frames import frames_of
+from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
+from wrist_stiffness.topics import MOTOR_COMMANDS
+
+ROWS_A_REPORT = 1000
+
+LONGEST_HEAD = 100_000
+"""Bytes in which a table's first line ends; another kind of file may have no line at all."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    rows : int
+        Measured poses in it.
+    turns : int
+        Rows without a measured value: where the wrist or its load turned back between poses.
+    remarks : tuple of str
+        What was left out of it.
+    """
+
+    path: Path
+    rows: int
+    turns: int
+    remarks: tuple[str, ...]
+
+
+def export_csv(
+    recording: str | Path,
+    output: str | Path,
+    table: Table,
+    *,
+    remaps: Mapping[str, str] | None = None,
+    settings: StreamSettings | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> Exported:
+    """Write the measured poses of a recording with the signals that belong to them as a table.
+
+    The numbers are those of the recording, in shortest form: importing the table gives them again
+    to the bit.  Nothing is taken for an outlier and no clock is put right.  Where poses are far
+    apart, rows without a measured value tell the way that friction and play remember.
+
+    Parameters
+    ----------
+    recording : path
+        rosbag2 folder with MCAP storage, or `.mcap` file.
+    output : path
+        CSV file.
+    table : Table
+        Of the wrist: turns loads that are measured on the platform into F, and knows how small a
+        swing of a motor is the chatter of a count.
+    remaps : mapping, optional
+        Actual by standard topic name.
+    settings : StreamSettings, optional
+        Joint names, sensor frames and age limit of loads.
+    overwrite : bool
+        Replace an existing file.
+    progress : callable
+        Told rows done and in all.
+
+    Returns
+    -------
+    Exported
+        Counts.
+
+    Raises
+    ------
+    InputError
+        If the output exists, is no table, or cannot be written.
+    WristError
+        If the recording cannot be read, lacks a topic or has a frame that is not known.
+    """
+    settings = settings or StreamSettings()
+    output = Path(output)
+    _require_place(output, overwrite)
+    source = open_recording(recording)
+    joints = (settings.motors.motor_1, settings.motors.motor_2)
+    samples = read_samples(source, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
+    require_topics(source, samples, remaps or {})
+    notes, _ = notes_of(samples)
+    known = frames_of(source, remaps or {}, settings.frames)
+    try:
+        machine = machine_signals(samples, known.frames)
+        time_ns, measured, names, markers = _measured(samples, known.frames)
+    except FrameError as error:
+        raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error
+    usable, unknown = machine.usable(time_ns, settings.load_age_limit_s)
+    remarks = (*known.remarks, *unknown)
+    if not usable.any():
+        raise InputError(f"{source.path}: no measured pose can be used: {'; '.join(remarks)}")
+    pose_ns = time_ns[usable]
+    way_ns = path_stamps(machine, pose_ns, table, settings.load_age_limit_s)
+    time_ns = np.union1d(pose_ns, way_ns)
+    seen = np.full((len(time_ns), measured.shape[1]), np.nan)
+    seen[np.searchsorted(time_ns, pose_ns)] = measured[usable]
+    block = machine.at(time_ns)
+    load = block.load
+    if block.load_on_platform:
+        load = (block_diagonal(rigid_rotation(table, block.theta)) @ load[..., None])[..., 0]
+    columns = Columns(
+        True,
+        names,
+        markers,
+        {component: f"T_{component}_degC" for component in sorted(block.temperatures)},
+        {name: column_of(name) for name in sorted(block.covariates)},
+    )
+    values = {
+        **dict(zip(MOTORS, block.theta.T, strict=True)),
+        **dict(zip(LOAD, load.T, strict=True)),
+        **dict(zip(names or marker_columns(markers), seen.T, strict=True)),
+        **{columns.temperatures[name]: value for name, value in block.temperatures.items()},
+        **{columns.covariates[name]: value for name, value in block.covariates.items()},
+    }
+    zero_ns = notes.get("time_zero_ns", 0)
+    _write(
+        output, columns, time_ns - (zero_ns if isinstance(zero_ns, int) else 0), values, progress
+    )
+    if source.damage:
+        remarks = (f"the recording is damaged: {source.damage}", *remarks)
+    if len(samples.frame_poses.time_ns):
+        remarks = (*remarks, "the frame's poses have no columns: its motion stays in")
+    return Exported(output, len(pose_ns), len(time_ns) - len(pose_ns), remarks)
+
+
+def _require_place(output: Path, overwrite: bool) -> None:
+    """Refuse to replace unasked, or what is no table: the recording itself, a model."""
+    if output.suffix == ".mcap":
+        raise InputError(f"{output}: a table is no recording; choose another name")
+    if not output.is_file():
+        return
+    if not overwrite:
+        raise InputError(
+            f"{output} exists already and is not overwritten; choose another name or remove it"
+        )
+    try:
+        with output.open("rb") as old:
+            head = old.readline(LONGEST_HEAD)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be replaced: {error.strerror}") from error
+    if head and TIME.encode() not in head:
+        raise InputError(f"{output} is no earlier table: it is not replaced")
+
+
+def _measured(samples: Samples, frames: Frames) -> tuple[Stamps, Array, tuple[str, ...], int]:
+    """Return stamps, what was measured in F (n, columns) with NaN, pose columns, marker count."""
+    if len(samples.poses.time_ns) == 0:
+        found = samples.markers
+        turn, origin = base_transform(found.frame_id, "measured markers", frames)
+        points = found.position
+        if not _is_identity(turn, origin):
+            points = points @ turn.T + origin
+        order = last_of_equal(found.time_ns)
+        values = points.reshape(len(points), -1)
+        return found.time_ns[order], values[order], (), points.shape[1]
+    poses = samples.poses
+    turn, origin = base_transform(poses.frame_id, "measured pose", frames)
+    position, quaternion = measured_components(poses)
+    if not _is_identity(turn, origin):
+        position = position @ turn.T + origin
+        turned = np.isfinite(quaternion).all(axis=1)
+        product = Rotation.from_matrix(turn) * Rotation.from_quat(quaternion[turned])
+        quaternion[turned] = product.as_quat(canonical=True)
+    values = np.hstack([position, quaternion])
+    # One blank component is a lost beam, a whole blank column an instrument that has none.
+    there = [bool(np.isfinite(column).any()) for column in values.T]
+    order = last_of_equal(poses.time_ns)
+    names = tuple(compress((*POSITION, *QUATERNION), there))
+    return poses.time_ns[order], values[:, there][order], names, 0
+
+
+def _is_identity(turn: Array, origin: Array) -> bool:
+    return bool(np.all(turn == np.eye(3)) and np.all(origin == 0.0))
+
+
+def _write(
+    output: Path,
+    columns: Columns,
+    time_ns: Stamps,
+    values: Mapping[str, Array],
+    progress: Progress,
+) -> None:
+    names = columns.names[1:]
+    writers = [writer_of(name) for name in names]
+    table = np.stack([values[name] for name in names], axis=1)
+    try:
+        with replacing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:
+            lines = csv.writer(stream, lineterminator="\n")
+            lines.writerow((TIME, *names))
+            for done, (stamp, row) in enumerate(zip(time_ns.tolist(), table, strict=True)):
+                cells = [
+                    "" if value != value else write(value)
+                    for write, value in zip(writers, row.tolist(), strict=True)
+                ]
+                lines.writerow((seconds(stamp), *cells))
+                if done % ROWS_A_REPORT == 0:
+                    progress(done, len(table))
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written: {error.strerror}") from error
+    progress(len(table), len(table))

@@ -1,0 +1,314 @@
+"""Add one effect to a model, fit it, and write the new model."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from wrist_stiffness.commands.calibrate import writable
+from wrist_stiffness.commands.provenance import Run
+from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.extension import Extension, extend
+from wrist_stiffness.identification.free_effects import unfitted
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula import names_in
+from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
+from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.model.parameters import Estimate, has_unit
+from wrist_stiffness.model.registry import find_law, law_from_file
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.report.fit_report import (
+    Errors,
+    fit_values,
+    left_lines,
+    parameter_values,
+    plus_minus,
+    told_lines,
+    used_lines,
+)
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+
+KINDS = ("along", "about")
+AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
+"""How `compare` names directions."""
+
+MOST_MOVED = 8
+"""Parameters of the base that are told of, those that moved farthest."""
+
+
+class Addition(Protocol):
+    """What to add."""
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect; `covariates` are those that all recordings have."""
+
+
+@dataclass(frozen=True)
+class CatalogueEffect:
+    """A law of the catalogue or of another package, `NAME@COMPONENT`."""
+
+    name: str
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect at its component."""
+        law, component = at_component(self.name)
+        return Effect(find_law(law), component)
+
+
+@dataclass(frozen=True)
+class FileEffect:
+    """A user's own law, `FILE.py:CLASS@COMPONENT`; the file is run."""
+
+    name: str
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect at its component."""
+        reference, component = at_component(self.name)
+        return Effect(law_from_file(reference, Path.cwd()), component)
+
+
+@dataclass(frozen=True)
+class FormulaEffect:
+    """A formula; what in it is neither a signal nor a covariate is a parameter.
+
+    Parameters
+    ----------
+    id : str
+        Name of the effect.
+    component : str
+        Where it is.
+    direction : sequence of 6 float
+        Screw for a value of 1, at O in the component's home frame [m, rad].
+    expression : str
+        See `model.formula_law`.
+    start : dict of str to float
+        Values of parameters from which the fit begins; 1 where there is none.
+    """
+
+    id: str
+    component: str
+    direction: Sequence[float]
+    expression: str
+    start: Mapping[str, float]
+
+    def effect(self, covariates: Sequence[str]) -> Effect:
+        """Return the effect with its start values."""
+        names = names_in(self.expression)
+        used = sorted(names & set(covariates))
+        keys = sorted(names - SIGNALS - set(covariates))
+        if unknown := sorted(self.start.keys() - set(keys)):
+            raise InputError(
+                f"{self.id}: start value of {unknown[0]}, but the formula's parameters are "
+                f"{', '.join(keys) or 'none'}"
+            )
+        if bare := [key for key in keys if key not in self.start and not has_unit(key)]:
+            raise InputError(
+                f"{self.id}: {bare[0]} is neither a signal ({', '.join(sorted(SIGNALS))}) nor a "
+                "covariate of the recordings; if it is a parameter, end its name in its unit "
+                f"({bare[0]}_um), or give --start {bare[0]}=VALUE"
+            )
+        if not keys:
+            raise InputError(
+                f"{self.id}: the formula {self.expression!r} has no parameter to fit; multiply it "
+                "by one, 'size_um * ...'"
+            )
+        direction = np.array(self.direction, dtype=float)
+        law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
+        estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
+        return Effect(law, self.component, estimates)
+
+
+def direction_of(words: Sequence[str]) -> list[float]:
+    """Return the screw that a user names: six numbers, or in the words of `compare`.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Six numbers; or "along" (a shift) or "about" (a turn) with an axis such as "+z" or three
+        numbers such as "(-0.38, -0.88, 0.29)", of which only the direction counts: `compare`
+        rounds them, and a parameter in um should be the way in um.
+
+    Returns
+    -------
+    list of 6 float
+        Translation [m], rotation [rad], for a value of 1; of length 1 where words named it.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or the three numbers are no direction.
+    """
+    text = " ".join(words)
+    kind, *rest = re.sub(r"[(),]", " ", text).split() or [""]
+    axis = AXIS.fullmatch(" ".join(rest)) if kind in KINDS else None
+    if axis:
+        size = -1.0 if axis["sign"] == "-" else 1.0
+        three = [size * (axis["name"] == name) for name in "xyz"]
+    else:
+        try:
+            three = [float(word) for word in (rest if kind in KINDS else [kind, *rest])]
+        except ValueError:
+            three = []
+    if kind in KINDS and len(three) == 3:
+        length = math.hypot(*three)
+        if not 0.0 < length < math.inf:
+            raise InputError(f"--direction {text}: an axis of length {length:g} has no direction")
+        three = [number / length for number in three]
+        return [*three, 0.0, 0.0, 0.0] if kind == "along" else [0.0, 0.0, 0.0, *three]
+    if kind in KINDS or len(three) != 6:
+        raise InputError(
+            f"--direction {text}: write six numbers (translation, rotation), or as compare says "
+            "'along +z', 'about (-0.38, -0.88, 0.29)'"
+        )
+    return three
+
+
+def at_component(text: str) -> tuple[str, str]:
+    """Split `NAME@COMPONENT`.
+
+    Raises
+    ------
+    InputError
+        If one of them is missing.
+    """
+    name, _, component = text.rpartition("@")
+    if not name or not component:
+        raise InputError(
+            f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2 or, of your own, "
+            "laws.py:Twist@platform"
+        )
+    return name, component
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """An extension and what it was made from.
+
+    Parameters
+    ----------
+    extension : Extension
+        What was found.
+    sessions : tuple of MeasuredSession
+        What was measured, in the order of time.
+    """
+
+    extension: Extension
+    sessions: tuple[MeasuredSession, ...]
+
+    @property
+    def errors(self) -> Errors:
+        """Before and after on the unseen part."""
+        found = self.extension
+        rows = {
+            name: {q.key: left.rmse(q) for q in found.quantities}
+            for name, left in (
+                ("without the effect", found.before),
+                (f"with {found.effect.name}", found.after),
+            )
+        }
+        return Errors(rows, found.fit)
+
+    def lines(self) -> list[str]:
+        """Return what a technician reads."""
+        found = self.extension
+        sentence = found.effect.law.sentence.format(place=found.effect.component)
+        lines = [*used_lines(self.sessions, found.fit), ""]
+        lines += [*self.errors.lines(), *left_lines(found.fit, found.judged_by)]
+        lines += ["", f"{found.effect.name}: {sentence}"]
+        usual = all(np.isfinite(parameter.scale) for parameter in found.effect.parameters)
+        lines += told_lines(found.own, all_of_them=True, usual=usual)
+        lines += [f"WARNING: {warning}" for warning in found.warnings]
+        moved = found.base_moved[:MOST_MOVED]
+        lines += (
+            ["", "the rest of the model moved by no more than chance"]
+            if not moved
+            else [
+                "",
+                "what the effect moved in the rest of the model:",
+                *(
+                    f"  {before.effect:30} {before.key:24}"
+                    f"{plus_minus(before.value, before.sigma):>20} -> "
+                    f"{plus_minus(after.value, after.sigma)}"
+                    for before, after in moved
+                ),
+            ]
+        )
+        return lines
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        found = self.extension
+        return {
+            **fit_values(self.errors, found.judged_by, self.sessions, found.fit),
+            "buys": {key: list(gain) for key, gain in found.bought.items()},
+            "effect": found.effect.law.id,
+            "component": found.effect.component,
+            "warnings": list(found.warnings),
+            "parameters": parameter_values(found.parameters),
+            "base_moved": [
+                {
+                    "effect": before.effect,
+                    "parameter": before.key,
+                    "session": before.session,
+                    "before": [before.value, before.sigma],
+                    "after": [after.value, after.sigma],
+                }
+                for before, after in found.base_moved
+            ],
+        }
+
+
+def extend_model(
+    model: str | Path,
+    addition: Addition,
+    recordings: Recordings,
+    output: str | Path,
+    run: Run,
+    progress: Progress = silent,
+) -> Extended:
+    """Add an effect to a model, fit it with what is there, and write the model.
+
+    Parameters
+    ----------
+    model : path
+        Model file.
+    addition : CatalogueEffect, FileEffect or FormulaEffect
+        What to add.
+    recordings : Recordings
+        With measured poses, of one wrist.
+    output : path
+        Model file to write.
+    run : Run
+        For the lineage.
+    progress : callable
+        Told steps done and steps at most.
+
+    Returns
+    -------
+    Extended
+        What was found.
+
+    Raises
+    ------
+    WristError
+        If a file cannot be read, used or written, or the effect cannot be added; then no model is
+        written.
+    """
+    output = writable(output)
+    parent = load_model(model)
+    sessions = read_sessions(recordings, [parent], progress)
+    measured = tuple(sessions.values())
+    covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
+    effect = addition.effect(sorted(covariates))
+    step = replace(run.step(model, sessions), added=effect.name)
+    known = unfitted(parent) if was_fitted_to(parent, sessions) else parent
+    found = extend(known, effect, measured, progress)
+    save_model(replace(found.model, lineage=(*parent.lineage, step)), output)
+    return Extended(found, measured)

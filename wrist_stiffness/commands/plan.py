@@ -1,0 +1,316 @@
+"""Plan an experiment and write it as a folder: table, trajectory, picture, summary."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness import topics
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.planning.earlier import as_experiment
+from wrist_stiffness.planning.information import MeasurementNoise
+from wrist_stiffness.planning.loads_file import read_loads
+from wrist_stiffness.planning.plan import Conditions, Plan, plan
+from wrist_stiffness.planning.question import Question, between, commissioning
+from wrist_stiffness.planning.rivals import read_rivals
+from wrist_stiffness.planning.timeline import Experiment, Pace, Timeline
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.recording.messages import JointTrajectory, JointTrajectoryPoint
+from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.report.pictures.experiment_plan import draw_plan
+from wrist_stiffness.report.plan_summary import summary
+
+JOINTS = ("motor_1_joint", "motor_2_joint")
+
+MDEG = float(np.radians(1e-3))
+
+COLUMNS = (
+    "time_s",
+    "motor_1_deg",
+    "motor_2_deg",
+    "approach",
+    "load",
+    *(f"{axis}_N" for axis in ("fx", "fy", "fz")),
+    *(f"{axis}_Nm" for axis in ("mx", "my", "mz")),
+    "hold_s",
+    "purpose",
+)
+
+
+LONGEST_MIN = 120.0
+"""Minutes of one experiment; planning takes 2 GB and minutes for so many."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user says of an experiment.
+
+    Parameters
+    ----------
+    minutes : float or None
+        Duration; needed for a commissioning.
+    speed_deg_per_s : float
+        Largest speed of a motor.
+    dwell_s : float
+        What one measurement at rest takes, settling included.
+    in_motion : bool
+        Whether the pose sensor measures in motion too.
+    noise_um, noise_mdeg : float
+        Standard deviation of each component of one measured pose, for a commissioning.
+    seed : int
+        The same seed gives the same plan.
+
+    Raises
+    ------
+    InputError
+        If a number is not positive or the experiment longer than `LONGEST_MIN`.
+    """
+
+    minutes: float | None
+    speed_deg_per_s: float = 30.0
+    dwell_s: float = 2.0
+    in_motion: bool = True
+    noise_um: float = 1.0
+    noise_mdeg: float = 1.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("minutes", "speed_deg_per_s", "dwell_s", "noise_um", "noise_mdeg"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"plan: {name} = {value:g} is not a positive number")
+        if self.minutes is not None and self.minutes > LONGEST_MIN:
+            raise InputError(
+                f"plan: {self.minutes:g} minutes are more than {LONGEST_MIN:g}: plan a shorter "
+                "experiment, and the next one after its diagnosis"
+            )
+        if self.seed < 0:
+            raise InputError(f"plan: seed {self.seed} is below 0")
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A plan and what to say of it.
+
+    Parameters
+    ----------
+    plan : Plan
+        The experiment.
+    text : str
+        For a technician.
+    """
+
+    plan: Plan
+    text: str
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        timeline = self.plan.timeline
+        return {
+            "schema": 1,
+            "duration_s": None if timeline is None else timeline.duration_s,
+            "dwells": [] if timeline is None else _rows(timeline),
+            "answers": [
+                {
+                    "truth": answer.goal.truth,
+                    "rival": answer.goal.rival or None,
+                    "discrimination": answer.discrimination,
+                    "settled": answer.settled,
+                    "reachable": answer.reachable,
+                }
+                for answer in self.plan.answers
+            ],
+            "cannot": dict(self.plan.cannot),
+            "uncertainty_falls_by": dict(self.plan.calibration),
+        }
+
+
+def plan_commissioning(
+    model_file: str | Path, loads: str | Path, options: Options, progress: Progress | None = None
+) -> tuple[ErrorModel, Planned]:
+    """Plan the first experiment on a wrist.
+
+    Parameters
+    ----------
+    model_file, loads : path
+        Model, and the loads that the user can apply.
+    options : Options
+        With a duration.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    ErrorModel
+        Of the file.
+    Planned
+        The plan.
+
+    Raises
+    ------
+    WristError
+        If a file is wrong, or nothing fits into the duration.
+    """
+    if options.minutes is None:
+        raise InputError("plan: --minutes says how long a commissioning may take")
+    model = load_model(model_file)
+    white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
+    noise = MeasurementNoise(white, model.table.geometry.limits.encoder_step)
+    question = commissioning(np.random.default_rng(options.seed))
+    return model, _planned(model, question, loads, noise, options, (), progress)
+
+
+def plan_between_rivals(
+    model_file: str | Path,
+    diagnosis: str | Path,
+    loads: str | Path,
+    options: Options,
+    recordings: Recordings | None = None,
+    progress: Progress | None = None,
+) -> tuple[ErrorModel, Planned]:
+    """Plan the next experiment, between the effects that a diagnosis could not tell apart.
+
+    Parameters
+    ----------
+    model_file, diagnosis, loads : path
+        Model, result of `diagnose --json`, and the loads that the user can apply.
+    options : Options
+        Without a duration it takes what it needs.
+    recordings : Recordings, optional
+        Those of the diagnosis: its rivals are fitted to them, and what it left open counts as open.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    ErrorModel
+        Of the file.
+    Planned
+        The plan.
+
+    Raises
+    ------
+    WristError
+        If a file is wrong, nothing is left to separate, or nothing fits into the duration.
+    """
+    model, rivals = load_model(model_file), read_rivals(diagnosis)
+    question = between(rivals.classes, rivals.silent, np.random.default_rng(options.seed))
+    noise = rivals.noise(model.table)
+    earlier = []
+    if recordings is not None:
+        sessions = read_sessions(recordings, [model], silent)
+        earlier = [as_experiment(model, session) for session in sessions.values()]
+    return model, _planned(model, question, loads, noise, options, earlier, progress)
+
+
+def _planned(
+    model: ErrorModel,
+    question: Question,
+    loads: str | Path,
+    noise: MeasurementNoise,
+    options: Options,
+    earlier: Sequence[Experiment],
+    progress: Progress | None,
+) -> Planned:
+    geometry = model.table.geometry
+    conditions = Conditions(
+        read_loads(loads, geometry.gravity, geometry.limits.force),
+        Pace(float(np.radians(options.speed_deg_per_s)), options.dwell_s, options.in_motion),
+        noise,
+        None if options.minutes is None else 60.0 * options.minutes,
+        options.seed,
+    )
+    found = plan(model, question, conditions, earlier, progress)
+    return Planned(found, summary(found, question))
+
+
+def write_plan(model: ErrorModel, planned: Planned, folder: str | Path) -> None:
+    """Write `plan.csv`, the recording `trajectory`, `plan.png` and `summary.txt`, all or nothing.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        For the picture.
+    planned : Planned
+        With a timeline.
+    folder : path
+        To make; its parent must exist.
+
+    Raises
+    ------
+    InputError
+        If the folder exists or cannot be written.
+    """
+    folder = Path(folder)
+    timeline = planned.plan.timeline
+    if timeline is None:
+        raise InputError(f"{folder}: there is no experiment to write")
+    if folder.exists():
+        raise InputError(
+            f"{folder} exists already and is not overwritten; choose another name or remove it"
+        )
+    partial = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    try:
+        partial.mkdir()
+        with replacing(partial / "plan.csv") as path, path.open("w", newline="") as stream:
+            table = csv.DictWriter(stream, COLUMNS)
+            table.writeheader()
+            table.writerows(_rows(timeline))
+        with RecordingWriter(partial / "trajectory") as recording:
+            recording.write(topics.MOTOR_TRAJECTORY, trajectory(timeline), 0)
+        draw_plan(model.table, timeline, partial / "plan.png")
+        (partial / "summary.txt").write_text(planned.text + "\n", encoding="utf-8")
+        os.rename(partial, folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror}") from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def trajectory(timeline: Timeline) -> JointTrajectory:
+    """Return the motors' motion.
+
+    All points are rests: a joint_trajectory_controller joins points with zero velocity and
+    acceleration by the same minimum-jerk moves.
+    """
+    rest = (0.0, 0.0)
+    points = tuple(
+        JointTrajectoryPoint(
+            positions=(float(theta[0]), float(theta[1])),
+            velocities=rest,
+            accelerations=rest,
+            time_from_start_ns=round(1e9 * time_s),
+        )
+        for time_s, theta, _ in timeline.knots[1:]
+    )
+    return JointTrajectory(joint_names=JOINTS, points=points)
+
+
+def _rows(timeline: Timeline) -> list[dict[str, Any]]:
+    rows = []
+    for dwell in timeline.dwells:
+        angles = np.degrees(dwell.visit.theta)
+        signs = "".join("+" if sign > 0.0 else "-" for sign in dwell.visit.approach)
+        values = [
+            round(dwell.time_s, 3),
+            *(round(float(angle), 4) for angle in angles),
+            signs,
+            dwell.load.name or "none",
+            *(round(float(component), 6) for component in dwell.wrench),
+            round(dwell.hold_s, 3),
+            dwell.purpose,
+        ]
+        rows.append(dict(zip(COLUMNS, values, strict=True)))
+    return rows

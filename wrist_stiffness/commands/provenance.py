@@ -1,0 +1,82 @@
+"""What a result was made from: files with checksums, versions, command."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from wrist_stiffness import __version__
+from wrist_stiffness.commands.read_sessions import measured_sha256, sha256_by_name
+from wrist_stiffness.model.lineage import Step
+from wrist_stiffness.model.model_file import file_sha256
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+
+PACKAGES = ("numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a result says of the run that made it.
+
+    Parameters
+    ----------
+    command : str
+        As it was typed.
+    date : str
+        ISO 8601.
+    """
+
+    command: str
+    date: str
+
+    def step(self, parent: str | Path, recordings: Mapping[Path, MeasuredSession]) -> Step:
+        """Return the step from a parent's file to its child."""
+        measured = {session.name: measured_sha256(session) for session in recordings.values()}
+        return Step(
+            self.command, self.date, file_sha256(parent), sha256_by_name(recordings), measured
+        )
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a result comes from.
+
+    Parameters
+    ----------
+    command : str
+        What was run.
+    date : str
+        When, ISO 8601.
+    models, recordings : dict of str to str
+        SHA-256 by file name.
+    """
+
+    command: str
+    date: str
+    models: Mapping[str, str]
+    recordings: Mapping[str, str]
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of this package, of Python and of the libraries that compute."""
+        found = {"wrist_stiffness": __version__, "python": platform.python_version()}
+        for package in PACKAGES:
+            try:
+                found[package] = version(package)
+            except PackageNotFoundError:
+                found[package] = "unknown"
+        return found
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read."""
+        return {
+            "command": self.command,
+            "date": self.date,
+            "models": dict(self.models),
+            "recordings": dict(self.recordings),
+            "versions": self.versions,
+        }

@@ -1,0 +1,167 @@
+"""The recordings that a command names, as measured sessions in the order of time."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.identification.calibration import CALIBRATED
+from wrist_stiffness.model.contribution import LEFT_OUT
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.model_file import file_sha256
+from wrist_stiffness.progress import Progress
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.reading.folder import recordings_in
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.refitted import BUILT, SET_UP
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """Which recordings to read, and how they name things.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Recordings, or folders of recordings.
+    topics : dict of str to str
+        Actual by standard topic name.
+    settings : StreamSettings
+        Names of the motors, sensor frames and the age limit of loads, as the nodes have them.
+    """
+
+    paths: Sequence[str | Path]
+    topics: Mapping[str, str]
+    settings: StreamSettings = field(default_factory=StreamSettings)
+
+
+def read_sessions(
+    recordings: Recordings, models: Sequence[ErrorModel], progress: Progress
+) -> dict[Path, MeasuredSession]:
+    """Read recordings with measured poses, each a session with a name of its own.
+
+    Parameters
+    ----------
+    recordings : Recordings
+        What to read.
+    models : sequence of ErrorModel
+        What the command works with.  The table is that of the first; what a recording has no signal
+        for is said of all.
+    progress : callable
+        Told recordings done and in all.
+
+    Returns
+    -------
+    dict of Path to MeasuredSession
+        In the order of time.  A copy of another one, also by way of `replay` or of a table, is no
+        second session, and is said.
+
+    Raises
+    ------
+    WristError
+        If a recording cannot be used.
+    """
+    paths, motors = recordings_in(recordings.paths), recordings.settings.motors
+    found: dict[Path, MeasuredSession] = {}
+    first: dict[str, Path] = {}
+    for done, path in enumerate(paths):
+        progress(done, len(paths))
+        session = read_session(
+            path,
+            models[0].table,
+            remaps=recordings.topics,
+            joints=(motors.motor_1, motors.motor_2),
+            frames=recordings.settings.frames,
+            load_age_limit_s=recordings.settings.load_age_limit_s,
+        )
+        same = first.setdefault(measured_sha256(session), path)
+        if same == path:
+            found[path] = _with_remarks(
+                session, [*_without_meaning(session), *_without_signal(session, models)]
+            )
+        else:
+            said = f"{path} holds the same measurements: used once"
+            found[same] = _with_remarks(found[same], [said])
+    progress(len(paths), len(paths))
+    names = Counter(session.name for session in found.values())
+    named = {
+        path: session if names[session.name] == 1 else replace(session, name=str(path))
+        for path, session in found.items()
+    }
+    return dict(sorted(named.items(), key=lambda item: float(item[1].block.time[0])))
+
+
+def _with_remarks(session: MeasuredSession, remarks: Sequence[str]) -> MeasuredSession:
+    return replace(session, remarks=(*session.remarks, *remarks))
+
+
+def _without_meaning(session: MeasuredSession) -> list[str]:
+    """Return a warning where the notes call something calibrated that no fit refits."""
+    said = session.notes.get(CALIBRATED)
+    known = [law for law, _ in (*SET_UP, *BUILT)]
+    names = [name for name in said if name not in known] if isinstance(said, list) else []
+    if not names:
+        return []
+    return [
+        f"note {CALIBRATED!r} names {', '.join(map(str, names))}, without effect; what is refitted "
+        f"are {', '.join(known)}"
+    ]
+
+
+def _without_signal(session: MeasuredSession, models: Sequence[ErrorModel]) -> list[str]:
+    """Return a warning for each effect that the models must leave out, for want of a signal.
+
+    A signal is there in all samples or in none, so the first one tells, put where any table holds.
+    """
+    first = session.block.take(slice(0, 1))
+    first = replace(first, theta=np.zeros((1, 2)), load=np.zeros((1, 6)))
+    warnings = (warning for model in models for warning in model.batch(first).warnings)
+    return list(dict.fromkeys(each for each in warnings if each.endswith(LEFT_OUT)))
+
+
+def was_fitted_to(model: ErrorModel, sessions: Mapping[Path, MeasuredSession]) -> bool:
+    """Tell whether a model was fitted to one of these sessions, or to a copy or replay of one."""
+    known = {
+        sha256
+        for step in model.lineage
+        for sha256 in (*step.recordings.values(), *step.measured.values())
+    }
+    return bool(known) and any(
+        measured_sha256(session) in known or recording_sha256(path) in known
+        for path, session in sessions.items()
+    )
+
+
+def measured_sha256(session: MeasuredSession) -> str:
+    """Return the SHA-256 of what no other session has: when which pose was measured, to the bit."""
+    rows = session.measured.any(axis=1)
+    poses = np.hstack([session.shift[rows], session.rotation[rows].reshape(-1, 9)])
+    said = np.column_stack([session.block.time[rows], np.nan_to_num(poses)])
+    return hashlib.sha256(said.tobytes()).hexdigest()
+
+
+def sha256_by_name(sessions: Mapping[Path, MeasuredSession]) -> dict[str, str]:
+    """Return the SHA-256 of each session's recording by the session's name."""
+    return {session.name: recording_sha256(path) for path, session in sessions.items()}
+
+
+def recording_sha256(path: Path) -> str:
+    """Return the SHA-256 of a recording's storage file, or of the checksums of several.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
+    """
+    if not path.is_dir():
+        return file_sha256(path)
+    files = sorted(path.glob("*.mcap"))
+    if len(files) == 1:
+        return file_sha256(files[0])
+    return hashlib.sha256("".join(file_sha256(file) for file in files).encode()).hexdigest()

@@ -1,0 +1,233 @@
+"""Write a recording of the virtual cell."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness import topics
+from wrist_stiffness.commands.cell_messages import CellMessages
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.progress import Progress
+from wrist_stiffness.recording import RecordingWriter
+from wrist_stiffness.recording.messages import String
+from wrist_stiffness.simulation.blind import ToldScale, draw
+from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+
+START_NS = 1_700_000_000_000_000_000
+"""Stamp of a recording's first sample: a fixed date, so that a seed gives the same bytes."""
+
+DAY_NS = 86_400 * 10**9
+
+LAST_DAY = 10_000
+"""Stamps in nanoseconds end long after it."""
+
+DAY_SEEDS = 1_000_003
+"""From the seed of one day's noise and program to that of the next."""
+
+BLOCK = 500
+"""Samples in memory at a time."""
+
+LONGEST_S, FASTEST_HZ = 24.0 * 3600.0, 5000.0
+"""A recording is no longer and has no more samples per second than that."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What was written.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    samples : int
+        Samples on each topic.
+    seconds : float
+        Duration [s].
+    """
+
+    path: Path
+    samples: int
+    seconds: float
+
+
+def simulate_recording(
+    path: str | Path,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    seed: int,
+    progress: Progress | None = None,
+    overwrite: bool = False,
+) -> Simulated:
+    """Let the virtual cell work and record it.
+
+    Parameters
+    ----------
+    path : path
+        rosbag2 folder, or file where it ends in `.mcap`.
+    table : Table
+        Of the true wrist.
+    settings : CellSettings
+        Program, rate, sensors; sessions are days.
+    seconds : float
+        Duration [s].
+    seed : int
+        Of all noise; the same seed gives the same bytes.
+    progress : callable, optional
+        Is told samples done and samples in all.
+    overwrite : bool
+        Replace an existing recording.
+
+    Returns
+    -------
+    Simulated
+        What was written.
+
+    Raises
+    ------
+    InputError
+        If duration or rate are out of bounds or the seed is negative.
+    RecordingError
+        If the recording exists or cannot be written.
+    """
+    check_bounds(seconds, settings.rate_hz, seed)
+    cell = VirtualCell(table, settings, np.random.default_rng(seed))
+    total = max(1, round(seconds * settings.rate_hz))
+    thermometer = max(1, round(settings.rate_hz))
+    start_ns = START_NS + settings.session * DAY_NS
+    with RecordingWriter(path, overwrite=overwrite) as writer:
+        notes = String(json.dumps(recording_notes(table, settings), sort_keys=True))
+        writer.write(topics.RECORDING_NOTES, notes, start_ns)
+        messages = CellMessages(writer, whole=settings.sees == "pose")
+        for first in range(0, total, BLOCK):
+            number = np.arange(first, min(first + BLOCK, total))
+            time_s = number / settings.rate_hz
+            sent = cell.desired(time_s)
+            block = cell.run(time_s, sent)
+            stamps_ns = start_ns + np.round(time_s * 1e9).astype(np.int64)
+            messages.write(stamps_ns.tolist(), sent, block, number % thermometer == 0)
+            if progress is not None:
+                progress(int(number[-1]) + 1, total)
+    return Simulated(Path(path), total, total / settings.rate_hz)
+
+
+def check_bounds(seconds: float, rate_hz: float, seed: int) -> None:
+    """Refuse what would be no recording, or never end.
+
+    Raises
+    ------
+    InputError
+        With the limit.
+    """
+    if not 0.0 < seconds <= LONGEST_S:
+        raise InputError(
+            f"simulate: a duration of {seconds:g} s is not more than 0 and at most {LONGEST_S:g} s"
+        )
+    if not 0.0 < rate_hz <= FASTEST_HZ:
+        raise InputError(
+            f"simulate: a rate of {rate_hz:g} Hz is not more than 0 and at most {FASTEST_HZ:g} Hz"
+        )
+    if seconds * rate_hz < 1.0:
+        raise InputError(f"simulate: {seconds:g} s at {rate_hz:g} Hz are less than one sample")
+    if seed < 0:
+        raise InputError(f"simulate: seed {seed} is negative")
+
+
+def hide(
+    name: str,
+    size: float,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
+) -> CellSettings:
+    """Return the settings with one more hidden effect of a wanted size.
+
+    Parameters
+    ----------
+    name : str
+        `NAME@COMPONENT` or `NAME@COMPONENT:FORM` of the catalogue; the first form by default.
+    size : float
+        In units of one sample's noise, over this experiment.
+    table : Table
+        Of the wrist.
+    settings : CellSettings
+        The experiment.
+    seconds : float
+        Its duration [s].
+    tell : callable
+        Is told before every run of the experiment that finds the size.
+
+    Returns
+    -------
+    CellSettings
+        The same with the effect.
+
+    Raises
+    ------
+    InputError
+        If the name is not in the catalogue or the size cannot be had.
+    """
+    effect, _, place = name.partition("@")
+    component, _, form = place.partition(":")
+    if effect not in ALL or not component:
+        raise InputError(
+            f"effect {name!r} is not NAME@COMPONENT with a NAME of: {', '.join(sorted(ALL))}"
+        )
+    if not (np.isfinite(size) and size > 0.0):
+        raise InputError(f"effect {name!r}: size {size:g} is not a positive number")
+    entry = ALL[effect]
+    if component not in entry.components:
+        raise InputError(f"effect {name!r}: {effect} is at {', '.join(entry.components)} only")
+    if form and form not in entry.forms:
+        raise InputError(f"effect {name!r}: {effect} has the forms {', '.join(entry.forms)} only")
+    start = HiddenEffect(
+        effect, component, form or entry.forms[0], entry.plausible, settings.program_seed
+    )
+    hidden = ToldScale(tell, table, settings, seconds).sized(start, size)
+    return replace(settings, hidden=(*settings.hidden, hidden))
+
+
+def hide_blind(
+    seed: int,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
+) -> CellSettings:
+    """Return the settings with the effect that a seed draws (see `blind.draw`)."""
+    return replace(settings, hidden=(draw(seed, table, settings, seconds, tell).hidden,))
+
+
+def on_day(day: int, settings: CellSettings) -> CellSettings:
+    """Return the settings of another day, from 1, of the same wrist with the same hidden effects.
+
+    The instrument was set up anew, and the wrist moves to other poses under other loads.
+
+    Raises
+    ------
+    InputError
+        If there is no such day.
+    """
+    if not 1 <= day <= LAST_DAY:
+        raise InputError(f"simulate: day {day} is not 1 to {LAST_DAY}")
+    later = DAY_SEEDS * (day - 1)
+    return replace(settings, session=day - 1, program_seed=settings.program_seed + later)
+
+
+def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
+    """Return the free facts that a user would know about the recording."""
+    return {
+        "wrist": table.geometry.name,
+        "geometry_sha256": table.geometry.sha256,
+        "pose_sensor": settings.instrument,
+        "load_source": "ft",
+        "session": "simulated",
+    }

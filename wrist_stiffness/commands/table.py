@@ -1,0 +1,241 @@
+"""Build, check and show a lookup table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.commands.budget import PER_AXIS, Push, budget
+from wrist_stiffness.errors import GeometryError, InputError
+from wrist_stiffness.inputs.document import read_yaml
+from wrist_stiffness.lookup.biharmonic import Kernel
+from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
+from wrist_stiffness.lookup.table_file import save_table
+from wrist_stiffness.mechanism.fits import check_fits
+from wrist_stiffness.mechanism.geometry_file import geometry_of
+from wrist_stiffness.progress import Progress, silent
+
+FINE = 161
+
+PICTURED_POSE = np.radians([25.0, -20.0])
+
+MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
+"""The corners alone carry no plane to be judged inside; the splines' matrices grow with n^4."""
+
+MICRO = 1e6
+CENTIDEGREES = 100.0 * 180.0 / np.pi
+
+
+def build(
+    geometry: str | Path,
+    output: str | Path,
+    evaluation: Evaluation = "closed_form",
+    interface: str = "rigid",
+    tolerance: float = 0.005,
+    per_axis: int | None = None,
+    kernel: Kernel = "thin_plate",
+    progress: Progress = silent,
+) -> Table:
+    """Run the offline sweep and write its table; an interrupted build goes on where it was.
+
+    Condensed parts are kept beside the table until it is written.
+
+    Parameters
+    ----------
+    geometry : path
+        Geometry file.
+    output : path
+        Table file to write, `.npz`.
+    evaluation : str
+        What the nodes shall use, `closed_form` or `spline`.
+    interface : str
+        `rigid`, `distributing` or `sliding` walls.
+    tolerance : float
+        Largest relative interpolation error in the operative workspace.
+    per_axis : int or None
+        Fixed grid, 5 for the paper's 25 poses; None refines to the tolerance.
+    kernel : str
+        `thin_plate`, or `sandwell` as in the paper.
+    progress : callable
+        Called with steps done and in all.
+
+    Returns
+    -------
+    Table
+        As written.
+
+    Raises
+    ------
+    WristError
+        If the geometry is wrong, the tolerance is not met or the file cannot be written.
+    """
+    from wrist_stiffness.fem.condensed_store import CondensedStore
+    from wrist_stiffness.fem.sweep import BuildSettings, build_table
+
+    output = Path(output)
+    if output.suffix != ".npz":
+        raise InputError(f"{output}: a table's name ends in .npz")
+    if not output.parent.is_dir():
+        raise InputError(f"{output.parent}: no such folder")
+    if not tolerance > 0.0:
+        raise InputError(f"tolerance {tolerance:g} is not above 0")
+    if per_axis is not None and not MIN_PER_AXIS <= per_axis <= MAX_PER_AXIS:
+        raise InputError(
+            f"a grid of {per_axis} x {per_axis} is outside {MIN_PER_AXIS} x {MIN_PER_AXIS} "
+            f"to {MAX_PER_AXIS} x {MAX_PER_AXIS}"
+        )
+    root = read_yaml(geometry, GeometryError)
+    check_fits(root, geometry_of(root))
+    settings = BuildSettings(
+        evaluation=evaluation,
+        interface=interface,  # type: ignore[arg-type]
+        tolerance=tolerance,
+        per_axis=per_axis,
+        kernel=kernel,
+    )
+    store = CondensedStore(output.with_name(f".{output.stem}.parts"))
+    table = save_table(build_table(root.plain, settings, progress, store), output)
+    store.remove()
+    return table
+
+
+@dataclass(frozen=True)
+class MapSummary:
+    """Statistics of the rated load's map.
+
+    Parameters
+    ----------
+    operative : dict
+        Mean, min and max by quantity over the operative workspace, with the unit in the name.
+    domain_max : dict
+        Maxima over the whole map.
+    """
+
+    operative: dict[str, dict[str, float]]
+    domain_max: dict[str, float]
+
+
+def summarise(table: Table) -> MapSummary:
+    """Return the statistics of Tables 1 and 2 for a table, on a fine grid over the map.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+
+    Returns
+    -------
+    MapSummary
+        In micrometres and hundredths of a degree.
+    """
+    workspace = table.workspace
+    poses = workspace.grid(101)
+    values = table.map_spline(poses) * np.array([MICRO] * 4 + [CENTIDEGREES])
+    inside = values[workspace.operative(poses)]
+    names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_1e-2deg"]
+    operative = {
+        name: {
+            "mean": float(column.mean()),
+            "min": float(column.min()),
+            "max": float(column.max()),
+        }
+        for name, column in zip(names, inside.T, strict=True)
+    }
+    domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
+    return MapSummary(operative, domain)
+
+
+def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> list[Path]:
+    """Draw what a load does: two maps, the error budget, and the bent wrist.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+    folder : path
+        Where the PNG files go; made if missing.
+    push : Push, optional
+        The load; the rated one if None, for which the maps are the table's splines of s and phi
+        (the paper's Figs. 5 and 6), else the closed form.
+
+    Returns
+    -------
+    list of Path
+        `map_s.png`, `map_phi.png`, `budget.png` and `bent.png`.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made.
+    LoadRangeError
+        If the load is outside the table's range.
+    """
+    from wrist_stiffness.report.pictures.bent_wrist import draw_bent_wrist
+    from wrist_stiffness.report.pictures.budget import draw_budget
+    from wrist_stiffness.report.pictures.joint_map import draw_map
+
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
+    load = push or Push.rated(table)
+    found = budget(table, load)
+    poses = table.workspace.rectangle_grid(FINE if push is None else PER_AXIS)
+    inside = table.workspace.domain(poses)
+    values = np.full((*poses.shape[:-1], 2), np.nan)
+    if push is None:
+        values[inside] = table.map_spline(poses[inside])[:, 3:]
+    else:
+        halves = found.twist.reshape(-1, 2, 3)
+        values[inside] = np.linalg.norm(halves, axis=-1)
+    pictures = [folder / name for name in ("map_s.png", "map_phi.png", "budget.png", "bent.png")]
+    s, phi = MICRO * values[..., 0], CENTIDEGREES * values[..., 1]
+    label = "displacement error s of the platform's centre [µm]"
+    draw_map(table, poses, s, label, load.text, pictures[0])
+    label = "orientation error φ of the platform [10⁻² deg]"
+    draw_map(table, poses, phi, label, load.text, pictures[1])
+    draw_budget(table, found, load.text, pictures[2])
+    draw_bent_wrist(table, PICTURED_POSE, load, pictures[3])
+    return pictures
+
+
+def facts(table: Table) -> Iterable[tuple[str, str]]:
+    """Return what a person wants to know of a table, as (name, text)."""
+    header, limits = table.header, table.geometry.limits
+    lower, upper = (np.degrees(edge) for edge in table.workspace.rectangle)
+    errors = header.errors
+    yield "geometry", f"{table.geometry.name} ({table.geometry.status})"
+    yield (
+        "angles",
+        f"motor 1 {lower[0]:.1f} to {upper[0]:.1f}, motor 2 {lower[1]:.1f} to {upper[1]:.1f} deg",
+    )
+    yield "loads", f"up to {limits.force:g} N and {limits.moment:g} N m at O"
+    yield (
+        "parts",
+        f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces",
+    )
+    yield "contact", f"{len(table.components.sectors.gap)} flange sectors"
+    yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
+    yield "evaluation", header.evaluation
+    yield (
+        "mesh error",
+        f"s {100 * errors['mesh']['s']:.2f} %, phi {100 * errors['mesh']['phi']:.2f} % "
+        "(extrapolated from three meshes)",
+    )
+    if errors.get("walls"):
+        walls = errors["walls"]
+        yield (
+            "wall error",
+            f"s {100 * walls['s']:.0f} %, phi {100 * walls['phi']:.0f} % "
+            "(walls that lift off against two-sided ones)",
+        )
+    for region in ("operative", "domain"):
+        worst = errors["predicted"][region]
+        yield (
+            f"spline error, {region}",
+            f"s {100 * worst['s']:.3f} %, phi {100 * worst['phi']:.3f} % at 99 of 100 unseen poses",
+        )

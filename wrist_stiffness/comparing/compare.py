@@ -1,0 +1,141 @@
+"""Compare models with measured sessions: the whole way from sessions to sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.comparing.explained import Explained, explain
+from wrist_stiffness.comparing.set_up import FREE, without_set_up
+from wrist_stiffness.comparing.wiring import (
+    MISTAKES,
+    Mistake,
+    Suspicion,
+    suspected,
+    told_mistake,
+)
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.calibration import said_calibrated
+from wrist_stiffness.inference.settings import FEWEST_UNITS
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import Observed
+from wrist_stiffness.sessions.repeatability import by_side, repeatability
+from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+
+Prepared = tuple[Observed, Explained, tuple[str, ...]]
+
+
+def compare_models(
+    models: Sequence[tuple[str, ErrorModel]],
+    sessions: Sequence[MeasuredSession],
+    progress: Progress = silent,
+) -> Comparison:
+    """Say how far models are off from measured sessions, where and under which condition.
+
+    Parameters
+    ----------
+    models : sequence of (str, ErrorModel)
+        Name of each for the report, and the model; all of one wrist.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+    progress : callable, optional
+        Told steps done and in all.
+
+    Returns
+    -------
+    Comparison
+        In the order of the models.
+
+    Raises
+    ------
+    InputError
+        If there is too little to compare, or the models are not of one wrist.
+    """
+    steps = len(models) + 1
+    progress(0, steps)
+    first = models[0][1]
+    cuts = tuple(as_units(first, session) for session in sessions)
+    calibrated = said_calibrated(sessions)
+    compared = []
+    for name, model in models:
+        if not _same_wrist(model, first):
+            raise InputError(
+                f"model {name} is of another wrist than {models[0][0]}: its axes differ"
+            )
+        observed, left, absorbed = _prepared(model, sessions, cuts, calibrated)
+        compared.append(ComparedModel(name, observed.observations, left, absorbed))
+        progress(len(compared), steps)
+    suspicion = suspected(model, observed, calibrated, left.observations, left.noise)
+    progress(steps, steps)
+    table = compared[0].refitted
+    return Comparison(
+        tuple(each.name for each in cuts),
+        tuple(compared),
+        repeatability(table),
+        repeatability(by_side(table)),
+        told_mistake(suspicion),
+    )
+
+
+def suspicion_in(
+    model: ErrorModel, sessions: Sequence[MeasuredSession], mistakes: Sequence[Mistake] = MISTAKES
+) -> Suspicion | None:
+    """Return the mistake of signs, units or names that explains most of an error; None for none.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        With which the sessions are compared.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+    mistakes : sequence of Mistake, optional
+        Those that are tried.
+
+    Raises
+    ------
+    InputError
+        If there is too little to compare.
+    """
+    cuts = tuple(as_units(model, session) for session in sessions)
+    calibrated = said_calibrated(sessions)
+    observed, left, _ = _prepared(model, sessions, cuts, calibrated)
+    return suspected(model, observed, calibrated, left.observations, left.noise, mistakes)
+
+
+def _prepared(
+    model: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    cuts: tuple[UnitSession, ...],
+    calibrated: Sequence[str],
+) -> Prepared:
+    """Return what a model leaves, what the set-up leaves of that, and where this stands."""
+    observed, refitted, set_ups = without_set_up(model, cuts, calibrated)
+    if refitted.n_units < FEWEST_UNITS:
+        names = ", ".join(session.name for session in sessions)
+        # A recording that was cut short says so itself.
+        why = "".join(f"; {remark}" for session in sessions for remark in session.remarks)
+        raise InputError(
+            f"{names}: {refitted.n_units} dwells and moments are too few to compare with, it needs "
+            f"{FEWEST_UNITS}{why}"
+        )
+    used = np.concatenate([each.measured for each in cuts])
+    columns = np.concatenate(
+        [
+            np.pad(each.columns, ((0, 0), (0, 0), (n * FREE, (len(cuts) - 1 - n) * FREE)))
+            for n, each in enumerate(set_ups)
+        ]
+    )[used]
+    z = np.concatenate([each.moved for each in set_ups])
+    weights = np.concatenate([each.weights for each in set_ups])[used]
+    left = explain(refitted, cuts, columns, z, weights)
+    return observed, left, tuple(each.sentence for each in set_ups)
+
+
+def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:
+    """Tell whether the rigid wrists are the same; parts may differ, they are what is compared."""
+    first, second = one.table.geometry, other.table.geometry
+    return all(np.array_equal(first.axes[joint], second.axes[joint]) for joint in first.axes)

@@ -1,0 +1,229 @@
+"""How far a model is off from what was measured, and what of that could be known better."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.comparing.explained import Explained
+from wrist_stiffness.comparing.sentences import as_values, percent
+from wrist_stiffness.inference import Observations, Quantity
+from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.mechanism.components import Array
+
+JUDGES = 12
+"""Blocks of units from which the uncertainty of an error is taken."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """Error of one quantity over all units, in the unit of its report.
+
+    Parameters
+    ----------
+    mean, rms, maximum : float
+        Of the vector's length.
+    uncertainty : float
+        One standard uncertainty of `rms`.
+    """
+
+    mean: float
+    rms: float
+    maximum: float
+    uncertainty: float
+
+    def as_values(self) -> dict[str, float]:
+        """Return what programs read."""
+        return {
+            "mean": self.mean,
+            "rms": self.rms,
+            "rms_uncertainty": self.uncertainty,
+            "max": self.maximum,
+        }
+
+
+def lengths(observations: Observations, quantity: Quantity) -> Array:
+    """Length of a quantity of each unit over its measured components, (n,); NaN without any."""
+    columns = observations.values[:, list(quantity.components)]
+    measured = np.isfinite(columns)
+    square = np.sum(np.where(measured, columns, 0.0) ** 2, axis=1)
+    return np.where(measured.any(axis=1), np.sqrt(square) * quantity.per_si, np.nan)
+
+
+def sizes(observations: Observations) -> dict[str, Size]:
+    """Error of every quantity by its key."""
+    return {q.key: _size(observations, lengths(observations, q)) for q in observations.reported}
+
+
+def _size(observations: Observations, length: Array) -> Size:
+    known = np.isfinite(length)
+    length, sessions = length[known], observations.sessions[known]
+    blocks = time_blocks(sessions, min(JUDGES, len(length)))
+    means = np.array([np.mean(length[blocks == block] ** 2) for block in np.unique(blocks)])
+    rms = float(np.sqrt(np.mean(length**2)))
+    scatter = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
+    slope = 1.0 / (2.0 * rms) if rms > 0.0 else 0.0
+    return Size(float(length.mean()), rms, float(length.max()), float(scatter * slope))
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedModel:
+    """One model against the recordings.
+
+    Parameters
+    ----------
+    name : str
+        Of the model.
+    raw : Observations
+        Residual as it stands, with the registrations that the model has.
+    explained : Explained
+        Residual after registrations, zeros and tare of every session were fitted again, and on what
+        it depends.
+    absorbed : tuple of str
+        What those took up.
+    """
+
+    name: str
+    raw: Observations
+    explained: Explained
+    absorbed: tuple[str, ...]
+
+    @property
+    def refitted(self) -> Observations:
+        """Residual after registrations, zeros and tare were fitted again."""
+        return self.explained.observations
+
+    @cached_property
+    def before(self) -> dict[str, Size]:
+        """Errors before the registrations were fitted again."""
+        return sizes(self.raw)
+
+    @cached_property
+    def after(self) -> dict[str, Size]:
+        """Errors after it."""
+        return sizes(self.refitted)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Models side by side over the same units.
+
+    Parameters
+    ----------
+    sessions : tuple of str
+        Names, in the order of time.
+    models : tuple of ComparedModel
+        In the order in which they were named.
+    repeated, repeated_by_side : dict of str to float
+        Repeatability of the measured pose from any side, and from the same side; empty where no
+        dwell was repeated.
+    mistake : str
+        A sentence on a sign, unit or name that may be wrong in the recordings; empty for none.
+    """
+
+    sessions: tuple[str, ...]
+    models: tuple[ComparedModel, ...]
+    repeated: dict[str, float]
+    repeated_by_side: dict[str, float]
+    mistake: str = ""
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """Instrument noise of each quantity, as what the last model leaves tells it."""
+        return self.models[-1].explained.noise
+
+    @property
+    def reachable(self) -> dict[str, float]:
+        """What the laws of the conditions leave of the first model's error, on unseen stretches."""
+        return self.models[0].explained.reachable
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Quantities that were measured."""
+        return self.models[0].refitted.reported
+
+    def headroom(self, model: ComparedModel, key: str) -> float | None:
+        """Share of what could be explained that a model explains; None where nothing could.
+
+        (before - after) / (before - reachable), before being the first model.
+        """
+        before = self.models[0].after[key]
+        possible = before.rms - self.reachable[key]
+        if possible <= 2.0 * before.uncertainty:
+            return None
+        return (before.rms - model.after[key].rms) / possible
+
+    def over_noise(self, model: ComparedModel) -> float:
+        """Error of a model over the instrument's noise, the larger of the quantities'."""
+        over = [model.after[key].rms / max(size, 1e-12) for key, size in self.noise.items()]
+        return max(over)
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """The answer in a few sentences."""
+        lines = [
+            f"{each.name} is off by {self._sizes(each.explained.error)} (RMS): "
+            f"{self._means(each.explained)}."
+            for each in self.models
+        ]
+        if len(self.models) > 1:
+            lines += [self._fall(q) for q in self.quantities]
+        if self.mistake:
+            lines.append(self.mistake)
+        return tuple(lines)
+
+    def _sizes(self, rms: dict[str, float]) -> str:
+        return " and ".join(f"{rms[q.key]:.3g} {q.unit} of {q.name}" for q in self.quantities)
+
+    def _means(self, found: Explained) -> str:
+        state = found.answer.state
+        if not (state.discrepant.any() or state.misfit):
+            sure = percent(found.answer.nothing)
+            return f"noise and drift of the instrument, no more ({sure} sure)"
+        return f"{self._sizes(found.above)} are above noise and drift of the instrument"
+
+    def _fall(self, quantity: Quantity) -> str:
+        first, last = self.models[0], self.models[-1]
+        before, after = first.after[quantity.key].rms, last.after[quantity.key].rms
+        was, is_now = f"{before:.3g}", f"{after:.3g}"
+        moves = f"{'falls' if after < before else 'rises'} from {was} to {is_now}"
+        if was == is_now:
+            moves = f"stays at {is_now}"
+        text = f"From {first.name} to {last.name} {quantity.name} {moves} {quantity.unit}"
+        share = self.headroom(last, quantity.key)
+        if share is None:
+            left = f"{self.reachable[quantity.key]:.3g} {quantity.unit}"
+            return f"{text} (laws of the conditions alone reach {left})."
+        if share >= 1.0:
+            # Laws of the conditions of a moment know nothing of where the wrist came from.
+            return f"{text}: all that the conditions could explain."
+        return f"{text}: {100.0 * share:.0f} % of what the conditions could explain."
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read, with units in the names."""
+        return {
+            "schema": 2,
+            "sessions": list(self.sessions),
+            "verdict": list(self.verdict),
+            "units": self.models[0].refitted.n_units,
+            "instrument_noise": self.noise,
+            "repeatability": {
+                "from_any_side": self.repeated,
+                "from_the_same_side": self.repeated_by_side,
+            },
+            "reachable": self.reachable,
+            "models": [self._model_values(model) for model in self.models],
+        }
+
+    def _model_values(self, model: ComparedModel) -> dict[str, Any]:
+        return {
+            "model": model.name,
+            "before_registration": {k: size.as_values() for k, size in model.before.items()},
+            "after_registration": {k: size.as_values() for k, size in model.after.items()},
+            "absorbed": list(model.absorbed),
+            "explained_headroom": {q.key: self.headroom(model, q.key) for q in self.quantities},
+            **as_values(model.explained),
+        }

@@ -1,0 +1,369 @@
+"""The base is refitted before any search: registrations, zeros, tare, and the wrist's tolerances.
+
+Registrations are a millimetre and a fraction of a degree, and a flange touches or does not: so the
+fit repeats Gauss-Newton steps on the model itself, and only what is left is taken as linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import lstsq
+from scipy.special import chdtri
+
+from wrist_stiffness.identification.free_effects import (
+    FreeEffect,
+    commissioning,
+    within_tolerances,
+)
+from wrist_stiffness.identification.parts import parted
+from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.identification.questions import questions
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.outliers import lost_units
+from wrist_stiffness.inference.settings import OUTLIER_LIMIT
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.columns import SessionModel
+from wrist_stiffness.sessions.unit_session import UnitSession
+from wrist_stiffness.sessions.units import Mask
+
+MOST_STEPS = 20
+
+COOLING = 0.05
+"""Least ratio of the variances of two steps: believed too early, the data close a wrong flange."""
+
+ENOUGH, NEARLY = 3e-3, 3e-2
+"""Relative fall of the sum of squares below which the fit has converged, and with rounded walls."""
+
+SMALLEST_STEP = 1.0 / 16.0
+
+MOST_CLEANINGS = 3
+"""Fits after which lost beams are looked for."""
+
+ROUNDED_N = (1.0, 0.3, 0.1, 0.03)
+"""Forces within which a pin goes from wall to wall, before the fit with the law as it is: from one
+wall to the other the sum of squares has a minimum for every pin that turns over, and steps end in
+the next one (graduated non-convexity, Blake and Zisserman 1987)."""
+
+Walls = Literal["sharp", "rounded first", "rounded"]
+
+Base = tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]
+"""What of a model is free, and what stays as it is."""
+
+MEDIAN_CHI2 = float(chdtri(1, 0.5))
+
+
+@dataclass(frozen=True, eq=False)
+class BaseFit:
+    """The base at its best, with further effects where some were fitted along.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        What was free.
+    z : (p,) float
+        Steps from the prior means.
+    residual : (u, 6) float
+        What is left, log(T_measured T_predicted^-1) at O in F [m, rad].
+    extras : tuple of str
+        Names of the further effects.
+    cost : float
+        Weighted sum of squares with the priors' part, in units of the noise.
+    bare : FitProblem
+        The base alone.
+    firm : FitProblem
+        The base with those extras beside which its columns are taken.
+    arrived : bool
+        Whether the steps settled.
+    """
+
+    problem: FitProblem
+    z: Array
+    residual: Array
+    extras: tuple[str, ...]
+    cost: float
+    bare: FitProblem
+    firm: FitProblem
+    arrived: bool
+
+    @cached_property
+    def columns(self) -> Array:
+        """Change of what is left by a step of each unknown, about `z`, (u, 6, p) [m, rad]."""
+        return _columns(self.problem, self.firm, self.z)
+
+    @property
+    def prior_std(self) -> Array:
+        """Standard deviations of the priors of the base in steps, (p,); infinite for none."""
+        return np.where(self.of_base & (self.problem.weights == 1.0), 1.0, np.inf)
+
+    @property
+    def of_base(self) -> Mask:
+        """Which unknowns belong to the base, (p,) bool."""
+        usual = len(self.bare.free)
+        return np.array([unknown.free < usual for unknown in self.problem.unknowns])
+
+    def beyond(self) -> dict[str, Effect]:
+        """Return the extras by their names, of those on top of the base only what is on top."""
+        usual, found = len(self.bare.free), {}
+        for place, free in enumerate(self.problem.free[usual:], usual):
+            # On a bound the way to steps and back rounds beyond it.
+            values = {
+                u.key: float(np.clip(u.mean + z * u.step, u.lower, u.upper))
+                for u, z in zip(self.problem.unknowns, self.z, strict=True)
+                if u.free == place
+            }
+            found[free.effect.name] = free.effect.with_values(values)
+        return found
+
+    @property
+    def variance(self) -> float:
+        """Mean square of what is left, in units of the noise."""
+        white = self.whiten(self.residual)
+        return float(white @ white) / np.count_nonzero(self.problem.table.measured)
+
+    def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
+        """Return the fitted effects of one session, also those that were held."""
+        own = self.problem.effects(self.z, session)
+        usual = {each.effect.name for each in self.bare.free}
+        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in usual]
+        return (*self.problem.model.effects, *kept)
+
+    def model(self, session: int, with_extras: bool = True) -> SessionModel:
+        """Return the fitted model of one session, on its units."""
+        problem = self.problem
+        effects = self.effects(session, with_extras)
+        return SessionModel(problem.model, problem.sessions[session], effects)
+
+    def whiten(self, values: Array) -> Array:
+        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
+        return self.problem.whiten(values)
+
+
+def free_base(model: ErrorModel) -> Base:
+    """Return what of the base is free, and the effects that stay as they are."""
+    free, held = commissioning(model)
+    return within_tolerances(free), held
+
+
+def fit_base(
+    model: ErrorModel,
+    sessions: tuple[UnitSession, ...],
+    extras: Sequence[Effect] = (),
+    start: BaseFit | None = None,
+    beside: bool = False,
+    walls: Walls = "sharp",
+    base: Base | None = None,
+) -> BaseFit:
+    """Fit registrations, zeros, tare and tolerances, within their priors.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its effects are starts, or held.
+    sessions : tuple of UnitSession
+        In the order of time.
+    extras : sequence of Effect, optional
+        Effects fitted along, from the values that they have, with priors about zero as wide as
+        they are large, at least of the usual size: what the data do not show stays small.  One that
+        belongs to the base comes on top of what the wrist was built with.
+    start : BaseFit, optional
+        Where the base begins.
+    beside : bool
+        Whether the base's columns are taken beside play too; else as if no play were there, which
+        is far quicker and leads nearly as far.
+    walls : {"sharp", "rounded first", "rounded"}
+        Whether pins go from wall to wall little by little first, and whether they stay so: enough
+        to tell which of several fits leads furthest.
+    base : (tuple of FreeEffect, tuple of Effect), optional
+        What of the model is free and what stays as it is; by default as `free_base` says.
+    """
+    free, held = base or free_base(model)
+    # What was fitted with rounded walls begins with its own law again.
+    extras = [_rounded(effect, None) for effect in extras]
+    added = {effect.name: effect for effect in extras}
+    usual = {each.effect.name for each in free}
+    # Those on top of the base follow it, and play comes last.
+    ordered = sorted(added.values(), key=lambda e: (e.law.state_is_a_guess, e.name not in usual))
+    more = [_about_zero(each) for each in ordered]
+    firm = len(ordered) if beside else sum(not each.law.state_is_a_guess for each in ordered)
+    whole = model.with_effects(*held)
+    alone = FitProblem(whole, sessions, free)
+    if start is not None and start.bare.same_as(alone):
+        alone = start.bare
+    problem = replace(alone, free=(*free, *more))
+    bare = problem if firm == len(more) else alone
+    if 0 < firm < len(more):
+        bare = replace(alone, free=(*free, *more[:firm]))
+    z = _start(problem, start, added)
+    if walls != "sharp":
+        for force in ROUNDED_N:
+            gradual = [replace(each, effect=_rounded(each.effect, force)) for each in more]
+            easy = replace(problem, free=(*free, *gradual))
+            z, residual, arrived = _descended(easy, easy, z, NEARLY)
+            if walls == "rounded":
+                cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
+                return BaseFit(easy, z, residual, tuple(added), cost, alone, easy, arrived)
+    z, residual, arrived = _descended(problem, bare, z)
+    cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
+    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare, arrived)
+
+
+def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFit, int]:
+    """Fit a problem as it stands, without units that no smooth law could explain: lost beams.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        What is free.
+    start : (p,) float, optional
+        Where to begin, in steps; by default at the means of the priors.
+
+    Returns
+    -------
+    BaseFit
+        Its problem lacks those units.
+    int
+        How many there were.
+    """
+    z, total = np.zeros(len(problem.unknowns)) if start is None else start, 0
+    for _ in range(MOST_CLEANINGS):
+        z, residual, arrived = _descended(problem, problem, z)
+        table = problem.table.with_values(residual)
+        # Exact data scatter by rounding: what is lost is far beyond the noise as well.
+        white = problem.whiten(residual).reshape(table.values.shape)
+        lost = _lost(table, problem.columns_at(z))
+        lost &= np.abs(white).max(axis=1) > OUTLIER_LIMIT
+        if not lost.any():
+            break
+        total += int(lost.sum())
+        problem = replace(problem, sessions=parted(problem.sessions, lost).seen)
+    cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
+    return BaseFit(problem, z, residual, (), cost, problem, problem, arrived), total
+
+
+def _lost(table: Observations, columns: Array) -> Mask:
+    """Return which units lie far from a base and every smooth law of the conditions, (u,)."""
+    asked = [each.features(table.covariates) for each in questions(table.covariates)]
+    found = [each for each in asked if each is not None]
+    smooth = np.concatenate([np.zeros((table.n_units, 0)), *found], axis=1)
+    spread = smooth[:, None, :, None] * np.eye(table.n_components)[:, None, :]
+    beside = spread.reshape(*table.values.shape, -1)
+    return lost_units(table, np.concatenate([columns, beside], axis=2), OUTLIER_LIMIT)
+
+
+def has_walls(effect: Effect) -> bool:
+    """Tell whether the law of an effect goes from wall to wall, so that it can be rounded.
+
+    Slopes about its absence say next to nothing, and beside it each slope of the base is a search
+    for where the pins rest.
+    """
+    return effect.law.rounded(ROUNDED_N[0]) is not effect.law.rounded(None)
+
+
+def _rounded(effect: Effect, force: float | None) -> Effect:
+    law = effect.law.rounded(force)
+    return effect if law is effect.law else replace(effect, law=law)
+
+
+def _descended(
+    problem: FitProblem, bare: FitProblem, z: Array, enough: float = ENOUGH
+) -> tuple[Array, Array, bool]:
+    """Return where Gauss-Newton steps lead from `z`, the residual there, whether they settled."""
+    lower, upper = problem.bounds
+    weights = problem.weights
+    residual = problem.residual(z)
+    scale = 0.0
+    for _ in range(MOST_STEPS):
+        columns = _columns(problem, bare, z)
+        left = problem.whiten(residual)
+        found = _robust_variance(left)
+        scale = max(found, COOLING * scale)
+        cooled = scale == found
+        step = _step(problem.whiten(columns), left, z * weights, weights, scale)
+        before = _cost(left, z, weights, scale)
+        size = 1.0
+        while True:
+            trial = np.clip(z + size * step, lower, upper)
+            tried = problem.residual(trial)
+            after = _cost(problem.whiten(tried), trial, weights, scale)
+            if after < before or size <= SMALLEST_STEP:
+                break
+            size /= 2.0
+        if after < before:
+            z, residual = trial, tried
+        if cooled and before - after < enough * before:
+            return z, residual, True
+    return z, residual, False
+
+
+def _columns(problem: FitProblem, bare: FitProblem, z: Array) -> Array:
+    """Return the columns of one problem, and of what another has on top of it.
+
+    Play would be solved again for each column of the base.
+    """
+    of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
+    of_extras = tuple(n for n, u in enumerate(problem.unknowns) if u.free >= len(bare.free))
+    first = bare.columns_at(z[of_bare])
+    if not of_extras:
+        return first
+    columns = np.zeros((*first.shape[:2], len(z)))
+    columns[:, :, of_bare] = first
+    columns[:, :, of_extras] = problem.columns_at(z, of_extras)
+    return columns
+
+
+def _about_zero(effect: Effect) -> FreeEffect:
+    """Return an effect with priors about its absence; shapes, which have a mean, are free."""
+    sizes = [p for p in effect.parameters if p.mean == 0.0 and np.isfinite(p.scale)]
+    found = {p.key: abs(effect.estimates[p.key].value) / p.scale for p in sizes}
+    linear = [found[p.key] for p in sizes if p.linear]
+    together = float(np.sqrt(np.mean(np.square(linear)))) if linear else 0.0
+    scale = dict.fromkeys((p.key for p in effect.parameters), np.inf)
+    for p in sizes:
+        scale[p.key] = p.scale * max(1.0, together if p.linear else found[p.key])
+    return FreeEffect(effect.with_values({p.key: 0.0 for p in sizes}), scale)
+
+
+def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effect]) -> Array:
+    """Return where the unknowns begin: where another fit left them, and effects at their values."""
+    usual = len(problem.free) - len(added)
+    known: dict[tuple[str, str, int | None, bool], float] = {}
+    if start is not None:
+        known = {
+            (start.problem.free[u.free].effect.name, u.key, u.session, bool(of_base)): u.mean
+            + z * u.step
+            for u, z, of_base in zip(start.problem.unknowns, start.z, start.of_base, strict=True)
+        }
+    found = []
+    for u in problem.unknowns:
+        name, of_base = problem.free[u.free].effect.name, u.free < usual
+        at = u.mean if of_base else added[name].estimates[u.key].value
+        found.append((known.get((name, u.key, u.session, of_base), at) - u.mean) / u.step)
+    return np.array(found)
+
+
+def _robust_variance(white: Array) -> float:
+    """Variance of what is left, at least that of the noise.
+
+    Priors then hold against an effect that is not there yet, or not at its value: a base that gave
+    way to it once does not come back.
+    """
+    seen = white[white != 0.0]
+    return max(1.0, float(np.median(seen**2)) / MEDIAN_CHI2)
+
+
+def _cost(white: Array, z: Array, prior: Array, scale: float) -> float:
+    return float(white @ white / scale + np.sum((prior * z) ** 2))
+
+
+def _step(columns: Array, left: Array, offset: Array, prior: Array, scale: float) -> Array:
+    root = np.sqrt(scale)
+    rows = np.vstack([columns / root, np.diag(prior)])
+    target = np.concatenate([-left / root, -offset])
+    return np.asarray(lstsq(rows, target, lapack_driver="gelsy")[0])

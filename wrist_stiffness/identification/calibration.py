@@ -1,0 +1,177 @@
+"""Commissioning: registrations, zeros, tare, and the tolerances of one wrist, from recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.base_fit import BaseFit, fit_cleaned
+from wrist_stiffness.identification.free_effects import commissioning, unfitted
+from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.identification.problem import FitProblem, require_units
+from wrist_stiffness.identification.result import Fit, FittedParameter
+from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
+from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.unit_session import as_units
+
+NEGLIGIBLE = 0.01
+"""Of a prior's standard deviation: a smaller move of a parameter that the data do not tell is none.
+"""
+
+STEPS = 3
+"""That are told of."""
+
+CALIBRATED = "calibrated"
+"""Key of the recording's notes that lists ids of effects which need no fit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A model fitted to a wrist as it was set up last.
+
+    Parameters
+    ----------
+    fit : Fit
+        To all recordings.
+    before, after : dict of str to float
+        Error of the model as it stood and of a calibrated one on the units that judge, RMS by the
+        key of the quantity.
+    judged_by : str
+        See `judge`.
+    calibrated : tuple of str
+        Ids of effects that the recordings say need no fit.
+    """
+
+    fit: Fit
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    judged_by: str
+    calibrated: tuple[str, ...]
+
+    @cached_property
+    def parameters(self) -> tuple[FittedParameter, ...]:
+        """All that was fitted."""
+        return self.fit.parameters
+
+    @cached_property
+    def model(self) -> ErrorModel:
+        """The model of the newest session; effects of which the data say nothing are left out."""
+        return told_model(self.fit)
+
+
+def calibrate(
+    model: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    progress: Progress = silent,
+    again: bool = False,
+) -> Calibration:
+    """Fit what differs from session to session and from wrist to wrist.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its effects are starts of what is fitted, or stay as they are.
+    sessions : sequence of MeasuredSession
+        In the order of time.  Of several the last one judges what the others tell, of one its end;
+        what is handed over is fitted to all.
+    progress : callable
+        Told steps done and steps at most.
+    again : bool
+        Whether the model was fitted to one of these sessions before: then what it found is no
+        knowledge to begin with.
+
+    Returns
+    -------
+    Calibration
+        Fit to all sessions, judged.
+
+    Raises
+    ------
+    InputError
+        If too little is measured, or nothing is free.
+    """
+    calibrated = said_calibrated(sessions)
+    start = unfitted(model) if again else model
+    free, held = commissioning(start, calibrated)
+    if not free:
+        raise InputError(
+            f"nothing is left to calibrate: the notes of the recordings say under {CALIBRATED!r} "
+            f"that {', '.join(calibrated)} need no fit"
+        )
+    units = tuple(as_units(model, session) for session in sessions)
+    problem = FitProblem(start.with_effects(*held), units, free)
+    require_units(problem)
+    progress(0, STEPS)
+    first, lost = fit_cleaned(problem)
+    progress(1, STEPS)
+    found = fitted(first, lost)
+    progress(2, STEPS)
+    judge = Judge(first)
+    after = judge.left(fit_cleaned(replace(problem, sessions=judge.parts.seen), first.z)[0])
+    before = judge.of_model(model)
+    progress(STEPS, STEPS)
+    reported = first.problem.table.reported
+    return Calibration(
+        found,
+        {q.key: before.rmse(q) for q in reported},
+        {q.key: after.rmse(q) for q in reported},
+        judge.by,
+        calibrated,
+    )
+
+
+def fitted(base: BaseFit, lost: int) -> Fit:
+    """Return what is known after a fit without effects beside it."""
+    return Fit(
+        WristFit(base, WristTable(base.problem.table, base.problem.sessions)).settled(), lost
+    )
+
+
+def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:
+    """Return the ids of effects that every recording says were calibrated otherwise.
+
+    Raises
+    ------
+    InputError
+        If a note is no list of names.
+    """
+    said = []
+    for session in sessions:
+        names = session.notes.get(CALIBRATED, [])
+        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+            raise InputError(f"{session.name}: note {CALIBRATED!r} is {names!r}, no list of names")
+        said.append(set(names))
+    return tuple(sorted(set.intersection(*said))) if said else ()
+
+
+def told_model(found: Fit, keep: Sequence[str] = ()) -> ErrorModel:
+    """Return a fitted model as it is written, of the newest session.
+
+    An effect of which the data say nothing is left out where it stayed at nothing, unless it is
+    among those to keep.
+    """
+    problem = found.problem
+    newest = problem.sessions[-1].name
+    told = {
+        parameter.effect
+        for parameter in found.parameters
+        if parameter.session in (None, newest)
+        and (parameter.excited or abs(parameter.moved) > NEGLIGIBLE)
+    }
+    effects = list(problem.model.effects)
+    for free, fitted in zip(problem.free, found.effects(), strict=True):
+        plain = Effect(free.effect.law, free.effect.component)
+        if fitted.name in (*told, *keep) or free.effect.si != plain.si:
+            effects.append(fitted)
+    names = {effect.name for effect in effects}
+    joint = found.joint
+    kept = tuple(name for name in joint.effects if name in names)
+    model = problem.model.with_effects(*effects)
+    return replace(model, joint=JointUncertainty(kept, joint.sigma))

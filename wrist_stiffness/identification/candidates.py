@@ -1,0 +1,264 @@
+"""The catalogue as candidates of a diagnosis: columns of every law at every place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.columns import Carried, Recipe, Shape, Values
+from wrist_stiffness.model.effect import Effect, effect_at
+from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.registry import catalogue, find_law
+from wrist_stiffness.sessions.columns import Effects, SessionModel
+from wrist_stiffness.sessions.refitted import SET_UP
+from wrist_stiffness.sessions.units import Mask
+
+LEVER, SHIFTS_ALONE = 0.03, 0.01
+"""A change shifts the platform alone if turns of its normal, at the distance of the bearings [m],
+are less than this share of the shifts: below a millimetre they are within an encoder step."""
+
+SET_UP_ANEW = {law for law, _ in SET_UP}
+"""Laws refitted in every session before any search; there is nothing to find."""
+
+Trial = tuple[Law, str, Values]
+
+
+@dataclass(frozen=True, eq=False)
+class WristCandidate:
+    """A law at a place, its recipe, and its columns on all points of its grid.
+
+    Parameters
+    ----------
+    law : Law
+        The physics.
+    place : str
+        Component.
+    recipe : Recipe
+        How it became columns.
+    known : dict of shape to (u, 6, k) arrays
+        Columns on the grid [m, rad].
+    exact : callable, optional
+        shape -> columns, where they are known between the points of the grid.
+    """
+
+    law: Law
+    place: str
+    recipe: Recipe
+    known: Mapping[Shape, Array]
+    exact: Callable[[Shape], Array] | None = None
+
+    @property
+    def name(self) -> str:
+        """`law@place`."""
+        return f"{self.law.id}@{self.place}"
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """Every point of the grid."""
+        return self.recipe.shapes
+
+    def effect(self, found: Mapping[str, float], shape: Shape) -> Effect:
+        """Return the effect with which a fit may begin.
+
+        Parameters
+        ----------
+        found : dict of str to float
+            Factors of the columns by their names.
+        shape : tuple of float
+            Values of the shape parameters.
+        """
+        return effect_at(self.law, self.place, self.recipe.start(found, shape))
+
+    def effect_of(self, values: Mapping[str, float]) -> Effect:
+        """Return the effect with these values, each brought within its bounds."""
+        return effect_at(self.law, self.place, values)
+
+    def at(self, shape: Shape) -> Array:
+        """Return the columns of all units at a point of the grid, (u, 6, k)."""
+        return self.exact(shape) if self.exact else self.known[shape]
+
+    @property
+    def usual(self) -> Array:
+        """Usual size of the factor of each column, (k,)."""
+        first = self.recipe.columns(self.shapes[0])
+        return np.array([column.factor.plausible for column in first])
+
+
+def compensable(law: Law, place: str, points: bool = True) -> str:
+    """Tell whether the motors can correct for an effect: `yes`, `needs_signal` or `no`.
+
+    Parameters
+    ----------
+    law : Law
+        The physics.
+    place : str
+        Component.
+    points : bool
+        Whether it turns the platform's normal.
+    """
+    if law.of_measurement(place) or not points:
+        return "no"
+    return "needs_signal" if law.signals else "yes"
+
+
+def turns_normal(columns: Array, normal: Array) -> bool:
+    """Tell whether any of the columns turns the platform's normal.
+
+    Parameters
+    ----------
+    columns : (u, 6, k) float
+        Twists at O in F [m, rad].
+    normal : (u, 3) float
+        Of the platform, unit vectors in F.
+    """
+    turned = np.cross(columns[:, 3:], normal[:, :, None], axis=1)
+    lengths = [np.linalg.norm(each, axis=(0, 1)) for each in (turned, columns[:, :3])]
+    return bool((LEVER * lengths[0] > SHIFTS_ALONE * lengths[1]).any())
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where columns are taken: the base of each session on its units.
+
+    Parameters
+    ----------
+    models : tuple of SessionModel
+        With the effects of the base.
+    used : tuple of (u,) bool
+        Units of each session that are in the table.
+    """
+
+    models: tuple[SessionModel, ...]
+    used: tuple[Mask, ...]
+
+    @property
+    def signals(self) -> frozenset[str]:
+        """Components with a thermometer in every session."""
+        names = [set(each.session.block.temperatures) for each in self.models]
+        return frozenset(set.intersection(*names))
+
+    def changes(self, trials: Sequence[Trial]) -> Array:
+        """Return the change of the predictions by each trial, (t, u, 6) [m, rad].
+
+        Parameters
+        ----------
+        trials : sequence of (Law, str, dict)
+            A law at a place with values of its parameters; an effect that the base has already
+            gets these values on top of its own.
+        """
+        blocks = []
+        for model, rows in zip(self.models, self.used, strict=True):
+            sets = [_with(model.effects, *trial) for trial in trials]
+            found = np.stack(model.changes(sets)) if sets else np.empty((0, len(rows), 6))
+            blocks.append(np.nan_to_num(found[:, rows]))
+        return np.concatenate(blocks, axis=1)
+
+    def mean(self, signal: Callable[[SessionModel], Array]) -> Array:
+        """Return a signal of each unit of the table, (u, ...)."""
+        return np.concatenate(
+            [signal(m)[rows] for m, rows in zip(self.models, self.used, strict=True)]
+        )
+
+
+def searched(absent: Collection[str]) -> list[tuple[Law, str]]:
+    """Return all laws of the catalogue at all their places, but for effects that are there."""
+    return [
+        (law, place)
+        for law in catalogue().values()
+        if law.id not in SET_UP_ANEW
+        for place in law.places
+        if f"{law.id}@{place}" not in absent
+    ]
+
+
+def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[WristCandidate, ...]:
+    """Evaluate laws at places about a point.
+
+    Parameters
+    ----------
+    point : Point
+        The base.
+    asked : sequence of (Law, str)
+        Laws with a component each.
+
+    Raises
+    ------
+    InputError
+        If a law of another package does not say how large it usually is.
+    """
+    signals = point.signals
+    plans = [(law, place, law.linearised(place, signals)) for law, place in asked]
+    for law, place, _ in plans:
+        _require_usual_sizes(law, place)
+    trials: dict[tuple[object, ...], int] = {}
+    listed: list[Trial] = []
+
+    def index(law: Law, place: str, values: Values) -> int:
+        key = (law.id, place, *sorted(values.items()))
+        if key not in trials:
+            trials[key] = len(listed)
+            listed.append((law, place, values))
+        return trials[key]
+
+    for law, place, own in plans:
+        if own.carried:
+            index(find_law(own.carried.law), place, own.carried.values)
+            continue
+        for column in (c for shape in own.shapes for c in own.columns(shape)):
+            index(law, place, column.trial)
+            if column.origin:
+                index(law, place, column.origin)
+    changes = point.changes(listed)
+    found = []
+    for law, place, own in plans:
+        if own.carried:
+            carrier = changes[index(find_law(own.carried.law), place, own.carried.values)]
+            exact = _times_signals(point, carrier, own.carried)
+            found.append(WristCandidate(law, place, own, {}, exact))
+            continue
+        known = {}
+        for shape in own.shapes:
+            stack = []
+            for column in own.columns(shape):
+                change = changes[index(law, place, column.trial)]
+                if column.origin:
+                    change = change - changes[index(law, place, column.origin)]
+                stack.append(change / column.size)
+            known[shape] = np.stack(stack, axis=-1)
+        found.append(WristCandidate(law, place, own, known))
+    return tuple(found)
+
+
+def _require_usual_sizes(law: Law, place: str) -> None:
+    for each in law.parameters(place):
+        if not 0.0 < each.scale < np.inf:
+            raise InputError(
+                f"{law.id}@{place}: {each.key} has the scale {each.scale:g}; a diagnosis needs its "
+                "usual size, finite and above 0"
+            )
+
+
+def _times_signals(point: Point, carrier: Array, carried: Carried) -> Callable[[Shape], Array]:
+    """Return columns (u, 6, k) at any shape from what a carrier changes of each unit, (u, 6)."""
+
+    def columns(shape: Shape) -> Array:
+        def signals(model: SessionModel) -> Array:
+            return model.session.mean(carried.signals(shape, model.session.block))
+
+        return carrier[:, :, None] * point.mean(signals)[:, None, :]
+
+    return columns
+
+
+def _with(effects: Effects, law: Law, place: str, values: Mapping[str, float]) -> Effects:
+    """Return effects with one more, added to its like where the base has it."""
+    added = effect_at(law, place, values)
+    for number, own in enumerate(effects):
+        if own.name == added.name:
+            both = {key: own.estimates[key].value + values[key] for key in values}
+            return (*effects[:number], effect_at(law, place, both), *effects[number + 1 :])
+    return (*effects, added)

@@ -1,0 +1,132 @@
+"""The likelihood of a wrist's units: what noise, drift and a discrepancy make of each, whitened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from wrist_stiffness.identification.problem import WANDER
+from wrist_stiffness.identification.questions import Conditions, alike, passing, questions
+from wrist_stiffness.inference.discrepancy import SLOW_DRIFT, Question, background, low_rank
+from wrist_stiffness.inference.evidence import Evidence
+from wrist_stiffness.inference.observations import Labels, Observations
+from wrist_stiffness.inference.point import Background
+from wrist_stiffness.inference.shared import Apart, component_factors, own_covariance
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.sessions.unit_session import UnitSession
+
+DRIFT = 0.5
+"""Expected size of an instrument's slow drift where it states none, in scatters of one
+measurement (assumed)."""
+
+KNOWN, UNKNOWN = 0.2, 3.0
+"""Standard deviation of the logarithm of the noise's variance where an instrument or dwells tell
+it, and where nothing does (assumed)."""
+
+SURE_OF_NOISE = 3.0
+"""Widths by which noise may be more than is known of it; beyond, it is a misfit."""
+
+LAW_RANK = 8
+"""Columns of the error of one law."""
+
+
+class WristTable:
+    """The units of the sessions as whitened rows.
+
+    Parameters
+    ----------
+    table : Observations
+        Of `observing.tabulate`.
+    sessions : sequence of UnitSession
+        Of which.
+    ask : callable, optional
+        From the conditions to what is asked of the discrepancy.
+    """
+
+    def __init__(
+        self,
+        table: Observations,
+        sessions: Sequence[UnitSession],
+        ask: Callable[[Conditions], Sequence[Question]] = questions,
+    ) -> None:
+        self.table: Observations = table
+        stated = table.covariance
+        self._noise_width = UNKNOWN if stated is None else KNOWN
+        own = own_covariance(table, np.diag(4.0 * WANDER**2) if stated is None else stated)
+        # A drift that is stated has columns of its own.
+        slow = np.concatenate(
+            [np.broadcast_to(s.wander, (len(s), 6))[s.measured] for s in sessions]
+        )
+        if stated is not None:
+            own = own - slow[:, :, None] ** 2 * np.eye(6)
+        self._apart = Apart(table, component_factors(own, table.measured))
+        self._rows = np.flatnonzero(table.measured.ravel())
+        self.variance: Array = np.diagonal(own, axis1=1, axis2=2)
+        self._scatter = self.variance
+        if table.shared is not None and table.stand is not None:
+            shared = np.sum(table.shared**2, axis=2) * (table.stand >= 0)[:, None]
+            self._scatter = self.variance + shared
+        scatter = np.sqrt(np.median(self.variance, axis=0))
+        each = [np.broadcast_to(s.white, (len(s), 6))[s.measured] for s in sessions]
+        single = np.nan_to_num(np.median(np.concatenate(each), axis=0))
+        single = np.where(single > 0.0, single, scatter)
+        self.drift = np.maximum(DRIFT * single, slow.max(axis=0))
+        self.background: Background = background(
+            table,
+            self.whiten,
+            ask(table.covariates),
+            scatter,
+            self.drift,
+            self._noise_width,
+            drifts=(passing(table.sessions),),
+        )
+        self._alike = low_rank(alike(table.covariates), LAW_RANK)
+
+    def whiten(self, values: Array) -> Array:
+        """Return (u, 6) or (u, 6, k) as rows of unit scatter, (N,) or (N, k)."""
+        columns = values if values.ndim == 3 else values[:, :, None]
+        filled = np.where(self.table.measured[:, :, None], np.nan_to_num(columns), 0.0)
+        white = self._apart(filled).reshape(self.table.measured.size, columns.shape[2])
+        white = white[self._rows]
+        return white if values.ndim == 3 else white[:, 0]
+
+    @property
+    def unit(self) -> Labels:
+        """Unit of each row, (N,)."""
+        return self._rows // self.table.n_components
+
+    def noise(self, found: Evidence) -> dict[str, float]:
+        """Return the scatter of a unit by noise and hidden counts, RMS by quantity."""
+        return self.table.rms(self._scatter_of(found))
+
+    def noise_and_drift(self, found: Evidence) -> dict[str, float]:
+        """Return that with the instrument's slow drift, RMS by quantity."""
+        own = self._scatter_of(found)
+        at = {each.name: list(each.components) for each in self.table.quantities}
+        groups = zip(found.background.groups, found.amplitude, found.discrepant, strict=True)
+        for group, size, wrong in groups:
+            if group.name == SLOW_DRIFT and not wrong:
+                own[:, at[group.quantity]] += (size * self.drift[at[group.quantity]]) ** 2
+        return self.table.rms(own)
+
+    def _scatter_of(self, found: Evidence) -> Array:
+        """Variance of each unit by noise, as far as the excess is no misfit."""
+        known = np.log(found.excess) <= SURE_OF_NOISE * self._noise_width
+        return self._scatter * (found.excess if known else 1.0)
+
+    def above(self, found: Evidence) -> dict[str, float]:
+        """Return what is left above that noise, RMS by quantity."""
+        own = np.zeros_like(self.variance)
+        for quantity in self.table.quantities:
+            at = list(quantity.components)
+            count = max(int(self.table.measured[:, at].sum()), 1)
+            own[:, at] = self.variance[:, at] * found.left_of(quantity.name, count)
+        return self.table.rms(own)
+
+    def varied(self, change: Array) -> Array:
+        """Return columns (N, l) for a change (u, 6) whose size changes with the conditions.
+
+        Units under like conditions change alike.
+        """
+        return self.whiten(change[:, :, None] * self._alike[:, None, :])

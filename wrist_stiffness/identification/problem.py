@@ -1,0 +1,387 @@
+"""What a fit compares: measured pose errors of the units, and what a model says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.free_effects import FreeEffect
+from wrist_stiffness.identification.shims import GAP, Shims
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.settings import FEWEST_UNITS
+from wrist_stiffness.inference.shared import Apart, own_covariance
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.columns import SessionModel
+from wrist_stiffness.sessions.observing import Observed, tabulate
+from wrist_stiffness.sessions.unit_session import UnitSession
+
+NO_PRIOR = 1e-3
+"""Weight where a law knows no prior: a thousand times its first value, so that what the data do not
+excite stays where it is."""
+
+MOST_KNOWN = 4096
+"""Effects with values that are kept: a fit asks for one a parameter at a time."""
+
+Values = tuple[tuple[str, float], ...]
+
+STEP = 1e-2
+"""Step of the difference quotients, in standard deviations of the prior."""
+
+MOST_POINTS = 4
+"""So many points keep their columns."""
+
+WANDER = np.repeat([0.5e-6, 5e-6], 3)
+"""Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
+
+SILENT = 1e-6
+"""Length, in standard deviations of the noise, of a column that is rounding: bases of columns are
+blind to scales, and what rounding says differs from machine to machine."""
+
+
+def require_units(problem: FitProblem) -> None:
+    """Refuse recordings that are too short to fit to.
+
+    Raises
+    ------
+    InputError
+        With the sessions, the number of units and the least one, or that of measured numbers.
+    """
+    units, table = problem.table.n_units, problem.table
+    if units < FEWEST_UNITS:
+        names = ", ".join(session.name for session in problem.sessions)
+        raise InputError(
+            f"{names}: {units} dwells and moments are too few to fit to, it needs {FEWEST_UNITS}"
+        )
+    if (measured := table.measured.sum()) < np.count_nonzero(problem.weights <= NO_PRIOR):
+        raise InputError(f"fit: only {measured} numbers were measured")
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that is fitted, counted in steps from the mean of its prior.
+
+    Parameters
+    ----------
+    free : int
+        Place of its effect among the free ones.
+    key : str
+        Name of the parameter.
+    session : int or None
+        Session whose own it is, None for the wrist's.
+    mean, step : float
+        Where it starts and its natural size, in the unit of its name.
+    weight : float
+        `step` over the standard deviation of the prior.
+    lower, upper : float
+        Bounds, in the unit of its name.
+    """
+
+    free: int
+    key: str
+    session: int | None
+    mean: float
+    step: float
+    weight: float
+    lower: float
+    upper: float
+
+    def value(self, steps: float) -> float:
+        """Return its value so many steps from the mean, within the bounds."""
+        return min(max(self.mean + steps * self.step, self.lower), self.upper)
+
+
+def _weight(free: FreeEffect, key: str) -> float:
+    return 1.0 if np.isfinite(free.scale[key]) else NO_PRIOR
+
+
+def _together(one: Effect, other: Effect) -> Effect:
+    """Return the sum of two effects of one name, within the bounds of its parameters."""
+    total = {}
+    for each in one.parameters:
+        value = one.estimates[each.key].value + other.estimates[each.key].value
+        total[each.key] = min(max(value, each.lower), each.upper)
+    return one.with_values(total)
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """A model, sessions, and what may move.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Table and the effects that stay as they are.
+    sessions : tuple of UnitSession
+        In the order of time.
+    free : tuple of FreeEffect
+        What may move; none of them is among the model's effects.  The second of one name is what
+        came on top of the first after the wrist was fitted: no shim follows it.
+    """
+
+    model: ErrorModel
+    sessions: tuple[UnitSession, ...]
+    free: tuple[FreeEffect, ...]
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """All numbers that are fitted: the wrist's, then those of each session."""
+        found = []
+        for session in (None, *range(len(self.sessions))):
+            for place, free in enumerate(self.free):
+                if free.per_session == (session is None):
+                    continue
+                bounds = {p.key: p for p in free.effect.parameters}
+                found += [
+                    Unknown(
+                        place,
+                        key,
+                        session,
+                        free.effect.estimates[key].value,
+                        free.step[key],
+                        _weight(free, key),
+                        bounds[key].lower,
+                        bounds[key].upper,
+                    )
+                    for key in free.scale
+                ]
+        return tuple(found)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds in steps, (p,)."""
+        lower = [(u.lower - u.mean) / u.step for u in self.unknowns]
+        upper = [(u.upper - u.mean) / u.step for u in self.unknowns]
+        return np.array(lower), np.array(upper)
+
+    @property
+    def weights(self) -> Array:
+        """Weights of the priors, (p,)."""
+        return np.array([unknown.weight for unknown in self.unknowns])
+
+    def effects(self, z: Array, session: int) -> tuple[Effect, ...]:
+        """Return the free effects as a session has them, gaps as shims leave them.
+
+        Parameters
+        ----------
+        z : (p,) float
+            Steps from the prior means.
+        session : int
+            Number of the session.
+        """
+        return self._with_values(self._values(z, session))
+
+    def _values(self, z: Array, session: int) -> list[dict[str, float]]:
+        """Return the fitted values of each free effect."""
+        values: list[dict[str, float]] = [{} for _ in self.free]
+        for unknown, steps in zip(self.unknowns, z.tolist(), strict=True):
+            if unknown.session in (None, session):
+                values[unknown.free][unknown.key] = unknown.value(steps)
+        return values
+
+    def _with_values(self, values: list[dict[str, float]]) -> tuple[Effect, ...]:
+        keys = [(place, tuple(own.items())) for place, own in enumerate(values)]
+        built = self._built
+        gaps = self._shims.gaps(self._as_built, [self._effect(*keys[place]) for place in built])
+        for number, gap in gaps.items():
+            place, own = keys[built[number]]
+            keys[place] = place, (*own, (GAP, gap))
+        found = {place: self._effect(*keys[place]) for place in built}
+        for place, first in self._on_top.items():
+            found[first] = self._sum(*keys[first], *keys[place])
+        return tuple(found.values())
+
+    def _moved(
+        self,
+        effects: tuple[Effect, ...],
+        values: list[dict[str, float]],
+        unknown: Unknown,
+        steps: float,
+    ) -> tuple[Effect, ...]:
+        """Return the effects of these values with one unknown so many steps from its mean."""
+        free = unknown.free
+        own = values[free] | {unknown.key: unknown.value(steps)}
+        with_others = self._shims.move_with(self.free[free].effect)
+        if with_others or free in self._on_top or free in self._on_top.values():
+            return self._with_values([*values[:free], own, *values[free + 1 :]])
+        at = self._built.index(free)
+        return (*effects[:at], self._effect(free, tuple(own.items())), *effects[at + 1 :])
+
+    @cached_property
+    def _on_top(self) -> dict[int, int]:
+        """Place of what came on top of an effect, and of that effect."""
+        names = [each.effect.name for each in self.free]
+        firsts = [names.index(name) for name in names]
+        return {place: first for place, first in enumerate(firsts) if first != place}
+
+    @cached_property
+    def _effect(self) -> Callable[[int, Values], Effect]:
+        """Free effects with values: trials that differ in one effect share all others."""
+
+        @lru_cache(maxsize=MOST_KNOWN)
+        def effect(place: int, values: Values) -> Effect:
+            return self.free[place].effect.with_values(dict(values))
+
+        return effect
+
+    @cached_property
+    def _sum(self) -> Callable[[int, Values, int, Values], Effect]:
+        """Sums of two of these effects."""
+
+        @lru_cache(maxsize=MOST_KNOWN)
+        def together(first: int, own: Values, place: int, values: Values) -> Effect:
+            return _together(self._effect(first, own), self._effect(place, values))
+
+        return together
+
+    @cached_property
+    def _built(self) -> tuple[int, ...]:
+        """Places of the free effects but for what came on top of them later."""
+        return tuple(place for place in range(len(self.free)) if place not in self._on_top)
+
+    @cached_property
+    def _as_built(self) -> tuple[Effect, ...]:
+        """Starts of these."""
+        return tuple(self.free[place].effect for place in self._built)
+
+    @cached_property
+    def _shims(self) -> Shims:
+        return Shims.of(self.model, self._as_built)
+
+    def residual(self, z: Array) -> Array:
+        """Return log(T_measured T_predicted^-1) of all units, (u, 6) at O in F [m, rad]."""
+        return self.rows(
+            [
+                self._residuals(number, [self.effects(z, number)])[0]
+                for number in range(len(self.sessions))
+            ]
+        )
+
+    def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
+        """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
+
+        By one-sided differences, away from the nearer bound.  Where the parameter's effect does not
+        need the path, the difference is taken at mean moments, without the effects that have a
+        past: that is far quicker, and good enough for the slope.  Play stays: where a pin is free,
+        nothing else has the slope that it has without.
+
+        Parameters
+        ----------
+        z : (p,) float
+            Steps from the prior means.
+        places : collection of int, optional
+            Which unknowns are asked for; all by default.
+
+        Returns
+        -------
+        (u, 6, p or number of places) array
+            In the order of `places`.
+        """
+        asked = list(range(len(self.unknowns)) if places is None else places)
+        return self.rows([self._columns(number, z, asked) for number in range(len(self.sessions))])
+
+    def _columns(self, number: int, z: Array, asked: list[int]) -> Array:
+        """Return the columns of one session's units, (u, 6, number asked)."""
+        model, session = self._models[number], self.sessions[number]
+
+        values = self._values(z, number)
+        effects = self._with_values(values)
+        whole = (*self.model.effects, *effects)
+        step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
+        moved, trials, by_path = [], [], []
+        for place in asked:
+            unknown = self.unknowns[place]
+            if unknown.session not in (None, number):
+                continue
+            other = self._moved(effects, values, unknown, float(z[place] + step[place]))
+            trial = (*self.model.effects, *other)
+            by_path.append(model.remembers((self.free[unknown.free].effect,)))
+            trials.append(trial if by_path[-1] else model.of_the_moment(trial))
+            moved.append(place)
+        path, quick, *changed = model.predicted(
+            [whole, model.of_the_moment(whole), *trials], [model.remembers(whole), False, *by_path]
+        )
+        twists = [
+            path + twist - (path if on_path else quick)
+            for on_path, twist in zip(by_path, changed, strict=True)
+        ]
+        first, *others = session.residual(np.stack([path, *twists]))
+        block = np.zeros((*first.shape, len(z)))
+        for place, other in zip(moved, others, strict=True):
+            block[:, :, place] = np.nan_to_num((other - first) / step[place])
+        return block[:, :, asked]
+
+    def same_as(self, other: FitProblem) -> bool:
+        """Tell whether another problem asks the same, so that what is known of it may be used."""
+        one, two = self.model, other.model
+        return (
+            self.sessions is other.sessions
+            and one.table is two.table
+            and (one.evaluation, one.effects) == (two.evaluation, two.effects)
+            and self.free == other.free
+        )
+
+    def columns_at(self, z: Array, places: tuple[int, ...] | None = None) -> Array:
+        """Return `columns`, of the last few points without evaluating anew; not to be changed.
+
+        A fit ends where its last step failed, and the next one begins where it ended.
+        """
+        key = (z.tobytes(), places)
+        if key not in self._known:
+            if len(self._known) == MOST_POINTS:
+                self._known.pop(next(iter(self._known)))
+            found = self.columns(z, places)
+            found[..., np.linalg.norm(self.whiten(found), axis=0) < SILENT] = 0.0
+            self._known[key] = found
+        return self._known[key]
+
+    @cached_property
+    def _known(self) -> dict[tuple[bytes, tuple[int, ...] | None], Array]:
+        return {}
+
+    @cached_property
+    def _apart(self) -> Apart:
+        stated = self.table.covariance
+        if stated is None:
+            stated = np.diag(4.0 * WANDER**2)
+        own = own_covariance(self.table, stated) + np.diag(WANDER**2)
+        return Apart(self.table, np.linalg.inv(np.linalg.cholesky(own)))
+
+    def whiten(self, values: Array) -> Array:
+        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
+        columns = values if values.ndim == 3 else values[:, :, None]
+        measured = self.table.measured[:, :, None]
+        filled = np.where(measured, np.nan_to_num(columns), 0.0)
+        white = self._apart(filled)
+        flat: Array = white.reshape(len(white) * white.shape[1], columns.shape[2])
+        return flat if values.ndim == 3 else flat[:, 0]
+
+    @cached_property
+    def table(self) -> Observations:
+        """Conditions, known scatter and labels of the units, with what was measured as values."""
+        return self._tabulated.observations
+
+    @cached_property
+    def _tabulated(self) -> Observed:
+        units = sum(map(len, self.sessions))
+        return tabulate(self.model, self.sessions, np.zeros((units, 6)))
+
+    def rows(self, blocks: list[Array]) -> Array:
+        """Put the sessions' units together and keep those of the table."""
+        return np.concatenate(
+            [block[each.measured] for block, each in zip(blocks, self.sessions, strict=True)]
+        )
+
+    def _residuals(self, number: int, additions: Sequence[Sequence[Effect]]) -> list[Array]:
+        session = self.sessions[number]
+        trials = [(*self.model.effects, *added) for added in additions]
+        return [session.residual(each) for each in self._models[number].along(trials)]
+
+    @cached_property
+    def _models(self) -> tuple[SessionModel, ...]:
+        return tuple(SessionModel(self.model, each, ()) for each in self.sessions)

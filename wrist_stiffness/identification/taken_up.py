@@ -1,0 +1,88 @@
+"""What the refitted base took up of the error, and how far it had to go for it.
+
+A tolerance at two standard deviations of its prior may be an effect that looks like it: an answer
+that names nothing must say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrist_stiffness.identification.base_fit import BaseFit
+from wrist_stiffness.sessions.observing import QUANTITIES
+
+
+@dataclass(frozen=True)
+class TakenUp:
+    """One part of the base.
+
+    Parameters
+    ----------
+    name : str
+        Effect and place, and the session where it is set up anew in each.
+    moved : dict of str to float
+        Root mean square by which it moved the prediction of what was measured, by quantity, in the
+        unit of its report.
+    parameter : str
+        Of a tolerance: the parameter that went furthest; empty for what has no prior.
+    value, deviations : float
+        Of that parameter: in the unit of its name, and in standard deviations of its prior.
+    """
+
+    name: str
+    moved: dict[str, float]
+    parameter: str = ""
+    value: float = 0.0
+    deviations: float = 0.0
+
+    @property
+    def sentence(self) -> str:
+        """One line for a person."""
+        units = {q.name: q.unit for q in QUANTITIES}
+        sizes = ", ".join(
+            f"{size:.2f} {units[name]} of {name}" for name, size in self.moved.items()
+        )
+        if not self.parameter:
+            return f"{self.name}: {sizes}"
+        return (
+            f"{self.name}: {sizes} ({self.parameter} = {self.value:.3g}, "
+            f"{self.deviations:.1f} standard deviations of its prior)"
+        )
+
+
+def taken_up(base: BaseFit, sessions: Sequence[str]) -> tuple[TakenUp, ...]:
+    """Tell what each part of a base took up: the set-up first, then tolerances, furthest first.
+
+    Parameters
+    ----------
+    base : BaseFit
+        Fitted.
+    sessions : sequence of str
+        Their names.
+    """
+    groups: dict[str, list[int]] = {}
+    for place, unknown in enumerate(base.problem.unknowns):
+        if base.of_base[place]:
+            name = base.problem.free[unknown.free].effect.name
+            where = "" if unknown.session is None else f" in {sessions[unknown.session]}"
+            groups.setdefault(name + where, []).append(place)
+    found = [_one(base, name, places) for name, places in groups.items()]
+    return tuple(sorted(found, key=lambda each: (bool(each.parameter), -each.deviations)))
+
+
+def _one(base: BaseFit, name: str, places: list[int]) -> TakenUp:
+    twist = base.columns[:, :, places] @ base.z[places]
+    table = base.problem.table
+    sizes = table.rms(twist**2)
+    moved = {q.name: sizes[q.key] for q in table.reported}
+    known = [place for place in places if np.isfinite(base.prior_std[place])]
+    if not known:
+        return TakenUp(name, moved)
+    far = max(known, key=lambda place: abs(base.z[place] / base.prior_std[place]))
+    unknown = base.problem.unknowns[far]
+    value = unknown.mean + float(base.z[far]) * unknown.step
+    share = abs(float(base.z[far] / base.prior_std[far]))
+    return TakenUp(name, moved, unknown.key, value, share)

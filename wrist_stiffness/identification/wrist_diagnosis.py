@@ -1,0 +1,297 @@
+"""Find the physical effects that are missing in a model of this wrist."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_cleaned
+from wrist_stiffness.identification.candidates import compensable, turns_normal
+from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.problem import require_units
+from wrist_stiffness.identification.taken_up import TakenUp, taken_up
+from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.inference.answer import (
+    NAMING,
+    Class,
+    Diagnosis,
+    Finding,
+    NotExcited,
+    Reading,
+    read,
+    standings,
+)
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
+from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.search import Search, State
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.registry import catalogue, find_law
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.refitted import TOLERATED
+from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+
+DETECTABLE = 3.0
+"""Standard deviations that an effect of typical size must leave beyond the base to be seen."""
+
+Tell = Callable[[str], None]
+
+
+def silent(text: str) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class WristDiagnosis:
+    """Answer of a diagnosis on the wrist.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What is missing, and how sure that is.
+    effects : tuple of Effect
+        Most probable member of each finding, fitted with its own law.
+    nominal, fitted : BaseFit
+        The model with its tolerances as fitted without any effect, and with those.
+    absorbed : tuple of TakenUp
+        What calibration took up: the set-up first, then tolerances, furthest from its prior first.
+    search : Search
+        With every set that was fitted, for what each rival would explain.
+    classes : tuple of Class
+        Of the most probable set.
+    """
+
+    diagnosis: Diagnosis
+    effects: tuple[Effect, ...]
+    nominal: BaseFit
+    fitted: BaseFit
+    absorbed: tuple[TakenUp, ...]
+    search: Search
+    classes: tuple[Class, ...]
+
+    @property
+    def observations(self) -> Observations:
+        """What the nominal model leaves of each unit."""
+        return self.nominal.problem.table.with_values(self.nominal.residual)
+
+    def change_by(self, name: str) -> Array:
+        """Return what the best set with a rival explains of each unit, (u, 6) [m, rad].
+
+        Raises
+        ------
+        InputError
+            If no set with it was fitted.
+        """
+        states = [each for each in self.search.states.values() if name in each.names]
+        if not states:
+            raise InputError(
+                f"{name}: was not fitted; slopes alone told that it explains too little"
+            )
+        best = max(states, key=lambda each: each.log)
+        return np.asarray(self.nominal.residual - best.fit.base.residual)
+
+
+def diagnose_sessions(
+    model: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    naming: float = NAMING,
+    seconds: float = np.inf,
+    tell: Tell = silent,
+) -> WristDiagnosis:
+    """Find the effects of the catalogue that a model misses.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    sessions : sequence of MeasuredSession
+        In the order of time.  Of several the last one judges what the others show; of one its end
+        judges the values, and the whole of it chooses the effects.
+    naming : float, optional
+        Probability from which an effect is named.
+    seconds : float, optional
+        Time after which no further fit is begun.
+    tell : callable, optional
+        Told what is being done.
+
+    Returns
+    -------
+    WristDiagnosis
+        The answer, and the fits that it rests on.
+
+    Raises
+    ------
+    InputError
+        If there is no session, or one without any measured pose, or a setting is out of range.
+    """
+    _require_poses(sessions)
+    if not 0.0 < naming < 1.0:
+        raise InputError(f"naming probability {naming:g} is not between 0 and 1 (0 to 100 %)")
+    if not seconds > 0.0:
+        raise InputError(f"{seconds:g} seconds for a diagnosis: must be above 0")
+    units = tuple(as_units(model, session) for session in sessions)
+    chosen = units[:-1] if len(units) > 1 else units
+    problem = WristProblem(model, chosen)
+    require_units(problem.begin().base.problem)
+    search = Search(problem, seconds, tell)
+    search.run()
+    reading = _settled(read(search, naming))
+    tell("judging by what was held out")
+    judge = _Judged(model, units, search, reading)
+    kept = judge.kept(search, reading)
+    reading = kept if kept is reading else _settled(kept)
+    state = reading.state
+    absorbed = taken_up(state.fit.base, [session.name for session in sessions])
+    findings = [_finding(search, each, reading, judge) for each in reading.named]
+    suspects = [
+        _finding(search, e, reading, None) for e in reading.classes if e not in reading.named
+    ]
+    table = state.fit.table
+    held = judge.stages
+    diagnosis = Diagnosis(
+        reading.verdict,
+        reading.probability,
+        table.noise(state.evidence),
+        table.above(state.evidence),
+        _errors(table.table, held[0]),
+        _errors(table.table, held[-1]),
+        tuple(findings),
+        tuple(suspects),
+        reading.depends_on,
+        reading.unexplained,
+        standings(search, reading),
+        _not_excited(problem, search),
+        tuple(each.sentence for each in absorbed),
+        judge.scope,
+        () if search.in_time else ("the time was over before every candidate was fitted",),
+    )
+    beyond = state.fit.base.beyond()
+    effects = tuple(beyond[each.name] for each in reading.named)
+    return WristDiagnosis(
+        diagnosis,
+        effects,
+        search.base.fit.base,
+        state.fit.base,
+        absorbed,
+        search,
+        reading.classes,
+    )
+
+
+def _settled(reading: Reading) -> Reading:
+    """Return a reading with its set as it is handed over."""
+    found = reading.state.fit.settled()
+    return replace(reading, state=replace(reading.state, fit=found, evidence=found.evidence))
+
+
+def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
+    if not sessions:
+        raise InputError("no session to diagnose")
+    for session in sessions:
+        if not (np.isfinite(session.shift).any() or np.isfinite(session.rotation).any()):
+            raise InputError(f"{session.name}: no measured pose in the whole session")
+
+
+class _Judged:
+    """The stages of an answer, judged by what was not seen."""
+
+    def __init__(
+        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, reading: Reading
+    ) -> None:
+        nominal: BaseFit = search.base.fit.base
+        if len(whole) > len(nominal.problem.sessions):
+            nominal, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
+        self._model, self._judge = model, Judge(nominal)
+        self.scope = self._judge.by
+        effects = list(reading.state.fit.base.beyond().values())
+        self.stages = [self._left(effects[:count]) for count in range(len(effects) + 1)]
+
+    def _left(self, effects: Sequence[Effect]) -> HeldOut:
+        """Return what is left by the model with some effects."""
+        judge = self._judge
+        return judge.left(fit_base(self._model, judge.parts.seen, effects, judge.whole))
+
+    def kept(self, search: Search, reading: Reading) -> Reading:
+        """Return a reading without what makes the held-out part worse: it is not handed over."""
+        if not reading.named or not refuted(self.stages[0], self.stages[-1]):
+            return reading
+        self.stages = self.stages[:1]
+        return replace(
+            reading,
+            state=search.base,
+            named=(),
+            verdict="unknown",
+            unexplained=1.0,
+        )
+
+    def without(self, fitted: BaseFit, name: str) -> HeldOut:
+        """Return what is left without one of the effects."""
+        others = [each for own, each in fitted.beyond().items() if own != name]
+        return self._left(others) if others else self.stages[0]
+
+
+def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | None) -> Finding:
+    state = reading.state if judge is not None else search.best
+    fit: WristFit = state.fit
+    law, place = _law_and_place(found.name)
+    effect = fit.base.beyond()[found.name]
+    quantities = fit.table.table.reported
+    buys = {}
+    if judge is not None:
+        before = judge.without(fit.base, found.name)
+        buys = {q.key: bought(before, judge.stages[-1], q) for q in quantities}
+    normal = fit.base.problem.model.table.mechanism
+    theta = np.concatenate([s.still.theta[s.measured] for s in fit.base.problem.sessions])
+    points = turns_normal(fit.change(found.name)[:, :, None], normal.normal(normal.forward(theta)))
+    explained = 1.0 - found.left
+    return Finding(
+        tuple((*_law_and_place(name), share) for name, share in found.members.items()),
+        found.probability,
+        _values(state, found.name, effect),
+        found.log_gain,
+        explained,
+        buys,
+        compensable(find_law(law), place, points),
+        f"{find_law(law).sentence.format(place=place)}. "
+        f"Explains {100.0 * explained:.3g} % of the error above the noise.",
+        find_law(law).check,
+    )
+
+
+def _law_and_place(name: str) -> tuple[str, str]:
+    law, _, place = name.partition("@")
+    return law, place
+
+
+def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, float]]:
+    """Return the parameters of an effect and their standard uncertainties, in their units."""
+    places = state.fit.places[name]
+    known = {each.key: each for each in effect.parameters}
+    sigma = np.sqrt(np.diag(state.evidence.covariance_of_fit)[places])
+    keys = [state.fit.base.problem.unknowns[place].key for place in places]
+    return {
+        key: (effect.estimates[key].value, float(own * known[key].scale))
+        for key, own in zip(keys, sigma, strict=True)
+    }
+
+
+def _errors(table: Observations, left: HeldOut) -> dict[str, float]:
+    return {quantity.key: left.rmse(quantity) for quantity in table.reported}
+
+
+def _not_excited(problem: WristProblem, search: Search) -> tuple[NotExcited, ...]:
+    """Return the candidates of which a typical size would not show."""
+    silent_ones = []
+    for trial in problem.trials(search.base.fit):
+        if trial.name in {name for names in search.states for name in names}:
+            continue
+        strongest = max(search.base.evidence.strength(columns) for _, columns in trial.blocks)
+        law, place = _law_and_place(trial.name)
+        if strongest < DETECTABLE and law not in TOLERATED:
+            silent_ones.append(NotExcited(law, place, catalogue()[law].excited_by))
+    return tuple(silent_ones)

@@ -1,0 +1,174 @@
+"""A fitted set of effects as the evidence takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from wrist_stiffness.identification.base_fit import BaseFit
+from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.inference.evidence import Evidence, evidence, known_noise
+from wrist_stiffness.inference.point import Point
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.parameters import Parameter
+
+MOST_ROUNDS = 10
+"""Steps from where a fit ended to the maximum of the posterior."""
+
+SMALL_GAIN = 1e-2
+"""A fit has settled where twice the log posterior gains no more: a tenth of an uncertainty."""
+
+LARGE_GAIN = 1.0
+"""An uncertainty: where a fit ends further from the maximum, at a kink, that is said."""
+
+MOST_HALVINGS = 8
+
+LEAST = 1e-12
+"""Share of the largest eigenvalue of a correlation below which one is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class WristFit:
+    """A set of effects fitted whole to the wrist.
+
+    Parameters
+    ----------
+    base : BaseFit
+        Set-up, tolerances and effects.
+    table : WristTable
+        Of the same units.
+    """
+
+    base: BaseFit
+    table: WristTable
+
+    @property
+    def names(self) -> Collection[str]:
+        """Effects of the set."""
+        return self.base.extras
+
+    def change(self, name: str) -> Array:
+        """Return what an effect of the set does to the predictions, (u, 6) to first order."""
+        at = self.places[name]
+        return np.asarray(-self.base.columns[:, :, at] @ self.base.z[at])
+
+    @cached_property
+    def places(self) -> dict[str, NDArray[np.intp]]:
+        """Places of the unknowns of each effect."""
+        problem, of_base = self.base.problem, self.base.of_base
+        names = [problem.free[unknown.free].effect.name for unknown in problem.unknowns]
+        return {
+            own: np.flatnonzero([n == own and not b for n, b in zip(names, of_base, strict=True)])
+            for own in self.names
+        }
+
+    @cached_property
+    def sized(self) -> dict[int, Parameter]:
+        """Parameters of effects by the place of their unknown, of those with a usual size."""
+        problem, found = self.base.problem, {}
+        for places in self.places.values():
+            for place in places.tolist():
+                unknown = problem.unknowns[place]
+                own = next(
+                    p for p in problem.free[unknown.free].effect.parameters if p.key == unknown.key
+                )
+                if np.isfinite(own.scale):
+                    found[place] = own
+        return found
+
+    @cached_property
+    def ratio(self) -> Array:
+        """Steps of the fit in one standard deviation of each unknown of `point`, (p,)."""
+        found = np.ones(len(self.base.z))
+        for place, own in self.sized.items():
+            found[place] = own.scale / self.base.problem.unknowns[place].step
+        return found
+
+    @cached_property
+    def point(self) -> Point:
+        """Where the fit ended, whitened; effects in usual sizes from the mean of their law."""
+        base, table = self.base, self.table
+        z = base.z.copy()
+        inexact = [np.zeros((len(table.whiten(base.residual)), 0))]
+        varied = {}
+        for name, places in self.places.items():
+            effect = base.problem.free[base.problem.unknowns[places[0]].free].effect
+            varied[name] = table.varied(self.change(name))
+            inexact.append(effect.law.inexactness * varied[name])
+        for place, own in self.sized.items():
+            unknown = base.problem.unknowns[place]
+            z[place] = (unknown.mean + base.z[place] * unknown.step - own.mean) / own.scale
+        effects = {
+            name: np.array([place for place in places if place in self.sized], dtype=np.intp)
+            for name, places in self.places.items()
+        }
+        return Point(
+            table.whiten(base.residual),
+            table.whiten(base.columns * self.ratio),
+            z,
+            base.problem.weights.copy(),
+            {name: places for name, places in effects.items() if len(places)},
+            np.concatenate(inexact, axis=1),
+            varied,
+        )
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """At the amplitudes of the largest evidence."""
+        return evidence(self.point, self.table.background)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the steps of all unknowns where a fit has settled, (p, p)."""
+        return self.evidence.covariance_of_fit * np.outer(self.ratio, self.ratio)
+
+    def settled(self) -> WristFit:
+        """Return the most probable values beside noise and drift as they are known.
+
+        A discrepancy takes nothing over from them: they are there to predict, and nobody would
+        predict by a discrepancy.
+        """
+        fit, gain = self, np.inf
+        for _ in range(MOST_ROUNDS):
+            noise = known_noise(fit.point, self.table.background)
+            step, gain = fit._step(noise)
+            moved = fit._moved(noise, step) if gain >= SMALL_GAIN else None
+            if moved is None:
+                break
+            fit = moved
+        return WristFit(replace(fit.base, arrived=gain < LARGE_GAIN), self.table)
+
+    def _step(self, found: Evidence) -> tuple[Array, float]:
+        """Return the step to the maximum within the bounds (p,), and its gain to second order."""
+        z, whole = self.base.z, self.ratio * found.step
+        if not len(z):
+            return z, 0.0
+        lower, upper = self.base.problem.bounds
+        low, high = np.minimum(lower - z, 0.0), np.maximum(upper - z, 0.0)
+        covariance = found.covariance[: len(z), : len(z)] * np.outer(self.ratio, self.ratio)
+        sigma = np.sqrt(np.diag(covariance))
+        sizes, vectors = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+        root = (vectors / np.sqrt(np.maximum(sizes, LEAST * sizes[-1]))).T
+        step = whole
+        if ((step < low) | (step > high)).any():
+            bounds = low / sigma - LEAST, high / sigma + LEAST
+            step = sigma * lsq_linear(root, root @ (whole / sigma), bounds, method="bvls").x
+        step = np.clip(step, low, high)
+        left = root @ ((whole - step) / sigma)
+        return step, float(np.sum((root @ (whole / sigma)) ** 2) - left @ left)
+
+    def _moved(self, found: Evidence, step: Array) -> WristFit | None:
+        """Return the fit a step further on, or less far; None where none is better."""
+        before = found.cost(self.point)
+        for halvings in range(MOST_HALVINGS):
+            z = self.base.z + 0.5**halvings * step
+            base = replace(self.base, z=z, residual=self.base.problem.residual(z))
+            tried = WristFit(base, self.table)
+            if found.cost(tried.point) < before:
+                return tried
+        return None

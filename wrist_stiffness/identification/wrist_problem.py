@@ -1,0 +1,171 @@
+"""What the search asks of a wrist: fits of sets of effects, and every candidate about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.identification.base_fit import (
+    Base,
+    BaseFit,
+    fit_base,
+    fit_cleaned,
+    free_base,
+    has_walls,
+)
+from wrist_stiffness.identification.candidates import (
+    Point as WristPoint,
+)
+from wrist_stiffness.identification.candidates import (
+    WristCandidate,
+    searched,
+    wrist_candidates,
+)
+from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.identification.own_law import Beyond
+from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.inference.evidence import evidence
+from wrist_stiffness.inference.point import Background
+from wrist_stiffness.inference.search import FALLS, Ranked, Trial, ranked
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.unit_session import UnitSession
+
+LEAVES_MUCH = 1.5
+"""Variance of what is left, in units of the noise, from which a fit is begun from the drawing too:
+tolerances that gave way to a large effect may not find back."""
+
+
+class WristProblem:
+    """A wrist and its sessions as the search asks them.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    sessions : tuple of UnitSession
+        In the order of time.
+    base : (tuple of FreeEffect, tuple of Effect), optional
+        What of the model is free and what stays; by default as `free_base` says.
+    """
+
+    def __init__(
+        self, model: ErrorModel, sessions: tuple[UnitSession, ...], base: Base | None = None
+    ) -> None:
+        self._model, self._base = model, base or free_base(model)
+        free, held = self._base
+        self._first, self.lost = fit_cleaned(FitProblem(model.with_effects(*held), sessions, free))
+        self._sessions = self._first.problem.sessions
+        self.table = WristTable(self._first.problem.table, self._sessions)
+        self._asked: dict[int, tuple[BaseFit, WristPoint, dict[str, WristCandidate]]] = {}
+
+    @property
+    def background(self) -> Background:
+        """What has no name."""
+        return self.table.background
+
+    def begin(self) -> WristFit:
+        """Return the nominal model with its tolerances."""
+        return WristFit(self._first, self.table)
+
+    def trials(self, fit: WristFit) -> Sequence[Trial]:
+        """Return the catalogue about a fit."""
+        return [self._trial(each) for each in self._catalogue(fit)[1].values()]
+
+    def _trial(self, candidate: WristCandidate) -> Trial:
+        blocks = [
+            (shape, self.table.whiten(-candidate.at(shape) * candidate.usual))
+            for shape in candidate.shapes
+        ]
+        return Trial(candidate.name, candidate.law.smooth, tuple(blocks))
+
+    def added(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
+        """Return the best fit with one effect more; None where its law finds no equilibrium."""
+        point, candidates = self._catalogue(fit)
+        return self._added(fit, ranked, point, candidates[ranked.trial.name])
+
+    def extended(self, fit: WristFit, effect: Effect) -> WristFit:
+        """Return the best fit with an effect that somebody named.
+
+        Raises
+        ------
+        InputError
+            If its law finds no equilibrium anywhere near these data.
+        """
+        point = self._point(fit)
+        if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
+            start = Beyond(fit.base, point).best_multiple(effect)
+            return WristFit(
+                self._fitted([*fit.base.beyond().values(), start], fit.base), self.table
+            )
+        (candidate,) = wrist_candidates(point, [(effect.law, effect.component)])
+        (best,) = ranked(evidence(fit.point, self.background), [self._trial(candidate)])
+        found = self._added(fit, best, point, candidate)
+        if found is None:
+            raise InputError(f"{effect.name}: its law finds no equilibrium in these recordings")
+        return found
+
+    def _added(
+        self, fit: WristFit, ranked: Ranked, point: WristPoint, candidate: WristCandidate
+    ) -> WristFit | None:
+        factors = [each.factor.name for each in candidate.recipe.columns(ranked.shape)]
+        values = (ranked.z * candidate.usual).tolist()
+        own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
+        try:
+            if not candidate.law.smooth:
+                own = Beyond(fit.base, point).fitted(candidate, own)
+            extras = [*fit.base.beyond().values(), own]
+            found = self._fitted(extras, fit.base)
+            if found.variance > LEAVES_MUCH and found.cost < FALLS * fit.base.cost:
+                found = min(found, self._fitted(extras, None), key=_cost)
+            if found.variance > LEAVES_MUCH and has_walls(own):
+                usual = {p.key: p.mean or p.scale for p in own.parameters}
+                gradual = [*fit.base.beyond().values(), own.with_values(usual)]
+                found = min(found, self._gradual(gradual, fit.base), key=_cost)
+        except WristError:
+            return None
+        return WristFit(found, self.table)
+
+    def without(self, fit: WristFit, name: str) -> WristFit:
+        """Return the fit with one effect less, begun where this one ended."""
+        others = [each for own, each in fit.base.beyond().items() if own != name]
+        return WristFit(self._fitted(others, fit.base), self.table)
+
+    def _fitted(self, extras: Sequence[Effect], start: BaseFit | None) -> BaseFit:
+        return fit_base(self._model, self._sessions, extras, start, base=self._base)
+
+    def _gradual(self, extras: Sequence[Effect], start: BaseFit) -> BaseFit:
+        own = self._model, self._sessions, extras, start, True
+        return fit_base(*own, walls="rounded first", base=self._base)
+
+    def _catalogue(self, fit: WristFit) -> tuple[WristPoint, dict[str, WristCandidate]]:
+        known = self._asked.get(id(fit.base))
+        if known is None or known[0] is not fit.base:
+            point = self._point(fit)
+            absent = {each.name for each in self._model.effects} | set(fit.names)
+            found = {each.name: each for each in wrist_candidates(point, searched(absent))}
+            self._asked = {id(fit.base): (fit.base, point, found)}
+            known = self._asked[id(fit.base)]
+        return known[1], known[2]
+
+    def _point(self, fit: WristFit) -> WristPoint:
+        """Return where candidates are asked: beside all but play, of which the whole fit knows.
+
+        Play would be solved again for each of them.
+        """
+        sessions = self._sessions
+        used = tuple(each.measured for each in sessions)
+        models = []
+        for number in range(len(sessions)):
+            own = fit.base.model(number)
+            beside = tuple(e for e in own.effects if not (e.name in fit.names and has_walls(e)))
+            models.append(replace(own, effects=beside))
+        return WristPoint(tuple(models), used)
+
+
+def _cost(fitted: BaseFit) -> float:
+    return fitted.cost

@@ -1,0 +1,150 @@
+"""What a plan is chosen by: the questions in reach, beyond what was measured before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.planning.goals import all_goals, nearest, needed
+from wrist_stiffness.planning.information import (
+    Goal,
+    Information,
+    by_truth,
+    calibrated,
+    carried_over,
+    discrimination,
+    wrong_bound,
+)
+from wrist_stiffness.planning.question import SESSION, TARE, Question
+from wrist_stiffness.planning.truths import Truths, after_data, as_asked
+
+LONGER = 10.0
+"""What so many times the whole pool cannot separate counts as out of reach."""
+
+LIKELY = 0.5
+"""Share of a rival's possible values for which a plan settles it; the next one knows which hold."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How well the plan answers one question.
+
+    Parameters
+    ----------
+    goal : Goal
+        The question.
+    discrimination : float
+        Beyond what was measured before, in standard deviations.
+    reachable : bool
+        Whether `LONGER` times the pool with these loads could settle it.
+    """
+
+    goal: Goal
+    discrimination: float
+    reachable: bool
+
+    @property
+    def settled(self) -> bool:
+        """Whether the plan settles it."""
+        return self.discrimination >= needed(self.goal)
+
+
+@dataclass(frozen=True, eq=False)
+class Aims:
+    """What experiments are worth to a question.
+
+    Parameters
+    ----------
+    truths : Truths
+        Columns of all Gram matrices here, from those that were evaluated.
+    pool : Information
+        All settings as one experiment, in these columns.
+    start : (q, q) float
+        What was measured before.
+    goals : tuple of Goal
+        All that is asked.
+    everything : bool
+        Whether a new wrist is asked for: its calibration counts as well, and of each effect only
+        the nearest rivals.
+    """
+
+    truths: Truths
+    pool: Information
+    start: Array
+    goals: tuple[Goal, ...]
+    everything: bool
+
+    @cached_property
+    def at_most(self) -> tuple[Answer, ...]:
+        """Answers of `LONGER` times the pool."""
+        total = self.start + LONGER * self.pool.total
+        best = discrimination(total, self.pool.layout, self.goals, self.start)
+        return tuple(
+            Answer(goal, float(d), bool(d >= needed(goal)))
+            for goal, d in zip(self.goals, best, strict=True)
+        )
+
+    @cached_property
+    def reachable(self) -> tuple[Goal, ...]:
+        """What the choice is for."""
+        found = [each.goal for each in self.at_most if each.reachable]
+        if self.everything:
+            found = nearest(found, discrimination(self.pool.total, self.pool.layout, found))
+        return tuple(found)
+
+    def worth(self, gram: Array) -> Array:
+        """Return the worth (...) of experiments with Gram matrices (..., q, q), `start` in them."""
+        found = discrimination(gram, self.pool.layout, self.reachable, self.start)
+        right: Array = 1.0 - wrong_bound(found).mean(axis=-1)
+        return right + calibrated(gram, self.pool.layout) if self.everything else right
+
+    def settled(self, gram: Array) -> bool:
+        """Tell whether nothing more is needed than a Gram matrix (q, q), `start` in it."""
+        found = by_truth(gram, self.pool.layout, self.reachable, self.start)
+        return all(
+            np.mean(d >= needed(goal)) >= LIKELY
+            for goal, d in zip(self.reachable, found, strict=True)
+        )
+
+    def answers(self, gram: Array) -> tuple[Answer, ...]:
+        """Return the answers of an experiment with a Gram matrix (q, q), `start` in it."""
+        found = discrimination(gram, self.pool.layout, self.goals, self.start)
+        return tuple(
+            Answer(best.goal, float(d), best.reachable)
+            for best, d in zip(self.at_most, found, strict=True)
+        )
+
+
+def aims(
+    known: Information,
+    before: Sequence[Information],
+    question: Question,
+    rng: np.random.Generator,
+) -> Aims:
+    """Return what settings are chosen by.
+
+    Parameters
+    ----------
+    known : Information
+        Of the pool.
+    before : sequence of Information
+        Of earlier experiments on this wrist, each with instruments set up anew.
+    question : Question
+        What is asked, without what no experiment shows.
+    rng : numpy.random.Generator
+        Draws rivals that agree with what was measured before.
+    """
+    start = np.zeros_like(known.total)
+    for each in before:
+        start += carried_over(each, (*SESSION, TARE))
+    if before:
+        truths = after_data(start, known.layout, question.alike, rng)
+    else:
+        truths = as_asked(known, question.alike)
+    pool = Information(truths.of(known.grams), truths.layout)
+    goals = all_goals(known) if question.goals is None else question.goals
+    return Aims(truths, pool, truths.of(start), goals, question.goals is None)

@@ -1,0 +1,365 @@
+"""How well an experiment separates effects, from the Gram matrices of its visits.
+
+Everything is additive over visits: the Gram matrix of an experiment is the sum of theirs.  The
+discrimination of a truth y from a rival X is the length, in standard deviations, of what the best
+fit of X and of all nuisances N leaves of y,
+
+    d^2 = min over x, n of |y - X x - N n|^2 + |n / prior|^2 + |x / loose|^2,
+
+so a likelihood ratio between the two errs with a probability of about Phi(-d/2) (T-optimality,
+Atkinson and Fedorov 1975).  Of two effects that fit alike the Bayesian information criterion takes
+the one with fewer parameters: each one more of the rival counts like `CHARGE` of d^2, but never
+beyond what lets the truth be seen at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp, ndtr
+
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.planning.signatures import Signature
+from wrist_stiffness.planning.timeline import Experiment
+
+RESOLVED = 5.0
+"""Discrimination at which a pair counts as separated: the wrong one wins in 0.6 % of cases."""
+
+FREE = 10.0
+"""Prior of what is free, in plausible sizes: registrations, zeros, and a rival's parameters."""
+
+CHARGE = float(np.log(300.0))
+"""Of one parameter, with some hundred measured numbers."""
+
+MOTION_NOISE = 3.0
+"""Noise of one moment in motion against that of a dwell, which averages some ten samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementNoise:
+    """White noise of one dwell, and the encoder count that hides in it.
+
+    Parameters
+    ----------
+    white : (6,) float
+        Standard deviations of a dwell's mean pose [m, rad].
+    encoder_step : float
+        [rad]
+    """
+
+    white: Array
+    encoder_step: float
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A question that the experiment shall answer.
+
+    Parameters
+    ----------
+    truth : str
+        Effect that is there.
+    rival : str
+        Effect that might be taken for it; empty where the truth shall only be seen at all.
+    """
+
+    truth: str
+    rival: str
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Which column of the Gram matrices is what.
+
+    Parameters
+    ----------
+    prior : (p,) float
+        Precision of each nuisance in plausible sizes, first columns of the Gram matrices.
+    nuisances : dict of str to (k,) int
+        Of each nuisance among these.
+    columns : dict of str to (k,) int
+        Of each effect among the columns after the nuisances.
+    truths : dict of str to (t,) int
+        Likewise.
+    """
+
+    prior: Array
+    nuisances: dict[str, NDArray[np.intp]]
+    columns: dict[str, NDArray[np.intp]]
+    truths: dict[str, NDArray[np.intp]]
+
+
+def whitened(
+    experiment: Experiment, twists: Array, table: Table, noise: MeasurementNoise
+) -> list[Array]:
+    """Whiten columns visit by visit.
+
+    Between two approaches the hidden place within the encoder's count stays the same, so all
+    dwells of a visit have that error in common.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        With r observed rows.
+    twists : (n, 6, p) float
+        Columns at all samples of the path [m, rad].
+    table : Table
+        Of the wrist.
+    noise : MeasurementNoise
+        Of one dwell.
+
+    Returns
+    -------
+    list of (6 rows, p) float
+        By visit.
+    """
+    mechanism = table.mechanism
+    theta = experiment.block.theta[experiment.rows]
+    jacobian = np.zeros((len(theta), 6, 2))
+    jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
+    jacobian *= noise.encoder_step / np.sqrt(12.0)
+    found = []
+    for number in range(int(experiment.visit.max()) + 1):
+        rows = np.flatnonzero(experiment.visit == number)
+        moving = experiment.moving[rows]
+        size = np.where(moving, MOTION_NOISE, 1.0)
+        covariance = np.diag((size[:, None] * noise.white).ravel() ** 2)
+        # In motion every sample has a count of its own.
+        groups = [np.array([row]) for row in np.flatnonzero(moving)]
+        for group in (*groups, np.flatnonzero(~moving)):
+            shared = np.zeros((len(rows), 6, 2))
+            shared[group] = jacobian[rows[group]]
+            flat = shared.reshape(-1, 2)
+            covariance += flat @ flat.T
+        values = twists[experiment.rows[rows]].reshape(6 * len(rows), -1)
+        found.append(np.linalg.solve(np.linalg.cholesky(covariance), values))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Gram matrices of the visits of an experiment.
+
+    Parameters
+    ----------
+    grams : (v, q, q) float
+        One for each visit.
+    layout : Layout
+        Of their columns.
+    """
+
+    grams: Array
+    layout: Layout
+
+    @cached_property
+    def total(self) -> Array:
+        """Of the whole experiment, (q, q)."""
+        total: Array = self.grams.sum(axis=0)
+        return total
+
+
+def information(
+    experiment: Experiment,
+    nuisances: Sequence[Signature],
+    free: Sequence[str],
+    effects: Sequence[Signature],
+    table: Table,
+    noise: MeasurementNoise,
+) -> Information:
+    """Return the Gram matrices of an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The experiment.
+    nuisances : sequence of Signature
+        Refitted whatever is asked.
+    free : sequence of str
+        Names of the nuisances of which nothing is known beforehand; the others are known to one
+        plausible size.
+    effects : sequence of Signature
+        What is asked for.
+    table : Table
+        Of the wrist.
+    noise : MeasurementNoise
+        Of one dwell.
+
+    Returns
+    -------
+    Information
+        Of every visit.
+    """
+    blocks = [each.columns for each in nuisances]
+    prior: list[float] = []
+    groups: dict[str, NDArray[np.intp]] = {}
+    columns: dict[str, NDArray[np.intp]] = {}
+    truths: dict[str, NDArray[np.intp]] = {}
+    for each in nuisances:
+        count = each.columns.shape[2]
+        groups[each.name] = np.arange(len(prior), len(prior) + count)
+        prior += [FREE**-2 if each.name in free else 1.0] * count
+    at = 0
+    for each in effects:
+        for names, values in ((columns, each.columns), (truths, each.truths)):
+            blocks.append(values)
+            names[each.name] = np.arange(at, at + values.shape[2])
+            at += values.shape[2]
+    stacked = np.concatenate(blocks, axis=2)
+    grams = [rows.T @ rows for rows in whitened(experiment, stacked, table, noise)]
+    return Information(np.array(grams), Layout(np.array(prior), groups, columns, truths))
+
+
+def carried_over(known: Information, names: Sequence[str]) -> Array:
+    """Return what an experiment tells for another one in which some nuisances are set anew.
+
+    Parameters
+    ----------
+    known : Information
+        Of the earlier experiment.
+    names : sequence of str
+        Nuisances that are refitted in each.
+
+    Returns
+    -------
+    (q, q) float
+        Gram matrix, zero for those nuisances.
+    """
+    gram, layout = known.total, known.layout
+    own = np.concatenate([layout.nuisances[name] for name in names if name in layout.nuisances])
+    rest = np.setdiff1d(np.arange(len(gram)), own)
+    inner = gram[np.ix_(own, own)] + np.diag(layout.prior[own])
+    cross = gram[np.ix_(own, rest)]
+    left = np.zeros_like(gram)
+    left[np.ix_(rest, rest)] = gram[np.ix_(rest, rest)] - cross.T @ np.linalg.solve(inner, cross)
+    return left
+
+
+def beyond_nuisances(gram: Array, layout: Layout) -> Array:
+    """Return what the nuisances leave of Gram matrices (..., q, q), (..., q - p, q - p)."""
+    p = len(layout.prior)
+    inner = gram[..., :p, :p] + np.diag(layout.prior)
+    cross = gram[..., :p, p:]
+    left: Array = gram[..., p:, p:] - np.swapaxes(cross, -1, -2) @ np.linalg.solve(inner, cross)
+    return left
+
+
+def discrimination(
+    gram: Array, layout: Layout, goals: Sequence[Goal], before: Array | None = None
+) -> Array:
+    """Return the discrimination of each goal.
+
+    Parameters
+    ----------
+    gram : (..., q, q) float
+        Of one experiment or several.
+    layout : Layout
+        Of the columns.
+    goals : sequence of g Goal
+        Questions.
+    before : (q, q) float, optional
+        Part of the experiments that was measured before the questions were asked; only what comes
+        on top counts.
+
+    Returns
+    -------
+    (..., g) float
+        d in standard deviations; over several truths, what errs as often as they do on average.
+    """
+    squares = np.zeros((*gram.shape[:-2], len(goals)))
+    for number, own in enumerate(by_truth(gram, layout, goals, before)):
+        wrong = logsumexp(-0.125 * own**2, axis=-1) - np.log(own.shape[-1])
+        squares[..., number] = np.maximum(-8.0 * wrong, 0.0)
+    return np.sqrt(squares)
+
+
+def by_truth(
+    gram: Array, layout: Layout, goals: Sequence[Goal], before: Array | None = None
+) -> list[Array]:
+    """Return the discriminations (..., t) of each goal at each of its t truths.
+
+    What was measured `before` a question was asked has left it open, whatever is reckoned here: a
+    law that is not quite right, or a rival that bends further than its tangent, fits better than
+    it should.  Counted as an answer it would let one more pose pass for enough, again and again.
+    """
+    squares = _squares(gram, layout, goals)
+    if before is not None:
+        known = _squares(before, layout, goals)
+        squares = [np.maximum(s - k, 0.0) for s, k in zip(squares, known, strict=True)]
+    return [np.sqrt(each) for each in squares]
+
+
+def _squares(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
+    """Return the squares of the discriminations (..., t) of each goal."""
+    left = beyond_nuisances(gram, layout)
+    found = []
+    for goal in goals:
+        truth = layout.truths[goal.truth]
+        own = left[..., truth, truth]
+        if goal.rival:
+            rival = layout.columns[goal.rival]
+            inner = left[..., rival[:, None], rival] + np.eye(len(rival)) / FREE**2
+            cross = left[..., rival[:, None], truth]
+            apart = own - np.sum(cross * np.linalg.solve(inner, cross), axis=-2)
+            charge = CHARGE * (len(rival) - len(layout.columns[goal.truth]))
+            own = np.minimum(apart + charge, own)
+        found.append(np.maximum(own, 0.0))
+    return found
+
+
+def chance_right(discriminations: Array | float) -> Array:
+    """Return the probability that the data prefer the truth to its rival."""
+    right: Array = ndtr(0.5 * np.asarray(discriminations))
+    return right
+
+
+def wrong_bound(discriminations: Array) -> Array:
+    """Return the Chernoff bound exp(-d^2/8) on the probability of a wrong answer, times two."""
+    return np.exp(-0.125 * np.asarray(discriminations) ** 2)
+
+
+def calibrated(gram: Array, layout: Layout) -> Array:
+    """Return the mean gain of what is calibrated over its prior, in nats (D-optimality).
+
+    Parameters
+    ----------
+    gram : (..., q, q) float
+        Of one experiment or several.
+    layout : Layout
+        Of the columns.
+
+    Returns
+    -------
+    (...) float
+        Mean over the nuisances of the log of prior over posterior deviation.
+    """
+    p = len(layout.prior)
+    weight = 1.0 / np.sqrt(layout.prior)
+    scaled = weight[:, None] * gram[..., :p, :p] * weight
+    value: Array = np.linalg.slogdet(np.eye(p) + scaled)[1] / (2.0 * p)
+    return value
+
+
+def improvement(gram: Array, layout: Layout) -> dict[str, float]:
+    """Return by how much each nuisance's uncertainty falls, the geometric mean of its parameters.
+
+    Parameters
+    ----------
+    gram : (q, q) float
+        Of one experiment.
+    layout : Layout
+        Of the columns.
+
+    Returns
+    -------
+    dict of str to float
+        Prior over posterior standard deviation, 1 for nothing gained.
+    """
+    p = len(layout.prior)
+    posterior = np.diagonal(np.linalg.inv(gram[:p, :p] + np.diag(layout.prior)))
+    ratio = 1.0 / np.sqrt(layout.prior * posterior)
+    return {name: float(np.exp(np.log(ratio[at]).mean())) for name, at in layout.nuisances.items()}

@@ -1,0 +1,311 @@
+"""Plan an experiment: for commissioning, or between the rivals that a diagnosis left.
+
+What effects would leave is computed with the model on a pool of settings performed as one
+experiment; settings are chosen by their Gram matrices; what the chosen experiment will settle is
+computed again on its own path, in its own order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.planning.aims import Answer, aims
+from wrist_stiffness.planning.choice import LOOKED_AT, choose
+from wrist_stiffness.planning.information import (
+    Information,
+    MeasurementNoise,
+    improvement,
+    information,
+)
+from wrist_stiffness.planning.loads_file import Source
+from wrist_stiffness.planning.pool import (
+    Setting,
+    arrange,
+    draw_settings,
+    fixed_visits,
+    moved_outward,
+    reference_pose,
+)
+from wrist_stiffness.planning.question import Question
+from wrist_stiffness.planning.refit import rivals_alike
+from wrist_stiffness.planning.signatures import signatures
+from wrist_stiffness.planning.timeline import (
+    Experiment,
+    Pace,
+    Timeline,
+    Visit,
+    run_through,
+)
+from wrist_stiffness.progress import Progress
+
+LONGEST_S = 3600.0
+"""Of a plan between rivals for which no duration is asked [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Under which an experiment is planned.
+
+    Parameters
+    ----------
+    sources : tuple of Weight or Actuator
+        What the user can apply; nothing else is proposed.
+    pace : Pace
+        Speeds and durations.
+    noise : MeasurementNoise
+        Of one dwell.
+    seconds : float or None
+        Duration; None for as long as it takes, but not beyond `LONGEST_S`.
+    seed : int
+        The same seed gives the same plan.
+    """
+
+    sources: tuple[Source, ...]
+    pace: Pace
+    noise: MeasurementNoise
+    seconds: float | None
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An experiment and what it is good for.
+
+    Parameters
+    ----------
+    timeline : Timeline or None
+        What to do when; None where no such experiment could answer any of the questions.
+    visits : tuple of Visit
+        Chosen ones, in the order of their worth.
+    answers : tuple of Answer
+        To every question.
+    cannot : dict of str to str
+        Effects that no such experiment shows, with the signal that they need.
+    calibration : dict of str to float
+        By how much the uncertainty of each effect that is always refitted falls.
+    """
+
+    timeline: Timeline | None
+    visits: tuple[Visit, ...]
+    answers: tuple[Answer, ...]
+    cannot: Mapping[str, str]
+    calibration: Mapping[str, float]
+
+
+def plan(
+    model: ErrorModel,
+    question: Question,
+    conditions: Conditions,
+    earlier: Sequence[Experiment] = (),
+    progress: Progress | None = None,
+) -> Plan:
+    """Plan an experiment.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    question : Question
+        What is asked.
+    conditions : Conditions
+        Loads, durations, noise.
+    earlier : sequence of Experiment
+        What was measured on this wrist before, each with instruments set up anew.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    Plan
+        Not longer than asked for.
+
+    Raises
+    ------
+    InputError
+        If not even the fixed part fits into the duration.
+    LoadRangeError
+        If a load cannot be applied within the table's range.
+    """
+    rng = np.random.default_rng(conditions.seed)
+    whole = question.goals is None
+    pool = _drawn(model, conditions, whole, rng)
+    seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
+    shortest = pool.arranged([], rng)
+    if shortest.duration_s > seconds:
+        raise InputError(
+            f"plan: {seconds / 60.0:g} minutes are less than the "
+            f"{shortest.duration_s / 60.0:.1f} that "
+            "warm-up, reference poses and two long holds take"
+        )
+    agree = bool(earlier and question.alike)
+    stage = _Stages(progress, 2 + len(earlier) + agree)
+    if agree:
+        question = rivals_alike(model, question, earlier, conditions.noise, stage.next())
+    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
+    question = question.without(lacking)
+    before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
+    own = aims(known, before, question, rng)
+    if not own.reachable and not whole:
+        return Plan(None, (), own.at_most, lacking, {})
+    chosen = choose(
+        pool.by_unit(own.pool.grams),
+        pool.cost_s,
+        own.start + pool.fixed_gram(own.pool.grams),
+        seconds - shortest.duration_s,
+        own.worth,
+        own.settled if conditions.seconds is None else _never,
+        rng,
+        LOOKED_AT if whole else len(pool.cost_s),
+        per_second=conditions.seconds is not None,
+    )
+    visits, timeline = pool.within(seconds, chosen, shortest, rng)
+    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
+    gram = own.start + own.truths.of(final.total)
+    return Plan(
+        timeline,
+        tuple(visits),
+        own.answers(gram),
+        lacking,
+        improvement(gram, own.pool.layout),
+    )
+
+
+def _never(gram: Array) -> bool:
+    """Tell that no experiment is enough: all the time asked for is used."""
+    return False
+
+
+class _Stages:
+    """One progress for several evaluations of about the same length."""
+
+    def __init__(self, progress: Progress | None, count: int) -> None:
+        self._progress, self._count, self._begun = progress, count, 0
+
+    def next(self) -> Progress:
+        """Return the progress of the next evaluation."""
+        behind = self._begun
+        self._begun += 1
+
+        def told(done: int, total: int) -> None:
+            if self._progress is not None:
+                self._progress(behind * total + done, self._count * total)
+
+        return told
+
+
+class _Pool:
+    """All settings, performed as one experiment, to be chosen as pairs of visits or singly."""
+
+    def __init__(
+        self,
+        settings: Sequence[Setting],
+        fixed: Sequence[Visit],
+        order: NDArray[np.intp],
+        pace: Pace,
+        model: ErrorModel,
+        both_sides: bool,
+    ) -> None:
+        self._fixed, self._pace = fixed, pace
+        self._workspace = model.table.workspace
+        self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
+        self.in_unit = 2 if both_sides else 1
+        ordered = [*(self._visits[i] for i in order), *fixed]
+        reference = reference_pose(self._workspace)
+        self.timeline = run_through(ordered, self._workspace, pace, reference)
+        self._place = np.argsort(order)
+        visit_s = np.diff(self.timeline.ends, prepend=0.0)
+        self.cost_s = self.by_unit(visit_s)
+
+    def by_unit(self, of_visits: Array) -> Array:
+        """Return the sums (m, ...) over the visits of each unit of values (v, ...)."""
+        units = of_visits[self._place].reshape(-1, self.in_unit, *of_visits.shape[1:])
+        total: Array = units.sum(axis=1)
+        return total
+
+    def fixed_gram(self, grams: Array) -> Array:
+        """Return the sum over the visits that every plan has."""
+        total: Array = grams[len(self._place) :].sum(axis=0)
+        return total
+
+    def visits_of(self, chosen: Sequence[int]) -> list[Visit]:
+        """Return the visits of some units; a unit chosen twice is visited twice."""
+        places = (self.in_unit * unit + side for unit in chosen for side in range(self.in_unit))
+        return [replace(self._visits[place]) for place in places]
+
+    def within(
+        self,
+        seconds: float,
+        chosen: Sequence[int],
+        shortest: Timeline,
+        rng: np.random.Generator,
+    ) -> tuple[list[Visit], Timeline]:
+        """Return the visits of the first of some units that fit into a duration, arranged."""
+        visits = self.visits_of(chosen)
+        timeline = self.arranged(visits, rng)
+        while timeline.duration_s > seconds:
+            visits = visits[: -self.in_unit]
+            # Arranged anew without visits, it might get a longer warm-up.
+            timeline = self.arranged(visits, rng) if visits else shortest
+        return visits, timeline
+
+    def arranged(self, visits: Sequence[Visit], rng: np.random.Generator) -> Timeline:
+        """Return the experiment of some visits."""
+        return arrange(visits, self._fixed, self._workspace, self._pace, rng)
+
+
+def _drawn(
+    model: ErrorModel, conditions: Conditions, whole: bool, rng: np.random.Generator
+) -> _Pool:
+    """Draw settings: both sides of each for a whole wrist, moved outward as well between rivals."""
+    workspace, pace = model.table.workspace, conditions.pace
+    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
+    fixed = fixed_visits(settings, pace, workspace)
+    if not whole:
+        settings += [moved_outward(setting, workspace) for setting in settings]
+    order = rng.permutation(2 * len(settings))
+    return _Pool(settings, fixed, order, pace, model, both_sides=whole)
+
+
+def evaluated(
+    model: ErrorModel,
+    question: Question,
+    experiment: Experiment,
+    noise: MeasurementNoise,
+    progress: Progress | None = None,
+) -> tuple[Information, dict[str, str]]:
+    """Return what an experiment tells of the effects in question.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        What is known of the wrist.
+    question : Question
+        What is asked.
+    experiment : Experiment
+        Its path.
+    noise : MeasurementNoise
+        Of one dwell.
+    progress : callable, optional
+        Called with (done, total).
+
+    Returns
+    -------
+    Information
+        Without the effects that lack a signal.
+    dict of str to str
+        Those, and the signal.
+    """
+    sets = [*((effect,) for effect in question.nuisances), *question.effects]
+    found = signatures(model, experiment.block, sets, progress)
+    count = len(question.nuisances)
+    lacking = {each.name: each.lacks for each in found[count:] if each.lacks}
+    shown = [each for each in found[count:] if not each.lacks]
+    known = information(experiment, found[:count], question.free, shown, model.table, noise)
+    return known, lacking

@@ -1,0 +1,319 @@
+"""Settings that a plan may choose from, and the order in which the chosen ones are performed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError, LoadRangeError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.geometry import Limits
+from wrist_stiffness.mechanism.workspace import Workspace
+from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad, Source
+from wrist_stiffness.planning.timeline import (
+    Pace,
+    Timeline,
+    Visit,
+    run_through,
+    straight,
+)
+
+POOL = 100
+"""Settings to choose from."""
+
+TILT_SHARE = 0.9
+"""Poses stay this far inside the operative workspace: approaches begin outside of them."""
+
+REFERENCE_EVERY_S = 480.0
+"""The reference pose is measured again at least so often, as far as single visits allow [s]."""
+
+HOLD_S = 60.0
+"""Of each of the two long holds [s]."""
+
+WARM_UP_SHARE, WARM_UP_LEAST_S, WARM_UP_MOST_S = 0.1, 30.0, 300.0
+"""Of the experiment's duration; moving without measuring [s]."""
+
+DRAWS = 200
+"""Tries to find a load within the table's range."""
+
+OUTWARD_STEPS = 30
+"""Radii that are tried for a setting that is moved outward."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A pose under a load, visited from both sides.
+
+    Parameters
+    ----------
+    theta : (2,) float
+        Motor angles [rad].
+    approach : (2,) float
+        Sense of the first visit's approach, the second one comes from the other side.
+    load : AppliedLoad
+        What is put on.
+    carried : bool
+        Whether the load is put on before the approach.
+    speeds : (float, float)
+        Of both visits, shares of the allowed speed.
+    """
+
+    theta: Array
+    approach: Array
+    load: AppliedLoad
+    carried: bool
+    speeds: tuple[float, float]
+
+    def visits(self, dwell_s: float) -> tuple[Visit, Visit]:
+        """Return the visits from both sides."""
+        first, second = (
+            Visit(self.theta, side * self.approach, self.load, self.carried, speed, dwell_s)
+            for side, speed in zip((1.0, -1.0), self.speeds, strict=True)
+        )
+        return first, second
+
+
+def reference_pose(workspace: Workspace) -> Array:
+    """Return the pose that is measured again and again: home, (2,) [rad].
+
+    Raises
+    ------
+    InputError
+        If home or the way to it from either side is out of the table's domain.
+    """
+    home = np.zeros(2)
+    if not _approachable(workspace, home, home, np.ones(2)):
+        raise InputError("plan: the home pose is not inside the table's domain")
+    return home
+
+
+def draw_settings(
+    workspace: Workspace, sources: Sequence[Source], gravity: Array, rng: np.random.Generator
+) -> list[Setting]:
+    """Draw the pool: random poses, without load or with one that the user can apply.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Of the wrist.
+    sources : sequence of Weight or Actuator
+        What the user can apply.
+    gravity : (3,) float
+        In F [m/s^2].
+    rng : numpy.random.Generator
+        Draws.
+
+    Returns
+    -------
+    list of Setting
+        About `POOL`.
+
+    Raises
+    ------
+    LoadRangeError
+        If a source has no load within the table's range at any pose.
+    """
+    limits, reference = workspace.limits, reference_pose(workspace)
+    # One in four settings is without load, as loads are what most effects need.
+    count = POOL if sources else POOL // 2
+    chosen = [
+        None if i % 4 == 3 or not sources else sources[i % len(sources)] for i in range(count)
+    ]
+    rng.shuffle(chosen)
+    poses = _poses(workspace, count, reference, rng)
+    settings = []
+    for theta, source in zip(poses, chosen, strict=True):
+        approach = rng.choice([-1.0, 1.0], 2)
+        speeds = rng.permutation([1.0, 0.5])
+        carried = bool(rng.uniform() < 0.5)
+        load = (
+            None if source is None else _draw_load(source, workspace, theta, approach, gravity, rng)
+        )
+        settings.append(
+            Setting(
+                theta,
+                approach,
+                NO_LOAD if load is None else load,
+                carried and load is not None,
+                (float(speeds[0]), float(speeds[1])),
+            )
+        )
+    for source in sources:
+        if not any(setting.load.name == source.name for setting in settings):
+            raise LoadRangeError(
+                f"load {source.name}: beyond the table's range of {limits.force:g} N and "
+                f"{limits.moment:g} N m about O at every pose"
+            )
+    return settings
+
+
+def moved_outward(setting: Setting, workspace: Workspace) -> Setting:
+    """Return a setting as far from home as the workspace lets it be visited with its load.
+
+    Most effects differ most where the motors have turned far, which random poses seldom have.
+    """
+    reference = reference_pose(workspace)
+    nearest = float(np.linalg.norm(setting.theta))
+    farthest = float(np.linalg.norm(np.abs(workspace.rectangle).max(axis=0)))
+    for radius in np.linspace(farthest, nearest, OUTWARD_STEPS, endpoint=False):
+        theta = setting.theta * radius / nearest
+        if _visitable(workspace, theta, reference) and within(
+            setting.load.wrench(_platforms(workspace, theta, setting.approach)), workspace.limits
+        ):
+            return replace(setting, theta=theta)
+    return setting
+
+
+def _poses(workspace: Workspace, count: int, reference: Array, rng: np.random.Generator) -> Array:
+    """Return poses that can be visited, (n, 2)."""
+    lower, upper = workspace.rectangle
+    found: list[Array] = []
+    while len(found) < count:
+        theta = rng.uniform(lower, upper)
+        if _visitable(workspace, theta, reference):
+            found.append(theta)
+    return np.array(found)
+
+
+def _visitable(workspace: Workspace, theta: Array, reference: Array) -> bool:
+    """Tell whether a pose of the operative workspace can be approached from all sides."""
+    tilt = TILT_SHARE * workspace.limits.operative_tilt
+    if not workspace.operative(theta) or workspace.mechanism.tilt(theta) > tilt:
+        return False
+    sides = np.array([[1.0, 1.0], [1.0, -1.0]])
+    return all(_approachable(workspace, theta, reference, side) for side in sides)
+
+
+def _platforms(workspace: Workspace, theta: Array, approach: Array) -> Array:
+    """Return the platform's rotations on both approaches, (n, 3, 3)."""
+    way = theta + np.linspace(-1.0, 1.0, 9)[:, None] * (theta - Visit(theta, approach).before)
+    return workspace.mechanism.platform_rotation(way)
+
+
+def _approachable(workspace: Workspace, theta: Array, reference: Array, side: Array) -> bool:
+    starts = [Visit(theta, sign * side).before for sign in (1.0, -1.0)]
+    return all(
+        straight(workspace, start, end)
+        for before in starts
+        for start, end in ((reference, before), (before, theta), (theta, reference))
+    )
+
+
+def _draw_load(
+    source: Source,
+    workspace: Workspace,
+    theta: Array,
+    approach: Array,
+    gravity: Array,
+    rng: np.random.Generator,
+) -> AppliedLoad | None:
+    """Return a load that stays in the table's range on both approaches, None if none does."""
+    platform = _platforms(workspace, theta, approach)
+    for _ in range(DRAWS):
+        load = source.draw(gravity, rng)
+        if within(load.wrench(platform), workspace.limits):
+            return load
+    return None
+
+
+def within(wrench: Array, limits: Limits) -> bool:
+    """Tell whether wrenches (..., 6) at O lie in the table's load range."""
+    sizes = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2)
+    return bool(np.all(sizes <= limits.most_load))
+
+
+def fixed_visits(settings: Sequence[Setting], pace: Pace, workspace: Workspace) -> list[Visit]:
+    """Return what every plan has: one visit of the reference pose, and the two long holds.
+
+    The holds are under the largest loads of different poses, one put on at rest and one carried
+    along; without any load they watch the pose itself.
+    """
+    reference = Visit(
+        reference_pose(workspace), np.ones(2), hold_s=pace.dwell_s, purpose="reference pose"
+    )
+    by_size = sorted(settings, key=lambda s: -float(np.linalg.norm(s.load.force)))
+    holds = [
+        replace(
+            setting.visits(pace.dwell_s)[0],
+            hold_s=max(HOLD_S, pace.dwell_s),
+            carried=setting.load is not NO_LOAD and carried,
+            purpose="long hold",
+        )
+        for setting, carried in zip(by_size, (False, True), strict=False)
+    ]
+    return [reference, *holds]
+
+
+def arrange(
+    chosen: Sequence[Visit],
+    fixed: Sequence[Visit],
+    workspace: Workspace,
+    pace: Pace,
+    rng: np.random.Generator,
+) -> Timeline:
+    """Put chosen visits into a random order, with everything that an experiment needs besides.
+
+    Parameters
+    ----------
+    chosen : sequence of Visit
+        Both sides of a pose, where both are chosen, come at different times.
+    fixed : sequence of Visit
+        Of `fixed_visits`.
+    workspace : Workspace
+        Of the wrist.
+    pace : Pace
+        Speeds and durations.
+    rng : numpy.random.Generator
+        Chooses the order.
+
+    Returns
+    -------
+    Timeline
+        Warm-up, visits, returns to the reference pose at the beginning, in between and at the end.
+    """
+    reference, *holds = fixed
+    visits = [chosen[i] for i in rng.permutation(len(chosen))]
+    for number, hold in enumerate(holds, start=1):
+        visits.insert(number * len(visits) // (len(holds) + 1), hold)
+    ordered = _with_returns(visits, reference, workspace, pace)
+    measuring = run_through(ordered, workspace, pace, reference.theta).duration_s
+    share = WARM_UP_SHARE * measuring
+    return run_through(
+        ordered,
+        workspace,
+        pace,
+        reference.theta,
+        _warm_up(float(np.clip(share, WARM_UP_LEAST_S, WARM_UP_MOST_S)), workspace, pace, rng),
+    )
+
+
+def _with_returns(
+    visits: Sequence[Visit], reference: Visit, workspace: Workspace, pace: Pace
+) -> list[Visit]:
+    """Return the visits with the reference at both ends and as often as needed in between."""
+    ordered = [reference]
+    since_s = 0.0
+    ends = run_through([reference, *visits], workspace, pace, reference.theta).ends
+    for visit, lasts_s in zip(visits, np.diff(ends), strict=True):
+        if since_s > 0.0 and since_s + lasts_s > REFERENCE_EVERY_S:
+            ordered.append(reference)
+            since_s = 0.0
+        ordered.append(visit)
+        since_s += float(lasts_s)
+    return [*ordered, reference]
+
+
+def _warm_up(
+    seconds: float, workspace: Workspace, pace: Pace, rng: np.random.Generator
+) -> list[Array]:
+    """Return poses (2,) to move through for a time [rad]."""
+    reference = reference_pose(workspace)
+    poses = _poses(workspace, 8, reference, rng)
+    way, spent = [reference], 0.0
+    while spent < seconds:
+        target = poses[len(way) % len(poses)]
+        spent += pace.move_s(way[-1], target)
+        way.append(target)
+    return way[1:]

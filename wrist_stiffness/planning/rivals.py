@@ -1,0 +1,123 @@
+"""The rivals that a diagnosis left, read from its result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.answer import SCHEMA
+from wrist_stiffness.inputs.document import Node, read_json
+from wrist_stiffness.inputs.schema import (
+    Quantity,
+    list_of,
+    mapping_of,
+    number,
+    record,
+    text,
+    vector,
+    version,
+)
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.planning.information import MeasurementNoise
+
+LEAST_WHITE = 0.25
+"""Share of a rotation's floor that is no hidden encoder count, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rivals:
+    """What a diagnosis left open.
+
+    Parameters
+    ----------
+    classes : tuple of tuples of Effect
+        Effects that its recordings could not tell apart, best first and with the values found: of
+        what was named, and of what was not sure enough.
+    silent : tuple of Effect
+        What its recordings could not have shown.
+    floor : (2,) float
+        Root mean square of shift and rotation that noise leaves [m, rad].
+    """
+
+    classes: tuple[tuple[Effect, ...], ...]
+    silent: tuple[Effect, ...]
+    floor: tuple[float, float]
+
+    def noise(self, table: Table) -> MeasurementNoise:
+        """Return the noise of one dwell: the floor without the hidden encoder count."""
+        step = table.geometry.limits.encoder_step
+        mechanism = table.mechanism
+        jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
+        shift, rotation = (value**2 for value in self.floor)
+        hidden = float(np.sum(jacobian**2)) * step**2 / 12.0
+        white = np.array([shift, max(rotation - hidden, LEAST_WHITE * rotation)])
+        return MeasurementNoise(np.repeat(np.sqrt(white / 3.0), 3), step)
+
+
+def read_rivals(path: str | Path) -> Rivals:
+    """Read the result of `diagnose --json`.
+
+    Parameters
+    ----------
+    path : path
+        JSON file.
+
+    Returns
+    -------
+    Rivals
+        Classes, silent effects and noise floor.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a key is missing or wrong, or an effect is not of the catalogue.
+    """
+    found = DIAGNOSIS(read_json(path, InputError))
+    floor, silent = found["noise"], found["not_excited"]
+    return Rivals(
+        (*found["findings"], *found["suspects"]),
+        tuple({effect.name: effect for effect in silent}.values()),
+        (floor["s"], floor["phi"]),
+    )
+
+
+def _effect(node: Node) -> Effect:
+    words = record({"effect": text(), "component": text()}, others=True)(node)
+    try:
+        return Effect(find_law(words["effect"]), words["component"])
+    except InputError as error:
+        raise node.refuse(str(error)) from error
+
+
+def _members(node: Node) -> tuple[Effect, ...]:
+    finding = record(
+        {"class": list_of(_effect, at_least=1), "parameters": mapping_of(lambda inner: inner)},
+        others=True,
+    )(node)
+    effects, parameters = finding["class"], finding["parameters"]
+    # What the regression calls otherwise than the law is left at its prior mean.
+    values = {
+        known.key: float(np.clip(vector(2)(parameters[known.key])[0], known.lower, known.upper))
+        for known in effects[0].parameters
+        if known.key in parameters
+    }
+    return (effects[0].with_values(values), *effects[1:])
+
+
+DIAGNOSIS = record(
+    {
+        "schema": version(SCHEMA),
+        "noise": record(
+            dict.fromkeys(("s_um", "phi_mdeg"), Quantity(number(above=0.0))), others=True
+        ),
+        "findings": list_of(_members),
+        "suspects": list_of(_members),
+        "not_excited": list_of(_effect),
+    },
+    others=True,
+)

@@ -1,0 +1,321 @@
+"""A planned experiment in time: visits of poses, the path between them, what is measured when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.workspace import Workspace
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad
+
+LEAD_S = 5.0
+"""Time to come to the reference pose from wherever the motors stand [s]."""
+
+APPROACH = np.radians(4.0)
+"""From so far aside a pose is approached, on both motors [rad]."""
+
+LOAD_RAMP_S = 0.6
+"""Shortest time in which a load goes on or off [s]."""
+
+PEAK = 1.875
+"""Peak over mean speed of a minimum-jerk move (Flash and Hogan 1985)."""
+
+SEEN_IN_MOVES = (0.25, 0.5, 0.75)
+"""Parts of a move's time at which the platform is observed in motion."""
+
+BEFORE_S = 0.01
+"""A sample so long before shows the laws the acceleration [s]."""
+
+BEFORE_SHARE = 0.1
+"""Of a fast move's time that is the longest: it lies between two that are observed."""
+
+LONG_HOLD = (0.03, 0.1, 0.3, 1.0)
+"""Parts of a hold of `LONG_S` or more at which it counts as measured."""
+
+LONG_S = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """One approach to a pose.
+
+    Parameters
+    ----------
+    theta : (2,) float
+        Motor angles [rad].
+    approach : (2,) float
+        Sense in which each motor moves at last, +1 or -1.
+    load : AppliedLoad
+        What is put on.
+    carried : bool
+        Whether the load is put on before the approach instead of at rest in the pose.
+    speed : float
+        Share of the allowed speed.
+    hold_s : float
+        How long the load is held and measured [s].
+    purpose : str
+        For the user.
+    """
+
+    theta: Array
+    approach: Array
+    load: AppliedLoad = NO_LOAD
+    carried: bool = False
+    speed: float = 1.0
+    hold_s: float = 2.0
+    purpose: str = "setting"
+
+    @property
+    def before(self) -> Array:
+        """Where the last move begins, (2,) [rad]."""
+        return self.theta - APPROACH * self.approach
+
+
+@dataclass(frozen=True, eq=False)
+class Dwell:
+    """One rest in a pose: a row of the plan's table.
+
+    Parameters
+    ----------
+    time_s : float
+        When it begins [s].
+    visit : Visit
+        Which it belongs to.
+    load : AppliedLoad
+        What is on.
+    wrench : (6,) float
+        At O in F [N, N m].
+    hold_s : float
+        [s]
+    purpose : str
+        For the user.
+    """
+
+    time_s: float
+    visit: Visit
+    load: AppliedLoad
+    wrench: Array
+    hold_s: float
+    purpose: str
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """What is measured along a path.
+
+    Parameters
+    ----------
+    block : Block
+        n samples of the path that laws with memory need, the observed ones among them.
+    rows : (r,) int
+        Observed samples.
+    visit : (r,) int
+        Approach to a pose that each belongs to.
+    moving : (r,) bool
+        Whether it is observed in motion.
+    """
+
+    block: Block
+    rows: NDArray[np.intp]
+    visit: NDArray[np.intp]
+    moving: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline(Experiment):
+    """A planned experiment.
+
+    Parameters
+    ----------
+    dwells : tuple of Dwell
+        In the order of time.
+    knots : tuple of (float, (2,) float, (6,) float)
+        Time [s], motor angles [rad] and wrench at O in F [N, N m] between which motors move and
+        loads change by minimum jerk.
+    ends : (v,) float
+        When each visit is over [s].
+    """
+
+    dwells: tuple[Dwell, ...]
+    knots: tuple[tuple[float, Array, Array], ...]
+    ends: Array
+
+    @property
+    def duration_s(self) -> float:
+        """Of the whole experiment [s]."""
+        return self.knots[-1][0]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast the experiment may go.
+
+    Parameters
+    ----------
+    speed : float
+        Largest speed of a motor [rad/s].
+    dwell_s : float
+        What one measurement at rest takes, settling included [s].
+    in_motion : bool
+        Whether the pose sensor measures in motion too.
+    """
+
+    speed: float
+    dwell_s: float
+    in_motion: bool
+
+    def move_s(self, start: Array, end: Array, share: float = 1.0) -> float:
+        """Duration of a minimum-jerk move at a share of the allowed speed [s]."""
+        return PEAK * float(np.max(np.abs(end - start))) / (share * self.speed)
+
+
+def straight(workspace: Workspace, start: Array, end: Array) -> bool:
+    """Tell whether a straight move stays in the map's domain and between the joint limits."""
+    limits = workspace.limits
+    path = start + np.linspace(0.0, 1.0, 25)[:, None] * (end - start)
+    inside = (path >= limits.joint_lower) & (path <= limits.joint_upper)
+    return bool(inside.all() and workspace.domain(path).all())
+
+
+def run_through(
+    visits: Sequence[Visit],
+    workspace: Workspace,
+    pace: Pace,
+    reference: Array,
+    warm_up: Sequence[Array] = (),
+) -> Timeline:
+    """Perform visits one after the other, from rest without load at the reference pose.
+
+    Parameters
+    ----------
+    visits : sequence of Visit
+        In their order.
+    workspace : Workspace
+        Moves stay in it; where a straight one would not, it goes by way of the reference pose.
+    pace : Pace
+        Speeds and durations.
+    reference : (2,) float
+        Motor angles [rad].
+    warm_up : sequence of (2,) float
+        Poses to move through first without measuring [rad].
+
+    Returns
+    -------
+    Timeline
+        Ends without load in the reference pose.
+    """
+    clock = _Clock(workspace, pace, reference)
+    for theta in warm_up:
+        clock.travel(theta)
+    for number, visit in enumerate(visits):
+        clock.visit(number, visit)
+    clock.travel(reference)
+    return clock.timeline()
+
+
+class _Clock:
+    """Performs one thing after the other."""
+
+    def __init__(self, workspace: Workspace, pace: Pace, reference: Array) -> None:
+        self._workspace, self._pace, self._reference = workspace, pace, reference
+        self._time_s, self._theta, self._load = 0.0, np.asarray(reference, dtype=float), NO_LOAD
+        self._samples: list[tuple[float, Array, Array, AppliedLoad]] = []
+        self._observed: list[tuple[int, int, bool]] = []
+        self._dwells: list[tuple[float, Visit, AppliedLoad, Array, float, str]] = []
+        self._knots: list[int] = []
+        self._ends: list[float] = []
+        self._knot()
+        self._time_s = LEAD_S
+        self._knot()
+
+    def travel(self, theta: Array) -> None:
+        direct = straight(self._workspace, self._theta, theta)
+        for target in (theta,) if direct else (self._reference, theta):
+            self._move(target, 1.0)
+
+    def visit(self, number: int, visit: Visit) -> None:
+        self.travel(visit.before)
+        if visit.carried:
+            self._change(visit.load)
+        self._move(visit.theta, visit.speed, number)
+        if visit.load is NO_LOAD:
+            self._rest(number, visit, visit.hold_s, visit.purpose)
+        elif visit.carried:
+            self._rest(number, visit, visit.hold_s, f"{visit.purpose}, load carried along")
+            self._change(NO_LOAD)
+            self._rest(number, visit, self._pace.dwell_s, "zero-load return")
+        else:
+            self._rest(number, visit, self._pace.dwell_s, "zero load")
+            self._change(visit.load)
+            self._rest(number, visit, visit.hold_s, f"{visit.purpose}, load put on at rest")
+            self._change(NO_LOAD)
+        self._ends.append(self._time_s)
+
+    def timeline(self) -> Timeline:
+        time, theta, speed, loads = (list(column) for column in zip(*self._samples, strict=True))
+        angles = np.array(theta)
+        platform = self._workspace.mechanism.platform_rotation(angles)
+        wrench = np.array([load.wrench(turn) for load, turn in zip(loads, platform, strict=True)])
+        block = Block(np.array(time), angles, wrench, np.array(speed))
+        rows, visit, moving = (
+            np.array(column, dtype=kind)
+            for column, kind in zip(
+                zip(*self._observed, strict=True), (np.intp, np.intp, bool), strict=True
+            )
+        )
+        turns = self._workspace.mechanism.forward(np.array([each[3] for each in self._dwells]))
+        dwells = tuple(
+            Dwell(at, each, load, load.wrench(turn), hold_s, purpose)
+            for (at, each, load, _, hold_s, purpose), turn in zip(
+                self._dwells, turns.platform, strict=True
+            )
+        )
+        knots = tuple((time[i], angles[i], wrench[i]) for i in self._knots)
+        return Timeline(block, rows, visit, moving, dwells, knots, np.array(self._ends))
+
+    def _sample(self, theta: Array, speed: Array) -> int:
+        self._samples.append((self._time_s, theta, speed, self._load))
+        return len(self._samples) - 1
+
+    def _knot(self) -> None:
+        self._knots.append(self._sample(self._theta, np.zeros(2)))
+
+    def _move(self, target: Array, share: float, number: int | None = None) -> None:
+        duration = self._pace.move_s(self._theta, target, share)
+        if duration == 0.0:
+            return
+        start, way, begin = self._theta, target - self._theta, self._time_s
+        seen = number is not None and self._pace.in_motion
+        before = min(BEFORE_S / duration, BEFORE_SHARE)
+        for part in SEEN_IN_MOVES if seen else (0.5,):
+            for back in (before, 0.0) if seen else (0.0,):
+                u = part - back
+                self._time_s = begin + u * duration
+                blend = u**3 * (10.0 + u * (6.0 * u - 15.0))
+                rate = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+                at = self._sample(start + blend * way, rate * way)
+            if seen and number is not None:
+                self._observed.append((at, number, True))
+        self._time_s, self._theta = begin + duration, target
+        self._knot()
+
+    def _change(self, load: AppliedLoad) -> None:
+        seconds = max(LOAD_RAMP_S, load.change_s, self._load.change_s)
+        self._time_s += seconds
+        self._load = load
+        self._knot()
+
+    def _rest(self, number: int, visit: Visit, hold_s: float, purpose: str) -> None:
+        begin = self._time_s
+        self._dwells.append((begin, visit, self._load, self._theta, hold_s, purpose))
+        for part in LONG_HOLD if hold_s >= LONG_S else (1.0,):
+            self._time_s = begin + part * hold_s
+            at = self._sample(self._theta, np.zeros(2))
+            self._observed.append((at, number, False))
+        self._time_s = begin + hold_s
+        self._knot()

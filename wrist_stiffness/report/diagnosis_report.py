@@ -1,0 +1,261 @@
+"""The report of `diagnose`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wrist_stiffness.commands.provenance import Provenance
+from wrist_stiffness.comparing.explained import Explained, explain
+from wrist_stiffness.comparing.sentences import percent, sentences
+from wrist_stiffness.identification.base_fit import BaseFit
+from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.inference import Diagnosis, Finding, Quantity
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.report.fit_report import plus_minus
+from wrist_stiffness.report.page import (
+    Bullets,
+    Page,
+    Part,
+    Section,
+    Table,
+    Text,
+    drawn,
+)
+from wrist_stiffness.report.parts import (
+    against,
+    number,
+    provenance_section,
+    typeset,
+    unit_of,
+)
+from wrist_stiffness.report.pictures.dependence import draw_against
+from wrist_stiffness.report.pictures.errors import Bars, draw_bars
+from wrist_stiffness.report.verdict import (
+    class_of,
+    correction_of,
+    rest_lines,
+    verdict_lines,
+)
+
+MOST_PICTURED = 4
+"""Conditions that are drawn."""
+
+MOST_RANKED = 12
+"""Candidates that are told."""
+
+
+HOW = (
+    "Registrations, encoder zeros, load tare and the tolerances of the wrist were fitted first; an "
+    "effect counts only for what it explains beyond them.",
+    "Every set of effects was fitted whole and judged by its evidence: how probable the recordings "
+    "are under it, with all values integrated over their priors. The probabilities follow from it.",
+    "Beside the effects stands a discrepancy without a name, a smooth law of the conditions. What "
+    "it explains is left above the noise.",
+    "Held-out errors are those of another session where there is one, else of the end of the only "
+    "one, by models whose values were fitted to the rest.",
+    "Effects in one class cannot be told apart by these recordings.",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What the pictures of a diagnosis need beside its result.
+
+    Parameters
+    ----------
+    left : Explained
+        Residuals after the base was refitted, without any effect, and on what they depend.
+    explained : (n, 6) float, optional
+        Residuals with the findings in the model, of the same units.
+    """
+
+    left: Explained
+    explained: Array | None = None
+
+
+def shown_by(nominal: BaseFit, explained: Array | None = None) -> Shown:
+    """Return what the pictures need.
+
+    Parameters
+    ----------
+    nominal : BaseFit
+        The base without any effect.
+    explained : (n, 6) float, optional
+        Residuals with the findings in the model, of the same units.
+    """
+    problem = nominal.problem
+    left = problem.table.with_values(nominal.residual)
+    return Shown(
+        explain(
+            left,
+            problem.sessions,
+            nominal.columns,
+            nominal.z,
+            left.measured / WristTable(left, problem.sessions).variance,
+            problem.weights,
+        ),
+        explained,
+    )
+
+
+def report_of_diagnosis(
+    result: Diagnosis,
+    shown: Shown,
+    recordings: Sequence[str],
+    mistake: str,
+    notes: Sequence[str],
+    provenance: Provenance,
+) -> Page:
+    """Return the report of a diagnosis.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        What the statistics say.
+    shown : Shown
+        For the pictures and the sentences.
+    recordings : sequence of str
+        Names.
+    mistake : str
+        Of the set-up, told first; empty for none.
+    notes : sequence of str
+        What could not be used.
+    provenance : Provenance
+        Files and versions.
+    """
+    quantities, units = shown.left.observations.reported, shown.left.observations.n_units
+    sections = [
+        Section("Findings", tuple(_findings(result, quantities))),
+        Section("How much it brings", _fall(result, quantities)),
+        Section("Every candidate", _ranking(result)),
+        Section("Where it shows", _depends(shown)),
+        Section("What remains", _remains(result)),
+        Section("What these recordings cannot show", _not_excited(result)),
+        Section("Absorbed by calibration", _absorbed(result, notes)),
+        Section("How it was computed", (Bullets(HOW),)),
+        provenance_section(provenance),
+    ]
+    return Page(
+        "Which physical effect is missing?",
+        f"{', '.join(recordings)}: {units} dwells and half seconds in motion",
+        (*([mistake] if mistake else []), *_verdict(result, quantities)),
+        tuple(sections),
+    )
+
+
+def _verdict(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
+    """Return the answer in a few sentences."""
+    lines = verdict_lines(result)
+    if result.findings:
+        falls = [
+            f"{q.name} from {number(result.before[q.key])} to {number(result.after[q.key])} "
+            f"{unit_of(q.unit)} (instrument noise {number(result.noise[q.key])})"
+            for q in quantities
+        ]
+        lines.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
+    return tuple(typeset(line) for line in lines)
+
+
+def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]:
+    if not result.findings:
+        return [Text("No effect of the catalogue was found.")]
+    parts: list[Part] = []
+    for place, finding in enumerate(result.findings, 1):
+        parts.append(Text(f"{place}. {class_of(finding)}. {typeset(finding.evidence)}"))
+        if finding.check:
+            parts.append(Text(f"To be sure: {finding.check}."))
+        parts.append(_numbers(finding, quantities))
+    return parts
+
+
+def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
+    rows = [
+        (name, typeset(plus_minus(value, error)))
+        for name, (value, error) in finding.parameters.items()
+    ]
+    for q in quantities:
+        if q.key in finding.buys:
+            gain, error = finding.buys[q.key]
+            rows.append(
+                (
+                    f"held-out error of {q.name} falls by",
+                    typeset(f"{plus_minus(gain, error)} {unit_of(q.unit)}"),
+                )
+            )
+    rows += [
+        ("probability", percent(finding.probability)),
+        ("log evidence against the model without it", f"{finding.log_gain:+.0f}"),
+        ("correction", correction_of(finding)),
+    ]
+    return Table(f"Numbers of {finding.name}.", ("", "value"), tuple(rows))
+
+
+def _fall(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[Part, ...]:
+    bars = [
+        Bars(
+            f"{q.name} [{unit_of(q.unit)}]",
+            ["before", "with the findings"],
+            [result.before[q.key], result.after[q.key]],
+            [0.0, 0.0],
+            {"instrument noise": result.noise[q.key]},
+        )
+        for q in quantities
+    ]
+    caption = (
+        f"Error on the held-out part ({result.scope}), before and with the findings in the model."
+    )
+    return (drawn(draw_bars(bars), caption),)
+
+
+def _ranking(result: Diagnosis) -> tuple[Part, ...]:
+    """Return how the leading candidates stand."""
+    rows = tuple(
+        (each.name, percent(each.probability), f"{each.log_gain:+.0f}", each.why_not or "named")
+        for each in result.standings[:MOST_RANKED]
+    )
+    caption = "How the leading candidates stand; log evidence against the calibrated model."
+    return (Table(caption, ("effect", "probability", "log evidence", ""), rows),)
+
+
+def _depends(shown: Shown) -> tuple[Part, ...]:
+    left = shown.left
+    parts: list[Part] = [Bullets(tuple(typeset(line) for line in sentences(left)))]
+    if not left.told:
+        return tuple(parts)
+    series = []
+    if shown.explained is not None:
+        series.append(("with the findings", left.observations.with_values(shown.explained)))
+    pictures = [against(each.curve, each.name, series) for each in left.told[:MOST_PICTURED]]
+    parts.append(
+        drawn(
+            draw_against(pictures),
+            "What the refitted base leaves against the conditions that show it best, everything "
+            "else that was found taken out: every dwell and half second in motion, and the fitted "
+            "law with its 95 % band.",
+        )
+    )
+    return tuple(parts)
+
+
+def _remains(result: Diagnosis) -> tuple[Part, ...]:
+    lines = rest_lines(result) or ["Nothing beyond the noise."]
+    return tuple(Text(typeset(line)) for line in lines)
+
+
+def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
+    if not result.not_excited:
+        return (Text("Every effect of the catalogue would have shown."),)
+    needs: dict[str, list[str]] = {}
+    for each in result.not_excited:
+        needs.setdefault(each.needs, []).append(f"{each.effect} at {each.component}")
+    rows = tuple((", ".join(names), need) for need, names in needs.items())
+    return (Table("To be recorded if one of these is suspected.", ("effects", "needs"), rows),)
+
+
+def _absorbed(result: Diagnosis, notes: Sequence[str]) -> tuple[Part, ...]:
+    parts: list[Part] = [Bullets(tuple(typeset(line) for line in result.absorbed))]
+    told = (*result.notes, *notes)
+    if told:
+        parts += [Text("To be kept in mind:"), Bullets(told)]
+    return tuple(parts)

@@ -1,0 +1,85 @@
+"""Parts that several reports share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan
+
+from wrist_stiffness.commands.provenance import Provenance
+from wrist_stiffness.comparing.curve import Curve
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.report.page import Section, Table, Text
+from wrist_stiffness.report.pictures.dependence import Against
+
+SIGNS = {" um": " µm", "+-": "±", "degC": "°C", " deg/s": " °/s"}
+"""What a terminal writes in ASCII."""
+
+
+def typeset(text: str) -> str:
+    """Return a sentence for people with the signs that a page has."""
+    for plain, sign in SIGNS.items():
+        text = text.replace(plain, sign)
+    return text
+
+
+def unit_of(unit: str) -> str:
+    """Return the name of a unit as a page writes it."""
+    return typeset(f" {unit}").strip()
+
+
+def number(value: float) -> str:
+    """Return three significant digits, without an exponent where a person writes none; NaN is -."""
+    if isnan(value):
+        return "-"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+
+
+def against(curve: Curve, title: str, models: Sequence[tuple[str, Observations]] = ()) -> Against:
+    """Return what a picture needs of one dependence.
+
+    Parameters
+    ----------
+    curve : Curve
+        Of one of the models.
+    title : str
+        What it depends on.
+    models : sequence of (str, Observations)
+        Name and residuals of further models over the same units, shown along the same direction.
+    """
+    columns = list(curve.quantity.components)
+    used = curve.direction != 0.0
+    others = [
+        (name, left.values[:, columns][:, used] @ curve.direction[used] * curve.quantity.per_si)
+        for name, left in models
+    ]
+    label = f"{curve.quantity.name} {curve.where} [{unit_of(curve.quantity.unit)}]"
+    labels = tuple(typeset(each) for each in curve.labels)
+    return Against(
+        title,
+        labels,
+        label,
+        curve.values,
+        curve.measured,
+        curve.places,
+        curve.mean,
+        curve.sigma,
+        others,
+    )
+
+
+def provenance_section(provenance: Provenance) -> Section:
+    """Return where the result comes from."""
+    files = [("model", *each) for each in provenance.models.items()]
+    files += [("recording", *each) for each in provenance.recordings.items()]
+    return Section(
+        "Files and versions",
+        (
+            Text(f"Made on {provenance.date} by: {provenance.command}"),
+            Table(
+                "Files, with the first digits of their checksums.",
+                ("kind", "file", "SHA-256"),
+                tuple((kind, name, sha[:16]) for kind, name, sha in files),
+            ),
+            Table("Versions", ("package", "version"), tuple(provenance.versions.items())),
+        ),
+    )

@@ -1,0 +1,231 @@
+"""The bent wrist in three dimensions: where a load takes it, exaggerated.
+
+The motion of every interface frame is that of the elastic model; along a bar between its two ends
+it is interpolated.  Pins, which are rigid in the model, are lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.commands.budget import Push
+from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, ENDS, JOINTS, LINKS, Array
+from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.energy import component_screws
+from wrist_stiffness.mechanism.influence import influence
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.mechanism.vectors import cross, unit
+from wrist_stiffness.report.pictures.figure import new_figure, save_figure
+
+SHOWN_M = 0.010
+"""The largest displacement is drawn about this long."""
+
+ALONG, AROUND = 24, 24
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A drawn body: a grid of surface points and how they move.
+
+    Parameters
+    ----------
+    points : (p, q, 3) float
+        Of the rigid wrist in F [m].
+    shift : (p, q, 3) float
+        Displacement [m].
+    """
+
+    points: Array
+    shift: Array
+
+
+def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:
+    """Return the bodies of the wrist at a pose with their displacements under a load alone.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+    theta : (2,) float
+        Motor angles [rad].
+    push : Push
+        The load; own weight is left out.
+
+    Returns
+    -------
+    list of Shape
+        Links, bushings and platform.
+
+    Raises
+    ------
+    UnreachablePoseError, SingularPoseError, LoadRangeError
+        If the pose or the load is out of range.
+    """
+    configuration = table.workspace.configuration(theta)
+    wrench = push.wrench(configuration.platform)
+    table.check_load(wrench)
+    response = respond(contact_operators(configuration, table.components, np.zeros(3)), wrench)
+    screws = component_screws(configuration, table.components, wrench, response.force)
+    frames = [_frame_screws(laws, screws) for laws in influence(configuration).of_frames()]
+    shapes = [_link(table, configuration, name, *_pair(frames, name)) for name in LINKS]
+    shapes += [_bushing(table, configuration, name, *_pair(frames, name)) for name in JOINTS]
+    return [*shapes, _platform(table, configuration, response.twist)]
+
+
+def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
+    """Draw the wrist at a pose, rigid in grey and bent in colours of its displacement.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+    theta : (2,) float
+        Motor angles [rad].
+    push : Push
+        The load.
+    path : Path
+        PNG to write.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    shapes = bent_shapes(table, theta, push)
+    largest = max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
+    factor = _round_down(SHOWN_M / largest) if largest > 0.0 else 1.0
+    colours = ScalarMappable(Normalize(0.0, 1e6 * largest), "viridis")
+    figure = new_figure(8.0, 7.0)
+    plot: Any = figure.add_subplot(projection="3d")
+    for shape in shapes:
+        # Micrometres decide the colour, millimetres the place.
+        micrometres = 1e6 * np.linalg.norm(shape.shift, axis=-1)
+        faces = colours.to_rgba(0.25 * _corner_sum(micrometres))
+        bent = 1e3 * (shape.points + factor * shape.shift)
+        rigid = 1e3 * shape.points
+        plot.plot_surface(
+            *np.moveaxis(bent, -1, 0), facecolors=faces, rstride=1, cstride=1, shade=False
+        )
+        plot.plot_wireframe(
+            *np.moveaxis(rigid, -1, 0), color="grey", linewidth=0.3, rstride=2, cstride=3, alpha=0.5
+        )
+    _draw_load(plot, table, theta, push)
+    plot.set_aspect("equal")
+    plot.set_xlabel("x [mm]")
+    plot.set_ylabel("y [mm]")
+    plot.set_zlabel("z [mm]")
+    degrees = np.degrees(theta)
+    plot.set_title(
+        f"{table.geometry.name} at ({degrees[0]:.0f}, {degrees[1]:.0f}) deg under "
+        f"{push.text}\ndisplacement exaggerated {factor:g} times; "
+        "bars interpolated between their ends",
+        fontsize=9,
+    )
+    figure.colorbar(colours, ax=plot, shrink=0.7, label="displacement [µm]")
+    save_figure(figure, path)
+
+
+def _frame_screws(laws: Array, screws: Array) -> Array:
+    moved = np.einsum("mkij,khj->mhi", laws, screws.reshape(-1, 2, 3))
+    return moved.reshape(len(moved), 6)
+
+
+def _pair(frames: list[Array], name: str) -> tuple[Array, Array]:
+    return frames[0][ELASTIC.index(name)], frames[1][ELASTIC.index(name)]
+
+
+def _shift(points: Array, screw: Array) -> Array:
+    return screw[..., :3] + cross(screw[..., 3:], points)
+
+
+def _link(table: Table, configuration: Configuration, name: str, near: Array, far: Array) -> Shape:
+    bar = table.geometry.links[name]
+    turn = configuration.rotations[name]
+    u, v = (turn @ end for end in table.geometry.link_ends(name))
+    normal = unit(cross(u, v))
+    across = cross(normal, u)
+    angle = float(np.arctan2(v @ across, v @ u))
+    past = bar.overhang / bar.arc_radius
+    along = np.linspace(-past, angle + past, ALONG)
+    radial = np.outer(np.cos(along), u) + np.outer(np.sin(along), across)
+    half_radial, half_axial = bar.section_radial / 2.0, bar.section_axial / 2.0
+    corners = ((1, 1), (1, -1), (-1, -1), (-1, 1), (1, 1))
+    points = np.stack(
+        [(bar.arc_radius + i * half_radial) * radial + j * half_axial * normal for i, j in corners],
+        axis=1,
+    )
+    place = np.clip(along / angle, 0.0, 1.0)[:, None, None]
+    blend = place * place * (3.0 - 2.0 * place)
+    return Shape(points, _shift(points, near + blend * (far - near)))
+
+
+def _axis(configuration: Configuration, table: Table, joint: str) -> Array:
+    moving = {"joint_2": configuration.b, "joint_3": configuration.c, "joint_4": configuration.d}
+    return moving.get(joint, table.geometry.axes[joint])
+
+
+def _bushing(
+    table: Table, configuration: Configuration, joint: str, near: Array, far: Array
+) -> Shape:
+    bushing = table.geometry.bushings[joint]
+    axis = _axis(configuration, table, joint)
+    start = np.eye(3)[np.argmin(np.abs(axis))]
+    p = unit(cross(axis, start))
+    q = cross(axis, p)
+    around = np.linspace(0.0, 2.0 * np.pi, AROUND)
+    outer = bushing.pin_diameter / 2.0 + bushing.wall
+    ring = outer * (np.outer(np.cos(around), p) + np.outer(np.sin(around), q))
+    half = bushing.length / 2.0
+    centres = [(bushing.radius + end) * axis for end in (-half, half)]
+    points = np.stack([centre + ring for centre in centres])
+    # The pin's wall moves with its body; halfway to the hub's wall is the sleeve's middle.
+    fixed = CARRIER[joint] == "frame"
+    return Shape(points, _shift(points, far if fixed else 0.5 * (near + far)))
+
+
+def _platform(table: Table, configuration: Configuration, twist: Array) -> Shape:
+    plate = table.geometry.platform
+    normal = configuration.platform @ plate.normal
+    centre = configuration.platform @ plate.centre
+    p = unit(cross(normal, np.eye(3)[np.argmin(np.abs(normal))]))
+    q = cross(normal, p)
+    around = np.linspace(0.0, 2.0 * np.pi, 2 * AROUND)
+    rim = np.outer(np.cos(around), p) + np.outer(np.sin(around), q)
+    radii = plate.diameter / 2.0 * np.array([0.0, 0.5, 1.0])
+    points = centre + radii[:, None, None] * rim
+    return Shape(points, _shift(points, twist))
+
+
+def _draw_load(plot: Any, table: Table, theta: Array, push: Push) -> None:
+    configuration = table.mechanism.forward(theta)
+    size = float(np.linalg.norm(push.force))
+    if size == 0.0:
+        return
+    tip = 1e3 * (configuration.platform @ push.point)
+    arrow = 25.0 * push.force / size
+    plot.quiver(*(tip - arrow), *arrow, color="tab:red", linewidth=2.0)
+    for joint in JOINTS:
+        end = 1e3 * table.geometry.bushings[joint].radius * _axis(configuration, table, joint)
+        plot.plot(*np.stack([np.zeros(3), end]).T, color="black", linewidth=0.4, linestyle=":")
+    for link in LINKS:
+        for joint in ENDS[link]:
+            side = np.sign(table.geometry.bushings[joint].radius)
+            axis = _axis(configuration, table, joint)
+            ends = (
+                side * table.geometry.links[link].arc_radius,
+                table.geometry.bushings[joint].radius,
+            )
+            plot.plot(*np.stack([1e3 * end * axis for end in ends]).T, color="black", linewidth=2.0)
+
+
+def _corner_sum(values: Array) -> Array:
+    return values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:]
+
+
+def _round_down(value: float) -> float:
+    size = 10.0 ** np.floor(np.log10(value))
+    return float(size * max(step for step in (1.0, 2.0, 5.0) if step * size <= value))

@@ -1,0 +1,162 @@
+"""What a change of a model's effects does to the units of a session: columns by differences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.batch import Recent
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.sessions.unit_session import UnitSession
+
+Effects = tuple[Effect, ...]
+
+AT_A_TIME = 256
+"""Trials evaluated together: they share the work of the base, and their results are in memory."""
+
+
+class Moments(Enum):
+    """At which moments a model is evaluated."""
+
+    MEAN = auto()
+    """At the mean one of each unit."""
+    UNITS = auto()
+    """At all that are kept of each unit."""
+    PATH = auto()
+    """At those that lie between units as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionModel:
+    """A model with the effects that hold in one session, on the units of that session.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Table and evaluation; its own effects do not count.
+    session : UnitSession
+        Units and the moments that tell their path.
+    effects : tuple of Effect
+        All effects at the point about which columns are wanted.
+    """
+
+    model: ErrorModel
+    session: UnitSession
+    effects: Effects
+
+    def remembers(self, effects: Effects) -> bool:
+        """Tell whether any of the effects needs the path and not the mean moment alone."""
+        return any(self._has_memory(effect) for effect in effects)
+
+    def of_the_moment(self, effects: Effects) -> Effects:
+        """Return those effects whose slope the mean moment shows: all that have no past."""
+        return tuple(each for each in effects if not self._has_memory(each))
+
+    def _has_memory(self, effect: Effect) -> bool:
+        return effect.law.many_waves or self._has_past(effect)
+
+    def _has_past(self, effect: Effect) -> bool:
+        """Tell whether earlier moments decide what an effect does.
+
+        The law is asked with its first values: with no play there is nothing to seek, so play has
+        no past, and its slopes are taken at mean moments.  Those at all moments led to no better
+        fits, at twice the cost.
+        """
+        known, asked = self.session.known, (effect.law, effect.component)
+        if asked not in known:
+            first = self.session.block.take(slice(0, 1))
+            usual = Effect(*asked)
+            memory = evaluate(self.model.with_effects(usual), first, None).memory
+            known[asked] = memory.states[0] is not None
+        return bool(known[asked])
+
+    def along(self, trials: Sequence[Effects]) -> list[Array]:
+        """Return what the sensor would say of each unit, from all its moments, (u, 6).
+
+        In motion the mean of a pose is not the pose at the mean angles: a target a millimetre off
+        bends that by micrometres.
+        """
+        return self.predicted(trials, [True] * len(trials))
+
+    def _batch(self, trials: Sequence[Effects], moments: Moments) -> list[Array]:
+        """Return what the sensor would say of each unit, (u, 6); pins begin where they rested."""
+        session = self.session if moments is Moments.PATH else self._without_path
+        block = self.session.still if moments is Moments.MEAN else session.block
+        rests = self._rests.get(moments, ())
+        recent = self.session.known.setdefault(moments, Recent())
+        found = self.model.with_effects().batch_with(block, trials, rests, recent)
+        self._rests[moments] = found[0].guesses
+        if moments is Moments.MEAN:
+            return [each.measured for each in found]
+        return [session.mean(each.measured) for each in found]
+
+    @cached_property
+    def _without_path(self) -> UnitSession:
+        return replace(self.session, cut=self.session.cut.without_path)
+
+    @cached_property
+    def _rests(self) -> dict[Moments, tuple[Mapping[str, Any], ...]]:
+        return {}
+
+    def predicted(
+        self, trials: Sequence[Effects], along: Sequence[bool] | None = None
+    ) -> list[Array]:
+        """Return the same, good enough for differences: the path only where an effect needs it.
+
+        Parameters
+        ----------
+        trials : sequence of tuple of Effect
+            Full sets of effects.
+        along : sequence of bool, optional
+            Which of them are evaluated on the path; by default those that remember.
+        """
+        path = [self.remembers(trial) for trial in trials] if along is None else along
+        wanted = [self._moments(*each) for each in zip(trials, path, strict=True)]
+        out: list[Array] = [np.empty(0)] * len(trials)
+        for moments in Moments:
+            chosen = [i for i, own in enumerate(wanted) if own is moments]
+            for start in range(0, len(chosen), AT_A_TIME):
+                part = chosen[start : start + AT_A_TIME]
+                found = self._batch([trials[i] for i in part], moments)
+                for i, each in zip(part, found, strict=True):
+                    out[i] = each
+        return out
+
+    def _moments(self, effects: Effects, along: bool) -> Moments:
+        """Return where effects must be evaluated; what has no past needs no path between units."""
+        if not along:
+            return Moments.MEAN
+        return Moments.PATH if any(map(self._has_past, effects)) else Moments.UNITS
+
+    def changes(self, trials: Sequence[Effects]) -> list[Array]:
+        """Return the change of the units' predicted poses by other effects than the point's.
+
+        Parameters
+        ----------
+        trials : sequence of tuple of Effect
+            Full sets of effects; those with a memory are compared on the path.
+
+        Returns
+        -------
+        list of (u, 6) arrays
+            Predicted with the trial minus predicted at the point, at O in F [m, rad].
+        """
+        path = [self.remembers(trial) for trial in trials]
+        # First of all: the trials take over what they have in common with it.
+        own, *found = self.predicted([self.effects, *trials])
+        base = {self.remembers(self.effects): own}
+        if True in path and True not in base:
+            base[True] = self._own_along
+        return [each - base[on_path] for each, on_path in zip(found, path, strict=True)]
+
+    @cached_property
+    def _own_along(self) -> Array:
+        return self.along([self.effects])[0]

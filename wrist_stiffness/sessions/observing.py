@@ -1,0 +1,195 @@
+"""From measured sessions to the table that the statistics take: one residual twist a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference import Observations, Quantity
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.hidden_counts import hidden_counts, stands_of
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+from wrist_stiffness.sessions.units import Labels
+
+QUANTITIES = (
+    Quantity("s", "um", (0, 1, 2), 1e6),
+    Quantity("phi", "mdeg", (3, 4, 5), 180e3 / np.pi),
+)
+
+SAME_POSE_COUNTS, SAME_LOAD = 2.5, 0.02
+"""Two dwells repeat one condition within so many encoder counts and this share of the load."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Sessions, what a model predicts of them, and the table of the difference.
+
+    Parameters
+    ----------
+    sessions : tuple of UnitSession
+        Sessions as units.
+    predicted : (u, 6) float
+        Predicted pose error of the units of all sessions, what the sensor would say [m, rad].
+    observations : Observations
+        Residuals and conditions of all units.
+    unit : tuple of (n,) int
+        For each session the row in the table of each measurement, -1 for none.
+    """
+
+    sessions: tuple[UnitSession, ...]
+    predicted: Array
+    observations: Observations
+    unit: tuple[Labels, ...]
+
+
+def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
+    """Compare a model with what was measured, unit by unit.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Predicts.
+    sessions : sequence of MeasuredSession
+        In the order of time.
+
+    Returns
+    -------
+    Observed
+        Only of units that lie in the table's domain and load range.
+
+    Raises
+    ------
+    InputError
+        If there is no session, nothing of one lies in the model's range, or no unit was measured.
+    """
+    if not sessions:
+        raise InputError("no session to compare the model with")
+    cuts = tuple(as_units(model, session) for session in sessions)
+    predicted = np.concatenate([predict_units(model, each) for each in cuts])
+    return tabulate(model, cuts, predicted)
+
+
+def predict_units(model: ErrorModel, session: UnitSession) -> Array:
+    """Return the predicted pose error of each unit as the sensor says it, (u, 6) [m, rad]."""
+    return session.mean(model.batch(session.block).measured)
+
+
+def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:
+    """Return the table of residuals of units against a prediction of them.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Its kinematics and encoder step tell what the encoders hide.
+    sessions : tuple of UnitSession
+        In the order of time, u units together.
+    predicted : (u, 6) float
+        Pose error of the units, as the sensor would say it [m, rad].
+
+    Raises
+    ------
+    InputError
+        If no unit was measured.
+    """
+    units = [len(each) for each in sessions]
+    ends = np.cumsum(units)
+    parts = np.split(predicted, ends[:-1])
+    values = np.concatenate(
+        [each.residual(part) for each, part in zip(sessions, parts, strict=True)]
+    )
+    used = np.isfinite(values).any(axis=1)
+    if not used.any():
+        raise InputError("no unit of the sessions was measured: every pose is blank")
+    theta = np.concatenate([each.mean(each.block.theta) for each in sessions])
+    cuts = [each.cut for each in sessions]
+    counts = hidden_counts(model.table, cuts, theta)
+    covariance = _covariance(sessions, counts)
+    observations = Observations(
+        values,
+        _covariates(sessions),
+        covariance,
+        np.concatenate([each.mean(each.block.time) for each in sessions]),
+        np.repeat(np.arange(len(sessions)), units),
+        _replicates(model, sessions, theta),
+        np.concatenate([each.samples for each in sessions]),
+        QUANTITIES,
+        stand=stands_of(model.table, cuts),
+        shared=None if covariance is None else counts,
+    )
+    row = np.where(used, np.cumsum(used) - 1, -1)
+    starts = ends - units
+    labels = tuple(
+        np.where(each.cut.label >= 0, row[start + each.cut.label], -1)
+        for each, start in zip(sessions, starts, strict=True)
+    )
+    kept = replace(observations.take(used), row=None)
+    return Observed(sessions, predicted, kept, labels)
+
+
+def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
+    """Return the conditions of each unit by name."""
+    columns: list[dict[str, Array]] = []
+    for each in sessions:
+        block, parts = each.block, each.cut
+        load = each.mean(block.load)
+        own = {
+            **{f"theta_{i + 1}": each.mean(block.theta[:, i]) for i in range(2)},
+            **{f"approach_{i + 1}": each.mean(parts.sense[parts.kept, i]) for i in range(2)},
+            **{f"speed_{i + 1}": each.mean(parts.speed[:, i]) for i in range(2)},
+            **dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), load.T, strict=True)),
+            "force": np.linalg.norm(load[:, :3], axis=1),
+            "moment": np.linalg.norm(load[:, 3:], axis=1),
+            "held_s": each.mean(parts.held_s[parts.kept]),
+            "loaded_at_rest": np.rint(each.mean(parts.at_rest[parts.kept].astype(float))),
+            "time_s": each.mean(block.time),
+            **{f"T_{name}": each.mean(value) for name, value in block.temperatures.items()},
+            **{name: each.mean(value) for name, value in block.covariates.items()},
+        }
+        columns.append(own)
+    common = [name for name in columns[0] if all(name in own for own in columns)]
+    return {name: np.concatenate([own[name] for own in columns]) for name in common}
+
+
+def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | None:
+    """Return the covariance of each unit on its own: white noise and the hidden encoder count."""
+    white = np.stack([each.white for each in sessions])
+    seen = np.concatenate([np.concatenate([e.shift, e.turn], axis=1) for e in sessions])
+    if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():
+        return None
+    variance = np.nan_to_num(white, nan=1.0) ** 2
+    own = np.concatenate(
+        [
+            own / each.samples[:, None] + each.wander**2
+            for own, each in zip(variance, sessions, strict=True)
+        ]
+    )
+    return np.asarray(counts @ np.swapaxes(counts, -1, -2) + own[:, :, None] * np.eye(6))
+
+
+def _replicates(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Labels:
+    """Return the number of the condition that each dwell repeats after a new approach, -1 else."""
+    step = model.table.geometry.limits.encoder_step
+    labels = []
+    number, start = 0, 0
+    for each in sessions:
+        units = len(each)
+        pose, load = theta[start : start + units], each.mean(each.block.load)
+        range_ = np.repeat([np.linalg.norm(load[:, i : i + 3], axis=1).max() for i in (0, 3)], 3)
+        own = np.full(units, -1)
+        for i in np.flatnonzero(each.cut.dwell):
+            if own[i] >= 0:
+                continue
+            alike = each.cut.dwell & (own < 0)
+            alike &= (np.abs(pose - pose[i]) <= SAME_POSE_COUNTS * step).all(axis=1)
+            alike &= (np.abs(load - load[i]) <= SAME_LOAD * range_ + 1e-12).all(axis=1)
+            if alike.sum() > 1:
+                own[alike] = number
+                number += 1
+        labels.append(own)
+        start += units
+    return np.concatenate(labels)

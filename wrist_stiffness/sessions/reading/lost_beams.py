@@ -1,0 +1,92 @@
+"""Lost beams: poses that neither a registration nor a late stamp explains."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import rotation_vector
+from wrist_stiffness.sessions.in_pieces import in_pieces
+from wrist_stiffness.sessions.reading.registration import place_left, turn_left
+from wrist_stiffness.sessions.reading.spikes import WINDOW, spikes
+
+DENSE_S = 0.2
+"""Median time between poses below which single ones are compared with their neighbours [s]."""
+
+LEAST_SPIKE_M = 30e-6
+
+LEAST_SPIKE_STEPS = 4.0
+"""In encoder steps: in motion the measured rotation leaves the encoders' by counts."""
+
+TELLING_STEPS = 3.0
+"""In encoder steps: a larger turn from the pose before to the one after tells its direction."""
+
+LATE_S = 0.1
+"""So late a stamp may be: what turns meanwhile is no spike."""
+
+MOVING_RAD = float(np.radians(1.0))
+"""Turn in that time from which on a pose tells what the stamps do in motion [rad]."""
+
+
+def lost_beams(
+    time: Array, shift: Array, rotation: Array, rigid: Array, step: float
+) -> NDArray[np.bool_]:
+    """Tell which poses stand out from their neighbours.
+
+    Parameters
+    ----------
+    time : (n,) float
+        Rising [s].
+    shift : (n, 3) float
+        Measured positions [m]; NaN = not measured.  Of a target that is not at O they swing with
+        the rotation.
+    rotation, rigid : (n, 3, 3) float
+        Measured rotations, and those of the rigid wrist when they were measured.
+    step : float
+        Of the encoders [rad].
+
+    Returns
+    -------
+    (n,) bool
+        True = lost; none where poses are far apart.
+    """
+    if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
+        return np.zeros(len(time), dtype=bool)
+    way = in_pieces(_turn_between, rigid[:-1], rigid[1:])
+    swing = _swing(time, way)
+    moving = swing > MOVING_RAD
+    turn = turn_left(rotation, rigid)
+    place, lever = place_left(shift, rigid)
+    # Stamps that jitter hide much along the motion and nothing across it.
+    lost = spikes(place, LEAST_SPIKE_M, lever * swing, moving)
+    for each in (turn, _across(turn, way, step)):
+        lost |= spikes(each, LEAST_SPIKE_STEPS * step, swing, moving)
+    return lost
+
+
+def _turn_between(first: Array, second: Array) -> Array:
+    """Return the rotation vectors (n, 3) that turn rotations (n, 3, 3) into others [rad]."""
+    return rotation_vector(second @ np.swapaxes(first, 1, 2))
+
+
+def _swing(time: Array, way: Array) -> Array:
+    """Return how far the wrist turns beside each pose while a stamp may be late, (n,) [rad].
+
+    Its way from pose to pose is (n - 1, 3) rotation vectors.
+    """
+    # Neighbours differ by half a window's turn at most: a count that flickers at 1 kHz is no speed.
+    share = LATE_S / np.maximum(np.diff(time), LATE_S / (WINDOW // 2))
+    swing = share * np.linalg.norm(way, axis=1)
+    near = sliding_window_view(np.pad(swing, WINDOW // 2), WINDOW - 1)
+    return np.asarray(np.max(near, axis=1))
+
+
+def _across(turn: Array, way: Array, step: float) -> Array:
+    """Return the parts of turns (n, 3) across the way (n - 1, 3); all of them where it is short."""
+    beside = sliding_window_view(np.pad(way, ((1, 1), (0, 0))), 2, axis=0).sum(axis=2)
+    size = np.linalg.norm(beside, axis=1, keepdims=True)
+    told = size > TELLING_STEPS * step
+    along = np.divide(beside, size, out=np.zeros_like(beside), where=told)
+    return turn - np.sum(turn * along, axis=1, keepdims=True) * along

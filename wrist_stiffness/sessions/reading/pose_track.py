@@ -1,0 +1,267 @@
+"""Measured poses of the platform in F, whatever the instrument said them in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
+from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
+from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
+from wrist_stiffness.sessions.reading.marker_poses import LEAST_MARKERS, poses_from_markers
+from wrist_stiffness.sessions.reading.signals import Signal, Stamps
+
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+"""Quaternion, scalar last."""
+
+MOVED = 2.0
+"""Variance over that of its white noise from which on the frame has moved, not only been noisy."""
+
+LEAST_FRAME_POSES = 3
+
+REFERENCE_SHARE = 0.05
+"""Share of a session's frame poses, at its start, that are the reference for its motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTrack:
+    """Measured poses by stamp.
+
+    Parameters
+    ----------
+    time_ns : (n,) int64
+        Rising [ns].
+    shift : (n, 3) float
+        Position of the platform's point O in F [m]; NaN = not measured.
+    rotation : (n, 3, 3) float
+        U -> F; NaN = not measured.
+    covariance : (6, 6) float, optional
+        As the instrument states it, zero where it does not [m, rad].
+    remarks : tuple of str
+        What could not be used.
+    """
+
+    time_ns: Stamps
+    shift: Array
+    rotation: Array
+    covariance: Array | None = None
+    remarks: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """Return the number of poses."""
+        return len(self.time_ns)
+
+
+def pose_track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
+    """Return the measured poses of a recording.
+
+    Parameters
+    ----------
+    samples : Samples
+        With poses or markers; poses are used where there are both.
+    markers : (k, 3) float
+        Nominal places of the markers in U [m].
+    frames : Frames
+        Sensor frames that are mapped to `wrist_base`.
+
+    Returns
+    -------
+    PoseTrack
+        In the order of their stamps.
+
+    Raises
+    ------
+    FrameError
+        If they are in a frame that is neither `wrist_base` nor mapped to it.
+    InputError
+        If the markers are not those of the geometry or too few of them were ever seen.
+    """
+    if len(samples.poses.time_ns):
+        track = _track_of_poses(samples.poses, "measured pose", frames)
+        if len(samples.markers.time_ns):
+            unused = "markers and poses were measured: the poses are used"
+            track = replace(track, remarks=(*track.remarks, unused))
+    else:
+        track = _track_of_markers(samples.markers, markers, frames)
+    if len(samples.frame_poses.time_ns):
+        return without_frame_motion(
+            track, _track_of_poses(samples.frame_poses, "frame pose", frames)
+        )
+    return track
+
+
+def without_frame_motion(track: PoseTrack, frame: PoseTrack) -> PoseTrack:
+    """Take the motion of the frame out of the platform's poses.
+
+    Parameters
+    ----------
+    track : PoseTrack
+        Poses of the platform.
+    frame : PoseTrack
+        Poses of a target on the frame by the same instrument.
+
+    Returns
+    -------
+    PoseTrack
+        As seen from the frame at the start.  Unchanged, with a remark, where the frame stood still
+        within its noise: the noise of a target that is far from O would only be added.
+    """
+    known = np.isfinite(frame.shift).all(axis=1) & np.isfinite(frame.rotation).all(axis=(1, 2))
+    if known.sum() < LEAST_FRAME_POSES:
+        few = f"only {known.sum()} poses of the frame were measured: its motion stays in"
+        return replace(track, remarks=(*track.remarks, few))
+    first = slice(0, max(1, int(REFERENCE_SHARE * known.sum())))
+    turned = Rotation.from_matrix(frame.rotation[known])
+    start_turn, start = turned[first].mean(), frame.shift[known][first].mean(axis=0)
+    turn = turned * start_turn.inv()
+    shift = frame.shift[known] - turn.apply(start)
+    motion = np.hstack([shift, turn.as_rotvec()])
+    white = 0.5 * np.mean(np.diff(motion, axis=0) ** 2, axis=0)
+    if np.all(motion.var(axis=0) <= MOVED * white):
+        still = "the frame stood still within the noise of its measurement: nothing is taken out"
+        return replace(track, remarks=(*track.remarks, still))
+    signal = Signal(frame.time_ns[known], motion)
+    inside = np.clip(track.time_ns, signal.time_ns[0], signal.time_ns[-1])
+    at = signal.interpolated(inside)
+    back = Rotation.from_rotvec(at[:, 3:]).inv()
+    largest = np.max(np.linalg.norm(motion.reshape(-1, 2, 3), axis=2), axis=0)
+    taken = (
+        f"motion of the frame taken out: up to {1e6 * largest[0]:.1f} um at O and "
+        f"{1e3 * np.degrees(largest[1]):.1f} mdeg"
+    )
+    return replace(
+        track,
+        shift=back.apply(track.shift - at[:, :3]),
+        rotation=back.as_matrix() @ track.rotation,
+        remarks=(*track.remarks, taken),
+    )
+
+
+def measured_components(poses: PoseSamples) -> tuple[Array, Array]:
+    """Return positions (n, 3) and quaternions (n, 4) with NaN for what was not measured.
+
+    A huge variance says so; so do numbers that are not finite.  A quaternion whose norm is not one
+    is no measurement at all, and an orientation that is measured in part only is left out.
+    """
+    huge = np.diagonal(poses.covariance, axis1=1, axis2=2) >= NOT_MEASURED
+    position, quaternion = poses.position.copy(), poses.quaternion.copy()
+    unturned = huge[:, 3:].any(axis=1) | ~np.isfinite(quaternion).all(axis=1)
+    broken = (np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) > UNIT_TOLERANCE) & ~unturned
+    position[huge[:, :3] | ~np.isfinite(position) | broken[:, None]] = np.nan
+    quaternion[unturned | broken] = np.nan
+    return position, quaternion
+
+
+def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
+    turn, origin = base_transform(poses.frame_id, what, frames)
+    shift, quaternion = measured_components(poses)
+    turned = np.asarray(np.isfinite(quaternion).all(axis=1))
+    rotation = Rotation.from_quat(np.where(turned[:, None], quaternion, IDENTITY)).as_matrix()
+    rotation[~turned] = np.nan
+    if np.any(turn != np.eye(3)):  # NaN times zero would spread to the other components
+        shift, rotation = shift @ turn.T, turn @ rotation
+    huge = np.diagonal(poses.covariance, axis1=1, axis2=2) >= NOT_MEASURED
+    covariance = _stated(poses.covariance, ~huge)
+    if covariance is not None:
+        axes = block_diagonal(turn)
+        covariance = axes @ covariance @ axes.T
+    remarks = []
+    if partly := int((huge[:, 3:].any(axis=1) & ~huge[:, 3:].all(axis=1)).sum()):
+        remarks.append(
+            f"{what}: {partly} of {len(shift)} orientations are measured in part only (a huge "
+            "variance for some turn): all three turns of these are left out"
+        )
+    blind = ~huge[:, 3:].any(axis=1) & ~np.isfinite(poses.quaternion).all(axis=1)
+    if alone := int((blind & np.isfinite(shift).any(axis=1)).sum()):
+        remarks.append(
+            f"{what}: {alone} of {len(shift)} orientations are not finite: of these the position "
+            "alone is used"
+        )
+    lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
+    return _in_time_order(poses.time_ns, shift + origin, rotation, covariance, what, lost, remarks)
+
+
+def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
+    """Return the typical covariance that messages state, None where they state none.
+
+    Of each component by those that measured it: most rows of a table may only tell the way.
+    """
+    told = np.isfinite(covariance).all(axis=(1, 2))
+    if not told.any():
+        return None
+    both = measured[told][:, :, None] & measured[told][:, None, :]
+    seen, ever = both.any(axis=0), measured[told].any(axis=0)
+    typical: Array = np.zeros(seen.shape)
+    typical[seen] = np.nanmedian(np.where(both, covariance[told], np.nan)[:, seen], axis=0)
+    return typical if np.all(np.diag(typical)[ever] > 0.0) else None
+
+
+def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) -> PoseTrack:
+    """Return the poses of markers in F; NaN where too few were seen."""
+    what = "measured markers"
+    turn, origin = base_transform(samples.frame_id, what, frames)
+    count = samples.position.shape[1]
+    if count != len(nominal):
+        raise InputError(
+            f"{what}: messages hold {count} markers, the geometry names {len(nominal)} readout "
+            "points; both must be in the same order"
+        )
+    shift, rotation = poses_from_markers(nominal, samples.position @ turn.T + origin)
+    unseen = int(np.isnan(shift).any(axis=1).sum())
+    if unseen == len(shift):
+        seen = np.isfinite(samples.position).all(axis=2).sum(axis=1)
+        raise InputError(
+            f"{what}: at most {seen.max()} of {count} were seen at once; at least {LEAST_MARKERS} "
+            "that are not on a line are needed for a pose"
+        )
+    return _in_time_order(samples.time_ns, shift, rotation, None, what, unseen, [])
+
+
+def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tuple[Array, Array]:
+    """Return rotation and origin that take the frame of all messages to `wrist_base`.
+
+    Raises
+    ------
+    FrameError
+        If it is neither `wrist_base` nor mapped to it, or they come in several frames.
+    """
+    names = np.unique(frame_id).tolist()
+    found = [frames.in_base(name, what) for name in names]
+    if len(names) > 1:
+        raise FrameError(f"{what}: more than one frame: {', '.join(names)}")
+    return found[0]
+
+
+def last_of_equal(time_ns: Stamps) -> NDArray[np.intp]:
+    """Return the rows in the order of their stamps; of equal stamps only the last one received."""
+    if np.all(np.diff(time_ns) > 0):
+        return np.arange(len(time_ns))
+    _, reverse = np.unique(time_ns[::-1], return_index=True)
+    return len(time_ns) - 1 - reverse
+
+
+def _in_time_order(
+    time_ns: Stamps,
+    shift: Array,
+    rotation: Array,
+    covariance: Array | None,
+    what: str,
+    lost: int,
+    remarks: list[str],
+) -> PoseTrack:
+    order = last_of_equal(time_ns)
+    if lost:
+        remarks.append(f"{what}: {lost} of {len(time_ns)} lost by the instrument")
+    if len(order) < len(time_ns):
+        remarks.append(
+            f"{what}: {len(time_ns) - len(order)} of {len(time_ns)} have the stamp of another one: "
+            "of each only the last is used"
+        )
+    return PoseTrack(time_ns[order], shift[order], rotation[order], covariance, tuple(remarks))

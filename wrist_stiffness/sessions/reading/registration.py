@@ -1,0 +1,179 @@
+"""Whether measured and rigid rotations belong to one wrist, wherever the instrument stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import rotation_vector
+from wrist_stiffness.sessions.in_pieces import in_pieces
+from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
+
+POSES_USED = 1000
+
+ROUNDS = 4
+"""After which registrations change no more."""
+
+SOUND = 3.0
+"""Times the median misfit up to which a measurement has a full say in a registration."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well measured rotations follow the rigid ones, the target turned on the platform as fits.
+
+    Parameters
+    ----------
+    misfit : float
+        Median angle that is left with the instrument as it stands [rad].
+    misfit_turned : float
+        The same with the instrument turned as fits best [rad].
+    turn : float
+        Angle of that turn [rad].
+    """
+
+    misfit: float
+    misfit_turned: float
+    turn: float
+
+
+def agreement(measured: Array, rigid: Array) -> Agreement:
+    """Compare measured with rigid rotations.
+
+    Parameters
+    ----------
+    measured, rigid : (n, 3, 3) float
+        U -> F, finite.
+
+    Returns
+    -------
+    Agreement
+        Of a thousand of them.
+    """
+    used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
+    seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
+    turn = _instrument(seen, said, np.ones(len(used)))
+    seen, said = seen * seen.mean().inv(), said * said.mean().inv()
+    turned = turn * said * turn.inv()
+    return Agreement(
+        float(np.median((seen * said.inv()).magnitude())),
+        float(np.median((seen * turned.inv()).magnitude())),
+        float(turn.magnitude()),
+    )
+
+
+def _instrument(seen: Rotation, said: Rotation, weight: Array) -> Rotation:
+    """Return the turn X of the instrument in F that fits best.
+
+    With X and a turn Y of the target on the platform, measured is X rigid Y.  So the rotations from
+    the mean of one side are those of the other, turned by X alone.
+    """
+    measured, rigid = ((each * each.mean(weight).inv()).as_rotvec() for each in (seen, said))
+    left, _, right = np.linalg.svd((weight * measured.T) @ rigid)
+    left[:, 2] *= np.linalg.det(left @ right)
+    return Rotation.from_matrix(left @ right)
+
+
+def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
+    """Return what to change so that rotations agree, empty for nothing known.
+
+    Parameters
+    ----------
+    measured : (n, 3, 3) float
+        U -> F, finite.
+    theta : (n, 2) float
+        Motor angles as they were recorded [rad].
+    table : Table
+        Of the wrist.
+    limit : float
+        Largest misfit of rotations that agree [rad].
+    """
+    w_first = Rotation.from_quat(Rotation.from_matrix(measured).as_quat()[:, [1, 2, 3, 0]])
+    changes = (
+        ("the motors swapped", measured, theta[:, ::-1]),
+        ("the sign of motor 1 turned", measured, theta * [-1.0, 1.0]),
+        ("the sign of motor 2 turned", measured, theta * [1.0, -1.0]),
+        ("both signs turned", measured, -theta),
+        ("angles taken as degrees", measured, np.radians(theta)),
+        ("the angles of a table's _deg columns taken as radians", measured, np.degrees(theta)),
+        ("quaternions taken in the order w x y z", w_first.as_matrix(), theta),
+        ("the rotations taken from base to platform", np.swapaxes(measured, 1, 2), theta),
+    )
+    # Small turns nearly agree with both signs turned and taken the other way round.
+    best, said = limit, ""
+    for change, rotation, angles in changes:
+        if table.mechanism.reachable(angles).all():
+            misfit = agreement(rotation, rigid_rotation(table, angles)).misfit
+            if misfit < best:
+                best, said = misfit, change
+    return said
+
+
+def turn_left(measured: Array, rigid: Array) -> Array:
+    """Return what constant turns of instrument and target leave of measured rotations.
+
+    Parameters
+    ----------
+    measured, rigid : (n, 3, 3) float
+        U -> F; measured ones are NaN where they are not.
+
+    Returns
+    -------
+    (n, 3) float
+        Rotation vectors in F, from rigid to measured with the instrument and the target turned
+        back [rad].
+    """
+    known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
+    if len(known) == 0:
+        return np.full((len(measured), 3), np.nan)
+    used = known[np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))]
+    seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
+    weight = np.ones(len(used))
+    for _ in range(ROUNDS):
+        instrument = _instrument(seen, said, weight)
+        target = (said.inv() * instrument.inv() * seen).mean(weight)
+        off = (seen * (instrument * said * target).inv()).magnitude()
+        # All keep a say: at rest the misfit is least, and it is motion that tells the instrument.
+        weight = 1.0 / (off**2 + (SOUND * np.median(off)) ** 2 + np.finfo(float).eps)
+    back, and_back = instrument.inv().as_matrix(), target.inv().as_matrix()
+    return in_pieces(
+        lambda here, there: rotation_vector(back @ here @ and_back @ np.swapaxes(there, 1, 2)),
+        measured,
+        rigid,
+    )
+
+
+def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
+    """Return what a constant place of the target in U and one in F leave of positions.
+
+    Parameters
+    ----------
+    shift : (n, 3) float
+        Measured positions [m]; NaN = not measured.
+    rigid : (n, 3, 3) float
+        U -> F.
+
+    Returns
+    -------
+    left : (n, 3) float
+        [m].
+    lever : float
+        Distance of the target from its place in U, as far as motion tells it [m].
+    """
+    used = np.unique(np.linspace(0, len(shift) - 1, POSES_USED).astype(int))
+    places = np.concatenate([rigid[used], np.tile(np.eye(3), (len(used), 1, 1))], axis=2)
+    design, seen = places.reshape(-1, 6), shift[used].ravel()
+    good = np.isfinite(seen)
+    if not good.any():
+        return shift, 0.0
+    fitted = np.zeros(6)
+    for _ in range(ROUNDS):
+        fitted = np.linalg.lstsq(design[good], seen[good], rcond=None)[0]
+        off = np.abs(seen - design @ fitted)
+        # A lost beam is far beyond three times the median of what is left.
+        good = off <= SOUND * np.nanmedian(off)
+    return shift - rigid @ fitted[:3] - fitted[3:], float(np.linalg.norm(fitted[:3]))

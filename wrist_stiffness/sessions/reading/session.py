@@ -1,0 +1,327 @@
+"""From a recording of this wrist to a measured session.
+
+The rules are those of the nodes, seen from the stamp of a measured pose: the load is the newest one
+that is not younger, held up to an age limit; temperatures and covariates are held.  Motor angles
+are interpolated between the two joint states around the stamp, because motions are compared: at
+10 ms between joint states and 30 deg/s a held angle is wrong by up to 300 mdeg.  In a dwell the
+encoder's count is the same on both sides, so nothing is smoothed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import FrameError, InputError, RecordingError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
+from wrist_stiffness.sessions.in_pieces import in_pieces
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
+from wrist_stiffness.sessions.reading.lost_beams import lost_beams
+from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
+from wrist_stiffness.sessions.reading.path import GAP_S, turning_stamps
+from wrist_stiffness.sessions.reading.pose_track import PoseTrack, pose_track
+from wrist_stiffness.sessions.reading.refusals import (
+    require_enough,
+    require_near,
+    require_overlap,
+    require_same_wrist,
+    require_topics,
+)
+from wrist_stiffness.sessions.reading.signals import Signal, Stamps
+from wrist_stiffness.sessions.reading.static_frames import frames_of
+from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
+from wrist_stiffness.sessions.table_range import beyond_range
+from wrist_stiffness.topics import (
+    MOTOR_COMMANDS,
+)
+
+Mask = NDArray[np.bool_]
+
+GEOMETRY = "geometry_sha256"
+"""Key of the notes: checksum of the geometry file of the wrist that was recorded."""
+
+ANGLES_USED = 20_000
+"""Joint states that are enough to tell the offset of the clocks."""
+
+OWN_CLOCK_S = 0.2
+"""A larger offset is another clock and is taken out; a smaller one is the effect `time_delay`."""
+
+OWN_CLOCK_PERIODS = 5.0
+"""An offset of fewer sample periods is not told from the sampling."""
+
+OWN_CLOCK_GAIN = 4.0
+"""An offset that divides the mean square of the misfit by less is not believed."""
+
+TURN_STEPS = 1.5
+"""In encoder steps: a smaller swing between two poses is the chatter of a count."""
+
+PULL_SHARE = 0.25
+"""Of the load's range: a smaller pull between two poses may be noise."""
+
+
+def read_session(
+    path: str | Path,
+    table: Table,
+    *,
+    remaps: Mapping[str, str] | None = None,
+    joints: Sequence[str] = DEFAULT_JOINTS,
+    frames: Frames | None = None,
+    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+) -> MeasuredSession:
+    """Read a recording with measured poses.
+
+    Parameters
+    ----------
+    path : path
+        rosbag2 folder with MCAP storage, or `.mcap` file.
+    table : Table
+        Of the wrist: its rigid kinematics, and its readout points as the nominal markers.
+    remaps : mapping, optional
+        Actual by standard topic name.
+    joints : sequence of str
+        Joint names of motor 1 and 2.
+    frames : Frames, optional
+        Sensor frames of loads, poses and markers, beside `wrist_base`, `wrist_platform` and those
+        on the recording's `/tf_static`.
+    load_age_limit_s : float
+        Oldest load that still belongs to a measured pose [s].
+
+    Returns
+    -------
+    MeasuredSession
+        Named after the recording, with remarks on everything that could not be used.  Where poses
+        are far apart, rows without a measurement tell where angles and load turned back in between.
+
+    Raises
+    ------
+    RecordingError
+        If the recording cannot be read, lacks a topic, or its clocks do not overlap.
+    FrameError
+        If loads or poses are in an unknown frame.
+    InputError
+        If too few poses are left, or they are those of another wrist.
+    """
+    recording = open_recording(path)
+    samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
+    require_topics(recording, samples, remaps or {})
+    notes, unread = notes_of(samples)
+    known = frames_of(recording, remaps or {}, frames or Frames())
+    try:
+        machine = machine_signals(samples, known.frames)
+        markers = table.geometry.platform.readout_points
+        track = pose_track(samples, markers, known.frames)
+        session = session_of(recording.path.name, machine, track, table, load_age_limit_s)
+    except (FrameError, InputError, RecordingError) as error:
+        hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
+        raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
+    damage = [f"the recording is damaged: {recording.damage}"] if recording.damage else []
+    faults = [str(fault) for fault in samples.faults]
+    other = _another_geometry(notes, table)
+    said = (*damage, *unread, *other, *known.remarks, *faults, *session.remarks)
+    return replace(session, notes=notes, remarks=said)
+
+
+def session_of(
+    name: str,
+    machine: MachineSignals,
+    track: PoseTrack,
+    table: Table,
+    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+) -> MeasuredSession:
+    """Put the signals of a recording together: clocks, spikes, the way between poses.
+
+    Parameters
+    ----------
+    name : str
+        Of the session.
+    machine : MachineSignals
+        Angles, loads and what is slow.
+    track : PoseTrack
+        Measured poses in F.
+    table, load_age_limit_s
+        As in `read_session`.
+
+    Returns
+    -------
+    MeasuredSession
+        With remarks on everything that could not be used, and no notes.
+
+    Raises
+    ------
+    RecordingError
+        If the clocks do not overlap.
+    InputError
+        If too few poses are left, or they are those of another wrist.
+    """
+    remarks = [*machine.remarks, *track.remarks]
+    require_overlap(machine.angles.time_ns, track.time_ns)
+    offset = late = _offset(machine, track, table)
+    if offset is not None and _another_clock(offset, machine, track):
+        remarks.append(
+            f"the clock of the pose sensor is {offset.seconds:+.3f} s (uncertain by "
+            f"{offset.sigma:.3f} s) from that of the joint states: taken out"
+        )
+        track = replace(track, time_ns=track.time_ns - round(offset.seconds * NANOSECONDS))
+        late = None
+    usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
+    remarks += reasons
+    time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
+    reachable = in_pieces(table.mechanism.reachable, machine.angles.interpolated(time_ns))
+    if not reachable.all():
+        remarks.append(
+            f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
+        )
+        time_ns, shift, rotation = time_ns[reachable], shift[reachable], rotation[reachable]
+    if len(time_ns) == 0:
+        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
+    block = machine.at(time_ns)
+    rigid = rigid_rotation(table, block.theta)
+    require_same_wrist(rotation, rigid, block.theta, table)
+    require_near(shift)
+    remarks += beyond_range(table, block)
+    meant = _rigid_when_measured(machine, time_ns, late, table, rigid)
+    lost = lost_beams(block.time, shift, rotation, meant, table.geometry.limits.encoder_step)
+    if lost.any():
+        remarks.append(f"{lost.sum()} of {len(lost)} measured poses are spikes: left out")
+        shift, rotation = shift.copy(), rotation.copy()
+        shift[lost], rotation[lost] = np.nan, np.nan
+    if np.all(block.load == block.load[0]):
+        remarks.append(
+            "the load never changes: what the load does and what is always there look the same"
+        )
+    path_ns = path_stamps(machine, time_ns, table, load_age_limit_s)
+    place = np.searchsorted(time_ns, path_ns)
+    new = time_ns[np.minimum(place, len(time_ns) - 1)] != path_ns
+    all_ns = np.insert(time_ns, place[new], path_ns[new])
+    rows = np.searchsorted(all_ns, time_ns)
+    session = MeasuredSession(
+        name,
+        block if len(all_ns) == len(block) else machine.at(all_ns),
+        _spread(shift, rows, len(all_ns)),
+        _spread(rotation, rows, len(all_ns)),
+        track.covariance,
+        remarks=tuple(remarks),
+        clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
+    )
+    require_enough(session, len(track))
+    return session
+
+
+def path_stamps(
+    machine: MachineSignals, time_ns: Stamps, table: Table, load_age_limit_s: float
+) -> Stamps:
+    """Return the stamps that tell the way to the first pose and between poses far apart.
+
+    Parameters
+    ----------
+    machine : MachineSignals
+        Angles and loads.
+    time_ns : (n,) int64
+        Stamps of measured poses, rising [ns].
+    table, load_age_limit_s
+        As in `read_session`.
+
+    Returns
+    -------
+    (p,) int64
+        Where angles or load turned back [ns].
+    """
+    start = max(machine.angles.time_ns[0], machine.loads.time_ns[0])
+    far = time_ns[0] - start > GAP_S * NANOSECONDS
+    time_ns = np.append(start, time_ns) if far else time_ns
+    step = table.geometry.limits.encoder_step
+    turns = turning_stamps(machine.angles, time_ns, np.full(2, TURN_STEPS * step))
+    pulls = turning_stamps(
+        machine.loads, time_ns, PULL_SHARE * np.ptp(machine.loads.values, axis=0)
+    )
+    found = np.union1d(np.union1d(turns, pulls), time_ns[:1])
+    found = found[machine.usable(found, load_age_limit_s)[0]]
+    return found[table.mechanism.reachable(machine.angles.interpolated(found))]
+
+
+def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
+    """Return values (n, ...) at their rows among so many, NaN at the others."""
+    if count == len(values):
+        return values
+    out = np.full((count, *values.shape[1:]), np.nan)
+    out[rows] = values
+    return out
+
+
+def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOffset | None:
+    known = np.isfinite(track.rotation).all(axis=(1, 2))
+    every = max(1, len(machine.angles) // ANGLES_USED)
+    theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
+    reachable = table.mechanism.reachable(theta)
+    if not known.any() or not reachable.any():
+        return None
+    rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_quat()
+    turned = Signal(time_ns[reachable], rigid)
+    return clock_offset(track.time_ns[known], track.rotation[known], turned)
+
+
+def _another_clock(offset: ClockOffset, machine: MachineSignals, track: PoseTrack) -> bool:
+    """Tell whether an offset is one of clocks, not a delay that the wrist's model can have."""
+    period = max(_period_s(machine.angles.time_ns), _period_s(track.time_ns))
+    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * period, 3.0 * offset.sigma)
+    return abs(offset.seconds) > least and offset.gain > OWN_CLOCK_GAIN
+
+
+def _rigid_when_measured(
+    machine: MachineSignals, time_ns: Stamps, late: ClockOffset | None, table: Table, rigid: Array
+) -> Array:
+    """Return the rigid rotations at the moments of the poses, not at their late stamps."""
+    if late is None or abs(late.seconds) <= 3.0 * late.sigma:
+        return rigid
+    own = machine.angles.time_ns
+    moments = np.clip(time_ns - round(late.seconds * NANOSECONDS), own[0], own[-1])
+    theta = machine.angles.interpolated(moments)
+    reachable = table.mechanism.reachable(theta)
+    meant = rigid.copy()
+    meant[reachable] = rigid_rotation(table, theta[reachable])
+    return meant
+
+
+def _period_s(time_ns: Stamps) -> float:
+    return float(np.median(np.diff(time_ns))) / NANOSECONDS if len(time_ns) > 1 else 0.0
+
+
+def _another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
+    """Return a warning where the notes name another geometry: a table may have been made anew."""
+    said, own = notes.get(GEOMETRY), table.geometry.sha256
+    if said in (None, own):
+        return []
+    return [
+        f"note {GEOMETRY!r} is {str(said)[:12]}..., the table's geometry {own[:12]}... "
+        f"({table.geometry.name}): the recording is of another wrist, or its geometry was changed"
+    ]
+
+
+def notes_of(samples: Samples) -> tuple[dict[str, Any], list[str]]:
+    """Return the facts of all notes, later ones first choice, and what was no JSON."""
+    notes: dict[str, Any] = {}
+    unread = []
+    for text in samples.notes:
+        try:
+            facts = json.loads(text)
+        except (ValueError, RecursionError):
+            facts = None
+        if isinstance(facts, dict):
+            notes |= facts
+        else:
+            unread.append(f"note {text[:80]!r} is no JSON object: not used")
+    return notes, unread
