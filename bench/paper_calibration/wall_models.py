@@ -2,8 +2,8 @@
 
     python bench/paper_calibration/wall_models.py judge | mesh | patches | lifting | pressure
 
-Each word writes one block or picture of docs/walls.md; none does all.  `judge` needs
-CalculiX (Debian package calculix-ccx).  Minutes each.
+Each word writes one block or picture of docs/walls.md; none does all; `patches` only prints.
+`judge` needs CalculiX (Debian package calculix-ccx).  Minutes each.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ HALVES = (slice(0, 3), slice(3, 6))
 PATCHED = 1.5
 """Element sizes of the wrists in patches, over the shipped ones."""
 
-UM, CENTIDEGREES = 1e6, 100.0 * 180.0 / np.pi
+UM, MDEG = 1e6, 1e3 * 180.0 / np.pi
 
 
 def main() -> None:
@@ -63,6 +63,8 @@ def main() -> None:
             continue
         block = stages[stage](geometry)
         print(block, flush=True)
+        if stage == "patches":
+            continue
         page = folder / "walls.md"
         page.write_text(insert_blocks(page.read_text(), {stage: block}))
 
@@ -132,10 +134,10 @@ def mesh(geometry: Geometry) -> str:
             components, _ = elastic_components(geometry, scaled(factor), interface)
             operators = contact_operators(configuration, components, np.zeros(3))
             values.append(rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0))
-        table = np.array(values) * [UM, CENTIDEGREES]
+        table = np.array(values) * [UM, MDEG]
         order, limit = richardson(table, factors[0] / factors[1])
-        for k, name in enumerate(("s [µm]", "φ [10⁻² °]")):
-            cells = " | ".join(f"{value:.3f}" for value in table[:, k])
+        for k, name in enumerate(("s [µm]", "phi [mdeg]")):
+            cells = " | ".join(f"{value:.{3 - k}f}" for value in table[:, k])
             left = 100 * (table[-1, k] / limit[k] - 1)
             rows.append(f"| `{interface}` | {name} | {cells} | {order[k]:.2f} | {left:+.2f} % |")
     head = "| wall | mean | 2.25 × | 1.5 × | shipped sizes | order | left |"
@@ -157,7 +159,7 @@ def patched(
 
 
 def rated(wrist: PatchedWrist, thetas: Array, clearance: float = 0.0, lifts: bool = True) -> Array:
-    """Mean |s| [um] and phi [1e-2 deg] of the rated load, walls in patches."""
+    """Mean |s| [um] and phi [mdeg] of the rated load, walls in patches."""
     mechanism = mechanism_of(wrist.geometry)
     sizes = []
     for theta in thetas:
@@ -165,7 +167,7 @@ def rated(wrist: PatchedWrist, thetas: Array, clearance: float = 0.0, lifts: boo
         load = rated_wrench(pose, wrist.geometry)
         twist = solve_patches(wrist, pose, load, clearance, lifts).twist
         sizes.append([np.linalg.norm(twist[half]) for half in HALVES])
-    return np.mean(sizes, axis=0) * [UM, CENTIDEGREES]
+    return np.mean(sizes, axis=0) * [UM, MDEG]
 
 
 def patches(geometry: Geometry) -> str:
@@ -180,18 +182,16 @@ def patches(geometry: Geometry) -> str:
         around = [len(np.unique(b.angle.round(9))) for b in wrist.bushings.values()]
         two, one = rated(wrist, thetas, lifts=False), rated(wrist, thetas)
         rows.append(
-            f"| {min(around)}–{max(around)} | {wall} | {flange} | {two[0]:.2f} / {two[1]:.3f} | "
-            f"{one[0]:.2f} / {one[1]:.3f} | {one[0] / two[0]:.3f} |"
+            f"| {min(around)}–{max(around)} | {wall} | {flange} | {two[0]:.2f} / {two[1]:.2f} | "
+            f"{one[0]:.2f} / {one[1]:.2f} | {one[0] / two[0]:.3f} |"
         )
         print(rows[-1], flush=True)
     components, _ = elastic_components(geometry, scaled(PATCHED), "sliding", condenser=CONDENSE)
     configuration = mechanism_of(geometry).forward(thetas)
     operators = contact_operators(configuration, components, np.zeros(3))
-    nodal = rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0) * [UM, CENTIDEGREES]
-    rows.append(f"| every node | | 1 | {nodal[0]:.2f} / {nodal[1]:.3f} | | |")
-    head = (
-        "| around | along the wall | over the flange | two-sided s / φ | one-sided s / φ | ratio |"
-    )
+    nodal = rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0) * [UM, MDEG]
+    rows.append(f"| every node | | 1 | {nodal[0]:.2f} / {nodal[1]:.2f} | | |")
+    head = "| around | along the wall | over the flange | two-sided s / phi | one-sided | ratio |"
     return "\n".join([head, "| --- | --- | --- | --- | --- | --- |", *rows])
 
 
@@ -200,12 +200,12 @@ def lifting(geometry: Geometry) -> str:
     wrist, thetas = patched(geometry, scaled(PATCHED), 8, 2), poses(geometry, 24, 14)
     rows = []
     two = rated(wrist, thetas, lifts=False)
-    rows.append(f"| two-sided (`sliding`) | {two[0]:.1f} | {two[1]:.2f} | 1 |")
+    rows.append(f"| two-sided (`sliding`) | {two[0]:.1f} | {two[1]:.1f} | 1 |")
     for clearance in (0.0, 1e-6, 5e-6, 20e-6):
         one = rated(wrist, thetas, clearance)
         name = f"lifts off, clearance {UM * clearance:g} µm"
-        rows.append(f"| {name} | {one[0]:.1f} | {one[1]:.2f} | {one[0] / two[0]:.2f} |")
-    head = "| wall | mean s [µm] | mean φ [10⁻² °] | s over two-sided |"
+        rows.append(f"| {name} | {one[0]:.1f} | {one[1]:.1f} | {one[0] / two[0]:.2f} |")
+    head = "| wall | mean s [µm] | mean phi [mdeg] | s over two-sided |"
     return "\n".join([head, "| --- | --- | --- | --- |", *rows])
 
 
