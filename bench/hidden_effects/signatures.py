@@ -1,6 +1,6 @@
-"""Draw what each hidden effect does to the residual, as a user would see it without noise.
+"""Draw what hidden effects do to the residual, as a user would see it without noise.
 
-Writes docs/pictures/hidden_effects.png and hidden_effects_strangers.png.  About two minutes.
+Writes docs/pictures/hidden_effects.png: four of the catalogue, and four outside it.
 
     python bench/hidden_effects/signatures.py [--table TABLE] [--output FOLDER]
 """
@@ -12,20 +12,23 @@ from pathlib import Path
 
 import numpy as np
 
-from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, Entry, HiddenEffect
+from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 from wrist_stiffness.simulation.size import Scale
 
 SECONDS, RATE_HZ = 40.0, 50.0
 SIZE = 3.0
 SHAPE_SEED = 3
-COLUMNS = 5
+DRAWN = (
+    ("link_stiffness", "joint_clearance", "backlash", "thermal_expansion"),
+    ("loose_seat", "cable_stop", "dent", "swelling"),
+)
+"""One row each; of every kind of time course one."""
 
 SHOWN = {
     "m": ((1e6, "µm"), (1e3, "mm")),
@@ -54,50 +57,42 @@ def amount(magnitude: float, unit: str) -> str:
     return f"{factor * magnitude:.3g} {shown}".strip()
 
 
-def draw_page(scale: Scale, entries: dict[str, Entry], path: Path) -> None:
-    """Draw one panel for each effect at its first place."""
-    rows = -(-len(entries) // COLUMNS)
-    figure = new_figure(3.4 * COLUMNS, 2.1 * rows)
-    panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
-    progress = Progress(path.stem)
-    for number, (effect, entry) in enumerate(entries.items()):
-        panel = panels[number]
-        start = HiddenEffect(
-            effect, entry.components[0], entry.forms[0], entry.plausible, SHAPE_SEED
-        )
-        hidden, note = sized_or_largest(scale, start)
-        change = scale.signature(hidden)
-        for axis, name in enumerate("xyz"):
-            panel.plot(scale.time_s, 1e6 * change[:, axis], linewidth=0.9, label=f"s_{name}")
-        panel.set_ylabel("shift [µm]", fontsize=8)
-        turned = panel.twinx()
-        turn = np.degrees(np.linalg.norm(change[:, 3:], axis=1)) * 1e3
-        turned.plot(scale.time_s, turn, color="0.6", linewidth=0.7, label="φ")
-        # From zero: a constant turn would show its rounding else.
-        turned.set_ylim(0.0, 1.1 * float(turn.max()) + 1e-3)
-        turned.set_ylabel("φ [mdeg]", fontsize=8, color="0.5")
-        for side in (panel, turned):
-            side.tick_params(labelsize=7)
-            side.ticklabel_format(useOffset=False)
-        panel.set_title(
-            f"{effect}@{hidden.component}\n{amount(hidden.magnitude, entry.unit)}, {note}",
-            fontsize=8,
-        )
-        progress(number + 1, len(entries))
-    for panel in panels[len(entries) :]:
-        panel.set_visible(False)
-    for panel in panels[max(0, len(entries) - COLUMNS) : len(entries)]:
-        panel.set_xlabel("time [s]", fontsize=8)
-        panel.tick_params(labelbottom=True)
-    lines = [*panels[0].get_lines(), *turned.get_lines()]
-    figure.legend(
-        lines, [str(line.get_label()) for line in lines], ncols=4, loc="outside upper left"
-    )
+def draw(scale: Scale, path: Path) -> None:
+    """Draw shift over rotation for each effect, at the first place where it may be."""
+    entries = CATALOGUE | STRANGERS
+    figure = new_figure(3.2 * len(DRAWN[0]), 3.6 * len(DRAWN))
+    panels = figure.subplots(2 * len(DRAWN), len(DRAWN[0]), sharex=True)
+    for row, effects in enumerate(DRAWN):
+        for column, effect in enumerate(effects):
+            entry = entries[effect]
+            start = HiddenEffect(
+                effect, entry.components[0], entry.forms[0], entry.plausible, SHAPE_SEED
+            )
+            hidden, note = sized_or_largest(scale, start)
+            change = scale.signature(hidden)
+            shift, rotation = panels[2 * row : 2 * row + 2, column]
+            for axis, name in enumerate("xyz"):
+                shift.plot(scale.time_s, 1e6 * change[:, axis], linewidth=1.0, label=f"s_{name}")
+            phi = np.degrees(np.linalg.norm(change[:, 3:], axis=1)) * 1e3
+            rotation.plot(scale.time_s, phi, color="0.3", linewidth=1.0)
+            # From zero: a constant rotation would show its rounding else.
+            rotation.set_ylim(0.0, 1.1 * float(phi.max()) + 1e-3)
+            shift.set_title(
+                f"{effect} at {hidden.component}\n{amount(hidden.magnitude, entry.unit)} ({note})",
+                fontsize=9,
+            )
+    for axes in panels[0::2, 0]:
+        axes.set_ylabel("s [µm]")
+    for axes in panels[1::2, 0]:
+        axes.set_ylabel("phi [mdeg]")
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    panels[0, 0].legend(fontsize=8, ncols=3, loc="lower left")
     save_figure(figure, path)
 
 
 def main() -> None:
-    """Draw both pages."""
+    """Draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--table", help="default: the shipped one")
     parser.add_argument("--output", default="docs/pictures", help="folder of the pictures")
@@ -107,8 +102,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     settings = CellSettings(rate_hz=RATE_HZ, program_seconds=SECONDS, program_seed=1)
     scale = Scale(table, settings, SECONDS)
-    draw_page(scale, CATALOGUE, folder / "hidden_effects.png")
-    draw_page(scale, STRANGERS, folder / "hidden_effects_strangers.png")
+    draw(scale, folder / "hidden_effects.png")
 
 
 if __name__ == "__main__":
