@@ -9,7 +9,8 @@ the old and with the extended model.  HOW is
                   wrist is recorded and calibrated before the effect comes
 
 NAMEs (`backlash@motor_1:single`) choose some effects.  What FILE (JSON lines) has already is not
-done again, so a run that was stopped goes on.  Table and picture go to `docs/closed-loop.md`.
+done again, so a run that was stopped goes on.  Tables go to `bench-results/closed-loop.md`, the
+picture to `docs/pictures/closed-loop.png`.
 """
 
 from __future__ import annotations

@@ -11,8 +11,9 @@ from closed_loop_picture import draw
 
 from wrist_stiffness.atomic_file import replacing
 
-DOCS = Path(__file__).parents[1] / "docs"
-PAGE, PICTURE = DOCS / "closed-loop.md", DOCS / "pictures" / "closed-loop.png"
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "bench-results" / "closed-loop.md"
+PICTURE = ROOT / "docs" / "pictures" / "closed-loop.png"
 
 ENOUGH = 1.2
 """Times what a corrector leaves that knows the true laws."""
@@ -44,21 +45,18 @@ WRONG = (
 
 
 def write_page(exact: Sequence[str], wrong: Sequence[str], rows: Rows) -> None:
-    """Put the tables between their marks in the page, and draw the picture."""
-    text = PAGE.read_text(encoding="utf-8")
+    """Write the tables to `bench-results/`, and draw the picture of `docs/closed-loop.md`."""
     told = [name for name in exact if (name, "exact", "told") in rows]
     other = [name for name in wrong if (name, "wrong", "told") in rows]
-    for mark, header, lines in (
-        ("results", RESULTS, [result(name, rows) for name in told]),
-        ("calm", CALM, [calm(name, rows) for name in told]),
-        ("wrong base", WRONG, [on_wrong_base(name, rows) for name in other]),
-    ):
-        begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
-        before, _, rest = text.partition(begin)
-        _, found, after = rest.partition(end)
-        if not found:
-            raise SystemExit(f"{PAGE}: no marks {begin.strip()} and {end}")
-        text = before + begin + header + "".join(f"| {line} |\n" for line in lines) + end + after
+    text = "".join(
+        f"## {title}\n\n{header}" + "".join(f"| {line} |\n" for line in lines) + "\n"
+        for title, header, lines in (
+            ("Pointing error at rest [mdeg]", RESULTS, [result(name, rows) for name in told]),
+            ("What motors can cancel", CALM, [calm(name, rows) for name in told]),
+            ("The table deviates [mdeg]", WRONG, [on_wrong_base(name, rows) for name in other]),
+        )
+    )
+    PAGE.parent.mkdir(exist_ok=True)
     with replacing(PAGE) as written:
         written.write_text(text, encoding="utf-8")
     shown = [name for name in told if shows(name, rows)]
