@@ -15,6 +15,7 @@ from wrist_stiffness.model.formula import (
     FUNCTIONS,
     LONGEST,
     Formula,
+    Past,
     UndefinedFormulaError,
 )
 from wrist_stiffness.model.formula_law import FormulaLaw
@@ -115,6 +116,36 @@ def test_parameters_of_an_undefined_term_are_told_in_their_units():
     model = load_model(shipped_file("config/palmieri2015_model.yaml")).with_effects(effect)
     with pytest.raises(UndefinedFormulaError, match=r"fz = -?\S+, gap_um = 2(,|$)"):
         model.predict(np.zeros(2), Load(np.array([0, 0, -1.0, 0, 0, 0])))
+
+
+def test_a_lag_follows_a_step_and_a_ramp_as_the_differential_equation_says():
+    time = np.array([0.0, 0.5, 0.5, 1.0, 4.0, 9.0])
+    ramp = Formula("lag(fx, 2)", NAMES)({"fx": 3.0 * time}, Past(time))
+    assert ramp == pytest.approx(3.0 * (time - 2.0 * (1.0 - np.exp(-time / 2.0))), abs=1e-12)
+    held = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    step = Formula("lag(fx, 2)", NAMES)({"fx": held}, Past(time))
+    assert step[2:] == pytest.approx(1.0 - np.exp(-(time[2:] - 0.5) / 2.0), abs=1e-12)
+
+
+def test_play_loses_its_slack_at_every_reversal():
+    fx = np.array([0.0, 2.0, 1.5, 0.5, -2.0, 0.0])
+    followed = Formula("play(fx, 0.5)", NAMES)({"fx": fx}, Past(np.arange(6.0)))
+    assert followed == pytest.approx([0.0, 1.5, 1.5, 1.0, -1.5, -0.5])
+
+
+def test_what_remembers_is_the_same_sample_by_sample_and_needs_a_positive_size():
+    rng, made = np.random.default_rng(3), Formula("lag(play(fx, 0.3), 2) * theta_1", NAMES)
+    time = np.cumsum(rng.exponential(1.0, 50))
+    values = {"fx": np.cumsum(rng.normal(size=50)), "theta_1": rng.normal(size=50)}
+    whole = made(values, Past(time))
+    past, single = Past(time[:1]), []
+    for n in range(50):
+        past = Past(time[n : n + 1], past.states)
+        single.append(made({name: each[n : n + 1] for name, each in values.items()}, past)[0])
+    assert np.array_equal(whole, single)
+    assert made.remembers
+    assert not Formula("fx * k", NAMES).remembers
+    assert not np.isfinite(Formula("lag(fx, -1)", NAMES)({"fx": 1.0})).any()
 
 
 def test_undefined_values_are_not_finite_and_not_loud():

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -51,6 +52,73 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Value]]] = {
 }
 """Number of arguments and meaning of each function."""
 
+
+def _lag(x: list[float], tau: float, time: list[float], state: State) -> tuple[list[float], State]:
+    """Follow x late, with a time constant; exact where x is straight between the samples."""
+    before, last, now = state or (time[0], x[0], x[0])
+    found = []
+    for t, value in zip(time, x, strict=True):
+        if (step := t - before) > 0.0:
+            late = (value - last) / step * tau
+            now = value - late + (now - last + late) * math.exp(-step / tau)
+        before, last = t, value
+        found.append(now)
+    return found, (before, last, now)
+
+
+def _play(
+    x: list[float], slack: float, time: list[float], state: State
+) -> tuple[list[float], State]:
+    """Follow x as something that x pushes with play to both sides."""
+    (now,) = state or (x[0],)
+    found = []
+    for value in x:
+        now = min(max(now, value - slack), value + slack)
+        found.append(now)
+    return found, (now,)
+
+
+State = tuple[float, ...] | None
+Remembering = Callable[[list[float], float, list[float], State], tuple[list[float], State]]
+
+MEMORIES: dict[str, Remembering] = {"lag": _lag, "play": _play}
+"""Functions of a signal and a positive number that remember what was before: `lag(x, seconds)`, a
+first-order lag, and `play(x, slack)`.  They begin settled at the first sample."""
+
+
+@dataclass
+class Past:
+    """What a formula remembers while it is evaluated.
+
+    Parameters
+    ----------
+    time : (n,) float
+        Stamps [s].
+    states : dict of int to tuple of float
+        Of each remembering function by its column in the formula; empty before the first sample.
+    """
+
+    time: Array
+    states: dict[int, tuple[float, ...]] = field(default_factory=dict)
+
+    def follow(self, node: ast.Call, name: str, values: Sequence[Value]) -> Value:
+        """Return what a remembering function makes of its arguments."""
+        x = np.broadcast_to(np.asarray(values[0], dtype=float), self.time.shape)
+        size = np.asarray(values[1], dtype=float)
+        if size.ndim or not size > 0.0 or not np.isfinite(x).all():
+            return np.full(x.shape, np.nan)
+        at = node.col_offset
+        found, state = MEMORIES[name](
+            x.tolist(), float(size), self.time.tolist(), self.states.get(at)
+        )
+        if state is not None:
+            self.states[at] = state
+        return np.array(found)
+
+
+COUNTS = {**{name: count for name, (count, _) in FUNCTIONS.items()}, **dict.fromkeys(MEMORIES, 2)}
+"""Number of arguments of each function."""
+
 OPERATIONS: dict[type[ast.AST], Callable[..., Value]] = {
     ast.Add: np.add,
     ast.Sub: np.subtract,
@@ -77,7 +145,7 @@ def names_in(text: str) -> frozenset[str]:
         If it cannot be read, or is no formula whatever its names stand for.
     """
     used = {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
-    names = frozenset(used - FUNCTIONS.keys())
+    names = frozenset(used - COUNTS.keys())
     Formula(text, tuple(names))
     return names
 
@@ -102,7 +170,7 @@ class Formula:
     Parameters
     ----------
     text : str
-        Numbers, names, + - * / **, parentheses and `FUNCTIONS`.
+        Numbers, names, + - * / **, parentheses, `FUNCTIONS` and `MEMORIES`.
     variables : tuple of str
         Names that it may use.
 
@@ -124,13 +192,21 @@ class Formula:
         """Variables that the expression does use."""
         return names_in(self.text)
 
-    def __call__(self, values: Mapping[str, Value]) -> Array:
+    @cached_property
+    def remembers(self) -> bool:
+        """Whether its value depends on earlier samples."""
+        calls = (node.func for node in ast.walk(self._tree) if isinstance(node, ast.Call))
+        return any(isinstance(each, ast.Name) and each.id in MEMORIES for each in calls)
+
+    def __call__(self, values: Mapping[str, Value], past: Past | None = None) -> Array:
         """Return the value for variables of n samples.
 
         Parameters
         ----------
         values : dict of str to float or (n,) float
             At least the `names`.
+        past : Past, optional
+            Of a formula that remembers; brought up to the last sample.
 
         Returns
         -------
@@ -138,7 +214,7 @@ class Formula:
             Not finite where the formula is not defined.
         """
         with np.errstate(all="ignore"):
-            return np.asarray(_value(self._tree, values), dtype=float)
+            return np.asarray(_value(self._tree, values, past or Past(np.zeros(1))), dtype=float)
 
     def undefined(self, values: Mapping[str, float], per_si: Mapping[str, float] = NO_UNITS) -> str:
         """Return the term that makes the formula undefined for one sample, and its variables.
@@ -160,8 +236,8 @@ class Formula:
                 node
                 for node in ast.walk(self._tree)
                 if isinstance(node, ast.expr)
-                and not (isinstance(node, ast.Name) and node.id in FUNCTIONS)
-                and not np.isfinite(_value(node, values))
+                and not (isinstance(node, ast.Name) and node.id in COUNTS)
+                and not np.all(np.isfinite(_value(node, values, Past(np.zeros(1)))))
             ]
         # A walk goes from the whole to its parts.
         term = terms[-1]
@@ -199,11 +275,11 @@ class Formula:
         elif isinstance(node, ast.UnaryOp) and type(node.op) in OPERATIONS:
             self._check(node.operand, depth + 1)
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-            if node.func.id not in FUNCTIONS:
+            if node.func.id not in COUNTS:
                 raise self._refusal(
-                    node, f"unknown function {node.func.id}; known are {', '.join(FUNCTIONS)}"
+                    node, f"unknown function {node.func.id}; known are {', '.join(COUNTS)}"
                 )
-            count = FUNCTIONS[node.func.id][0]
+            count = COUNTS[node.func.id]
             if len(node.args) != count:
                 raise self._refusal(
                     node, f"{node.func.id} takes {count} values, not {len(node.args)}"
@@ -214,23 +290,26 @@ class Formula:
             raise self._refusal(
                 node,
                 "only numbers, names, + - * / **, parentheses and the functions "
-                f"{', '.join(FUNCTIONS)} are allowed",
+                f"{', '.join(COUNTS)} are allowed",
             )
 
     def _refusal(self, node: ast.expr, why: str) -> InputError:
         return InputError(f"formula {self.text!r}, column {node.col_offset + 1}: {why}")
 
 
-def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
+def _value(node: ast.expr, values: Mapping[str, Value], past: Past) -> Value:
     match node:
         case ast.Constant(value=number):
             return float(number)  # type: ignore[arg-type]
         case ast.Name(id=name):
             return values[name]
         case ast.BinOp(left=left, op=op, right=right):
-            return OPERATIONS[type(op)](_value(left, values), _value(right, values))
+            return OPERATIONS[type(op)](_value(left, values, past), _value(right, values, past))
         case ast.UnaryOp(op=op, operand=operand):
-            return OPERATIONS[type(op)](_value(operand, values))
+            return OPERATIONS[type(op)](_value(operand, values, past))
         case ast.Call(func=ast.Name(id=name), args=arguments):
-            return FUNCTIONS[name][1](*(_value(argument, values) for argument in arguments))
+            found = [_value(argument, values, past) for argument in arguments]
+            return (
+                past.follow(node, name, found) if name in MEMORIES else FUNCTIONS[name][1](*found)
+            )
     raise InputError(f"formula: {ast.dump(node)} was not checked")

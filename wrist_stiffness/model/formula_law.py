@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.formula import FUNCTIONS, Formula, UndefinedFormulaError
+from wrist_stiffness.model.formula import COUNTS, Formula, Past, UndefinedFormulaError
 from wrist_stiffness.model.law import Contribution, Law, require_id
 from wrist_stiffness.model.parameters import Parameter, si_factor
 from wrist_stiffness.model.places import LIMB
@@ -87,7 +87,7 @@ class FormulaLaw(Law):
         for own in (*self.covariates, *self._keys):
             if not own.isidentifier():
                 raise InputError(f"{name}: {own!r} is not a name")
-            if own in SIGNALS or own in FUNCTIONS or (*covariates, *keys).count(own) > 1:
+            if own in SIGNALS or own in COUNTS or (*covariates, *keys).count(own) > 1:
                 raise InputError(f"{name}: the name {own} is in use")
         self.formula = Formula(expression, (*sorted(SIGNALS), *self.covariates, *self._keys))
         self.signals = tuple(
@@ -110,7 +110,8 @@ class FormulaLaw(Law):
     ) -> tuple[Contribution, Any]:
         """Return the screw."""
         variables = {name: self._signal(at, place, name, values) for name in self.formula.names}
-        size = np.broadcast_to(self.formula(variables), len(at.block))
+        past = Past(at.block.time, dict(state or {}))
+        size = np.broadcast_to(self.formula(variables, past), len(at.block))
         if not np.isfinite(size).all():
             row = int(np.argmin(np.isfinite(size)))
             there = {
@@ -119,7 +120,7 @@ class FormulaLaw(Law):
             per_si = {key: 1.0 / si_factor(key) for key in self._keys}
             told = f"{self.id}: {self.formula.undefined(there, per_si)}"
             raise UndefinedFormulaError(told, float(at.block.time[row]))
-        return at.screw(place, np.outer(size, self.direction)), None
+        return at.screw(place, np.outer(size, self.direction)), past.states or None
 
     def _signal(
         self, at: Situation, place: str, name: str, values: Mapping[str, float]
