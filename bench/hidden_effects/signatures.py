@@ -87,7 +87,10 @@ def draw(scale: Scale, path: Path) -> None:
         axes.set_ylabel("phi [mdeg]")
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
-    panels[0, 0].legend(fontsize=8, ncols=3, loc="lower left")
+    lines = panels[0, 0].get_lines()
+    figure.legend(
+        lines, [str(each.get_label()) for each in lines], ncols=3, loc="outside upper left"
+    )
     save_figure(figure, path)
 
 
