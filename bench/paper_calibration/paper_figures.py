@@ -2,7 +2,7 @@
 
 Palmieri, "On the positioning error of a 2-DOF spherical parallel wrist with flexible links and
 joints - an FEM approach", Mech. Sci. 6, 9-16, 2015: Tables 1 and 2 and the text's two maxima.
-Everything here is in the paper's units: micrometres and hundredths of a degree.
+Everything here is in micrometres and millidegrees; the paper prints hundredths of a degree.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
 
 COLUMNS = ("s_x", "s_y", "s_z", "s", "phi")
-UNITS = ("µm", "µm", "µm", "µm", "10⁻² °")
-TO_PAPER_UNITS = np.array([1e6, 1e6, 1e6, 1e6, 100.0 * 180.0 / np.pi])
+UNITS = ("µm", "µm", "µm", "µm", "mdeg")
+TO_UNITS = np.array([1e6, 1e6, 1e6, 1e6, 1e3 * 180.0 / np.pi])
 """From `lookup.table.MAP_COLUMNS` in SI units."""
 
 PAPER_GRID = 5
@@ -59,12 +59,12 @@ class Figures:
 PUBLISHED = Figures(
     operative=np.array(
         [
-            [1.17, 0.53, -8.39, 8.73, 1.29],
-            [-2.06, -2.12, -13.51, 5.50, 0.64],
-            [5.12, 5.63, -5.11, 14.78, 3.61],
+            [1.17, 0.53, -8.39, 8.73, 12.9],
+            [-2.06, -2.12, -13.51, 5.50, 6.4],
+            [5.12, 5.63, -5.11, 14.78, 36.1],
         ]
     ),
-    map_maximum=np.array([70.0, 5.5]),
+    map_maximum=np.array([70.0, 55.0]),
 )
 
 
@@ -92,7 +92,7 @@ class PaperExperiment:
         """Solve the wrist at poses (n, 2) [rad]: `COLUMNS` in the paper's units, (n, 5)."""
         configuration = mechanism_of(self.geometry).forward(theta)
         operators = contact_operators(configuration, self.components, np.zeros(3))
-        return rated_map(configuration, operators, self.geometry) * TO_PAPER_UNITS
+        return rated_map(configuration, operators, self.geometry) * TO_UNITS
 
     def nodes(self) -> Array:
         """Return the poses of the paper's grid, (25, 2) [rad]."""

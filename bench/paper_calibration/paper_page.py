@@ -118,7 +118,15 @@ def grid_error_block(found: PaperExperiment) -> str:
         values = 100.0 * np.concatenate([mean, *largest])
         rows.append([f"{per_axis} × {per_axis}", *(f"{value:.2g} %" for value in values)])
     return _table(
-        ["grid", "s mean", "φ mean", "s max", "φ max", "s max, whole map", "φ max, whole map"],
+        [
+            "grid",
+            "s mean",
+            "phi mean",
+            "s max",
+            "phi max",
+            "s max, whole map",
+            "phi max, whole map",
+        ],
         rows,
     )
 
@@ -141,27 +149,7 @@ def misfit(figures: Figures) -> float:
     return float(np.sqrt(np.mean(difference[free] ** 2)))
 
 
-def predictions_block(predicted: Mapping[str, Mapping[str, tuple[float, float]]]) -> str:
-    """Mean s and phi under loads that the paper did not apply, by wrist."""
-    loads = list(next(iter(predicted.values())))
-    rows = [
-        [
-            load,
-            *(f"{s:.2f} / {phi:.2f}" for s, phi in (found[load] for found in predicted.values())),
-        ]
-        for load in loads
-    ]
-    return _table(["mean s [µm] / φ [10⁻² °]", *predicted], rows)
-
-
-def budget_block(budgets: Mapping[str, Mapping[str, float]]) -> str:
-    """Share of each component in the strain energy, by wrist."""
-    parts = list(next(iter(budgets.values())))
-    rows = [[part, *(f"{100 * found[part]:.1f} %" for found in budgets.values())] for part in parts]
-    return _table(["component", *budgets], rows)
-
-
-MEANS_AND_MAXIMA = ("mean s", "mean φ", "mean s_z", "map max s", "map max φ")
+MEANS_AND_MAXIMA = ("mean s", "mean phi", "mean s_z", "map max s", "map max phi")
 
 
 def _means_and_maxima(figures: Figures) -> list[str]:
@@ -237,8 +225,6 @@ def write_page(folder: Path) -> None:
             "load point": load_point_block(shipped),
             "grid error": grid_error_block(shipped),
             "variants": variants_block(experiments),
-            "predictions": predictions_block(predicted),
-            "budget": budget_block(budgets),
         },
     )
     drawn = folder / "pictures"

@@ -14,9 +14,14 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 S, PHI = 3, 4
-NAMES = {S: "shift s", PHI: "turn φ"}
-INSIDE_LEVELS = {S: (6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 50.0), PHI: (0.5, 1, 1.5, 2, 3, 4, 5)}
+NAMES = {S: "shift s", PHI: "rotation phi"}
+INSIDE_LEVELS = {
+    S: (6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 50.0),
+    PHI: (5, 10, 15, 20, 30, 40, 50),
+}
 """Lines of equal error: the colours alone, fixed by the border, would hide the inside."""
+
+BANDS = {S: np.arange(0.0, 80.0, 5.0), PHI: np.arange(0.0, 65.0, 5.0)}
 
 
 def draw_paper_map(experiment: PaperExperiment, column: int, path: Path) -> None:
@@ -34,15 +39,14 @@ def draw_paper_map(experiment: PaperExperiment, column: int, path: Path) -> None
     axes, poses = _grid(experiment)
     spline, solved = experiment.paper_spline()(poses), _solved(experiment, poses)
     figure = new_figure(10.4, 5.0)
-    largest = max(PUBLISHED.map_maximum[column - 3], np.nanmax(spline[..., column]))
     for plot, values, title in zip(
         figure.subplots(1, 2, sharey=True),
         (spline, solved),
         ("biharmonic spline through 25 poses (the paper's way)", "the wrist solved at every pose"),
         strict=True,
     ):
-        filled = plot.pcolormesh(
-            *axes, values[..., column].T, vmin=0.0, vmax=largest, cmap="jet", shading="gouraud"
+        filled = plot.contourf(
+            *axes, values[..., column].T, levels=BANDS[column], cmap="viridis", extend="max"
         )
         lines = plot.contour(
             *axes,
@@ -163,7 +167,7 @@ def draw_variants(
         )
     for plot, labels, title in (
         (shifts, loads, f"mean s / that of {wrists[0]}"),
-        (turns, loads, f"mean φ / that of {wrists[0]}"),
+        (turns, loads, f"mean phi / that of {wrists[0]}"),
         (shares, parts, "share of strain energy [%]"),
     ):
         plot.set_yticks(np.arange(len(labels)) + height, labels, fontsize=8)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from paper_figures import TO_PAPER_UNITS, PaperExperiment
+from paper_figures import TO_UNITS, PaperExperiment
 
 from wrist_stiffness.lookup.rated_load import rated_wrench
 from wrist_stiffness.lookup.response import respond
@@ -38,7 +38,7 @@ def predictions(experiment: PaperExperiment) -> dict[str, tuple[float, float]]:
     Returns
     -------
     dict of str to (float, float)
-        Mean s [um] and phi [1e-2 deg] in the operative workspace, by load.
+        Mean s [um] and phi [mdeg] in the operative workspace, by load.
     """
     configuration = _operative(experiment)
     geometry, components = experiment.geometry, experiment.components
@@ -89,4 +89,4 @@ def _operative(experiment: PaperExperiment) -> Configuration:
 
 def _mean(twist: Array) -> tuple[float, float]:
     shift, turn = (np.linalg.norm(twist[:, half], axis=1) for half in (slice(3), slice(3, 6)))
-    return float(shift.mean() * TO_PAPER_UNITS[3]), float(turn.mean() * TO_PAPER_UNITS[4])
+    return float(shift.mean() * TO_UNITS[3]), float(turn.mean() * TO_UNITS[4])

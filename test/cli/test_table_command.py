@@ -153,8 +153,8 @@ def test_statistics_are_those_of_the_closed_form(tmp_path, monkeypatch, capsys):
     exact = rated_map(configuration, operators, table.geometry)
     for name, values in (("s_um", 1e6 * exact[:, 3]), ("s_z_um", 1e6 * exact[:, 2])):
         assert told["operative"][name]["mean"] == pytest.approx(values.mean(), rel=0.01)
-    phi = 100.0 * np.degrees(exact[:, 4])
-    assert told["operative"]["phi_1e-2deg"]["max"] == pytest.approx(phi.max(), rel=0.05)
+    phi = 1e3 * np.degrees(exact[:, 4])
+    assert told["operative"]["phi_mdeg"]["max"] == pytest.approx(phi.max(), rel=0.05)
     assert told["domain_max"]["s_um"] >= told["operative"]["s_um"]["max"]
     shown = capsys.readouterr().out
     assert f"mean {told['operative']['s_um']['mean']:7.2f}" in shown

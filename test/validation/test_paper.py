@@ -11,7 +11,7 @@ import pytest
 from paper_figures import (
     COLUMNS,
     PUBLISHED,
-    TO_PAPER_UNITS,
+    TO_UNITS,
     Figures,
     PaperExperiment,
 )
@@ -93,7 +93,7 @@ def test_readout_of_the_map_is_the_platforms_twist(shipped):
         pushed = nonnegative_contact_forces(operators.approach[i], gap)
         twist = free + operators.force_twist[i] @ pushed
         assert values[:3] == pytest.approx(1e6 * twist[:3], abs=SECOND_ORDER_UM)
-        assert values[4] == pytest.approx(np.linalg.norm(twist[3:]) * TO_PAPER_UNITS[4], rel=1e-6)
+        assert values[4] == pytest.approx(np.linalg.norm(twist[3:]) * TO_UNITS[4], rel=1e-6)
 
 
 def nonnegative_contact_forces(approach, gap):

@@ -196,7 +196,7 @@ def _show(arguments: argparse.Namespace) -> int:
         )
     print(
         f"whole map: s up to {summary.domain_max['s_um']:.3g} um, "
-        f"phi up to {summary.domain_max['phi_1e-2deg']:.3g} 1e-2 deg"
+        f"phi up to {summary.domain_max['phi_mdeg']:.3g} mdeg"
     )
     for picture in pictures:
         print(f"written: {picture}")

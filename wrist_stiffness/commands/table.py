@@ -26,7 +26,7 @@ MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
 """The corners alone carry no plane to be judged inside; the splines' matrices grow with n^4."""
 
 MICRO = 1e6
-CENTIDEGREES = 100.0 * 180.0 / np.pi
+MDEG = 1e3 * 180.0 / np.pi
 
 
 def build(
@@ -129,13 +129,13 @@ def summarise(table: Table) -> MapSummary:
     Returns
     -------
     MapSummary
-        In micrometres and hundredths of a degree.
+        In micrometres and millidegrees.
     """
     workspace = table.workspace
     poses = workspace.grid(101)
-    values = table.map_spline(poses) * np.array([MICRO] * 4 + [CENTIDEGREES])
+    values = table.map_spline(poses) * np.array([MICRO] * 4 + [MDEG])
     inside = values[workspace.operative(poses)]
-    names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_1e-2deg"]
+    names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_mdeg"]
     operative = {
         name: {
             "mean": float(column.mean()),
@@ -193,10 +193,10 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
         halves = found.twist.reshape(-1, 2, 3)
         values[inside] = np.linalg.norm(halves, axis=-1)
     pictures = [folder / name for name in ("map_s.png", "map_phi.png", "budget.png", "bent.png")]
-    s, phi = MICRO * values[..., 0], CENTIDEGREES * values[..., 1]
-    label = "displacement error s of the platform's centre [µm]"
+    s, phi = MICRO * values[..., 0], MDEG * values[..., 1]
+    label = "shift s of the platform at O [µm]"
     draw_map(table, poses, s, label, load.text, pictures[0])
-    label = "orientation error φ of the platform [10⁻² deg]"
+    label = "rotation phi of the platform [mdeg]"
     draw_map(table, poses, phi, label, load.text, pictures[1])
     draw_budget(table, found, load.text, pictures[2])
     draw_bent_wrist(table, PICTURED_POSE, load, pictures[3])

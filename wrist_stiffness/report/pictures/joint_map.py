@@ -10,6 +10,9 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
+BANDS = 12
+"""At most so many colours; ends of the colour bar stand for what lies beyond."""
+
 
 def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, path: Path) -> None:
     """Draw one quantity over the joint space, with the operative workspace bordered.
@@ -27,20 +30,18 @@ def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, p
     path : Path
         PNG to write.
     """
-    from matplotlib.colors import BoundaryNorm
+    from matplotlib.ticker import MaxNLocator
 
     workspace = table.workspace
     operative = values[workspace.operative(poses)]
     figure = new_figure(7.0, 5.6)
     plot = figure.subplots()
     theta_1, theta_2 = np.degrees(poses[:, 0, 0]), np.degrees(poses[0, :, 1])
-    # Equal counts per colour: the border's steep maximum would hide the operative workspace else.
-    levels = np.unique(np.nanquantile(values, np.linspace(0.0, 1.0, 25)))
-    filled = plot.contourf(
-        theta_1, theta_2, values.T, levels=levels, norm=BoundaryNorm(levels, 256), cmap="viridis"
-    )
+    # Even bands over the operative workspace: the steep border would take all colours else.
+    levels = MaxNLocator(BANDS).tick_values(operative.min(), operative.max())
+    filled = plot.contourf(theta_1, theta_2, values.T, levels=levels, cmap="viridis", extend="both")
     lines = plot.contour(
-        theta_1, theta_2, values.T, levels=levels[::3], colors="white", linewidths=0.5
+        theta_1, theta_2, values.T, levels=levels[::2], colors="white", linewidths=0.5
     )
     plot.clabel(lines, fontsize=7, fmt="%.3g")
     border = np.degrees(workspace.operative_border)
