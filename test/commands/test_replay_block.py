@@ -15,7 +15,6 @@ from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
@@ -146,8 +145,8 @@ def wanted(path, settings):
             sent["/pose_error/s_um"].append(vector_payload(stamp_ns, s_um))
             sent["/pose_error/phi_mdeg"].append(vector_payload(stamp_ns, mdeg))
             if pace.takes(stamp_ns, 10.0):
-                drawn = drawing.message(stamp_ns, found.configuration, found.twist)
-                sent["/wrist_markers"].append(encode(drawn))
+                one = np.array([stamp_ns]), found.configuration.as_block, found.twist[None]
+                sent["/wrist_markers"] += drawing.payloads(*one)
         except WristError:
             refused += 1
         names, first = ("other", *MOTORS), np.nan if i == EMPTY else 0.5

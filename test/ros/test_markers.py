@@ -8,6 +8,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from wrist_stiffness.commands.wrist_drawing import WristDrawing
 from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.recording.cdr import decode
+from wrist_stiffness.recording.messages import MarkerArray as Drawn
 from wrist_stiffness.ros.body_transforms import body_transforms
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 from wrist_stiffness.ros.qos import STATE_QOS
@@ -24,8 +26,9 @@ def place(point):
 def drawn(model):
     prediction = model.predict(np.array([0.4, -0.3]), DOWN)
     drawing = WristDrawing(model.table.geometry, 500.0)
-    message = drawing.message(SECOND, prediction.configuration, prediction.twist)
-    return prediction, {marker.ns: marker for marker in message.markers}
+    one = np.array([SECOND]), prediction.configuration.as_block, prediction.twist[None]
+    (payload,) = drawing.payloads(*one)
+    return prediction, {marker.ns: marker for marker in decode(Drawn, payload).markers}
 
 
 def test_links_run_from_joint_to_joint(drawn, model):

@@ -22,12 +22,14 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording.cdr import decode
+from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.messages import (
     Float64,
     Float64MultiArray,
     Header,
     JointState,
     JointTrajectory,
+    MarkerArray,
     Message,
     Point,
     Pose,
@@ -165,8 +167,12 @@ def replay(
                 ahead.read_for(raw.log_time_ns)
                 try:
                     answers = _answers(standard, raw, predicting, correcting, drawings, summary)
-                    for name, message in answers:
-                        writer.write(name, message, raw.log_time_ns)
+                    for name, answer in answers:
+                        if isinstance(answer, bytes):
+                            drawn = channel_of(name, MarkerArray)
+                            writer.write_raw(drawn, answer, raw.log_time_ns)
+                        else:
+                            writer.write(name, answer, raw.log_time_ns)
                 except WristError as error:
                     summary.refuse(raw.channel.topic, error)
         if not summary.predictions:
@@ -187,7 +193,7 @@ def _answers(
     correcting: CorrectionStream,
     drawings: Drawings,
     summary: ReplaySummary,
-) -> Iterator[tuple[str, Message]]:
+) -> Iterator[tuple[str, Message | bytes]]:
     if standard == MOTOR_TRAJECTORY:
         plan = decode(JointTrajectory, raw.payload)
         return _plan(plan, raw.log_time_ns, correcting, summary)
@@ -232,7 +238,7 @@ def _predict(
     predicting: PredictionStream,
     drawings: Drawings,
     summary: ReplaySummary,
-) -> Iterator[tuple[str, Message]]:
+) -> Iterator[tuple[str, Message | bytes]]:
     summary.joint_states += 1
     sample = predicting.on_joint_state(
         state.header.stamp_ns, state.name, state.position, state.velocity
@@ -249,8 +255,8 @@ def _predict(
         (POSE_ERROR_PHI_MDEG, MILLIDEGREES * prediction.twist[3:]),
     ):
         yield topic, Vector3Stamped(header, Vector3(*vector.tolist()))
-    if drawings.take(state.header.stamp_ns):
-        drawn = drawings.message(state.header.stamp_ns, prediction.configuration, prediction.twist)
+    one = np.array([state.header.stamp_ns]), prediction.configuration.as_block
+    for drawn in drawings.of(*one, prediction.twist[None])[1]:
         yield WRIST_MARKERS, drawn
 
 

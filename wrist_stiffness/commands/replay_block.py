@@ -23,7 +23,6 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.recording.batch import Batch, decode_batches
-from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.chunk_writer import Messages
 from wrist_stiffness.recording.fixed_layout import FixedLayout
@@ -224,18 +223,9 @@ class BlockReplay:
     def _draw(
         self, joints: _Joints, predicted: PredictedBlock, known: Integers, out: Messages
     ) -> None:
-        drawings, stamps = self._drawings, joints.stamps.tolist()
-        drawn = [place for place in known.tolist() if drawings.take(stamps[place])]
-        payloads = [
-            encode(
-                drawings.message(
-                    stamps[place],
-                    Configuration.of_row(predicted.configuration[place]),
-                    predicted.twist[place],
-                )
-            )
-            for place in drawn
-        ]
+        at = Configuration.of_row(predicted.configuration[known])
+        places, payloads = self._drawings.of(joints.stamps[known], at, predicted.twist[known])
+        drawn = known[places]
         rows, times = joints.rows[drawn], joints.time_ns[drawn]
         self._add(out, WRIST_MARKERS, MarkerArray, 4, rows, times, payloads)
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
@@ -12,6 +15,8 @@ from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import triad
+from wrist_stiffness.recording.batch import Layout, layout_of
+from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.messages import (
     ColorRGBA,
     Header,
@@ -20,7 +25,6 @@ from wrist_stiffness.recording.messages import (
     MarkerShape,
     Point,
     Pose,
-    Quaternion,
     Vector3,
 )
 from wrist_stiffness.topics import BASE_FRAME
@@ -50,6 +54,17 @@ class Pace:
         self._drawn_ns = stamp_ns
         return True
 
+    def places(self, stamps: NDArray[np.int64], rate_hz: float) -> list[int]:
+        """Return which samples of stamps (n,) that do not fall are drawn."""
+        found, place = [], 0
+        while place < len(stamps) and rate_hz:
+            if self.takes(int(stamps[place]), rate_hz):
+                found.append(place)
+            # What lies between is surely not drawn.
+            soon = self._drawn_ns + int(NANOSECONDS / rate_hz)
+            place = max(place + 1, int(np.searchsorted(stamps, soon)))
+        return found
+
 
 class WristDrawing:
     """Draws one wrist.
@@ -73,82 +88,117 @@ class WristDrawing:
         across = np.eye(3)[np.argmin(np.abs(plate.normal))]
         # A cylinder stands along its own z.
         self._upright = np.roll(triad(plate.normal, across), -1, axis=1)
+        self._templates: dict[int, tuple[bytes, Layout]] = {}
 
-    def message(self, stamp_ns: int, configuration: Configuration, twist: Array) -> MarkerArray:
-        """Return links, rigid platform, actual platform and the shift of O.
+    def payloads(
+        self, stamps: NDArray[np.int64], configuration: Configuration, twist: Array
+    ) -> list[bytes]:
+        """Return links, rigid platform, actual platform and the shift of O, drawn n times.
 
         Parameters
         ----------
-        stamp_ns : int
-            Of the joint state [ns].
+        stamps : (n,) int
+            Of the joint states [ns].
         configuration : Configuration
-            The rigid wrist.
-        twist : (6,) float
+            The rigid wrist, n times.
+        twist : (n, 6) float
             The pose error at O in F [m, rad].
 
         Returns
         -------
-        MarkerArray
-            In `wrist_base`; the text says the factor.
+        list of bytes
+            visualization_msgs/MarkerArray; the text says the factor.
         """
-        header = Header(stamp_ns, self._frame_id)
-        factor, rigid = self._exaggeration, configuration.platform
+        factor, n = self._exaggeration, len(stamps)
         rotation, shift = exp_twist(factor * twist)
-        turned = np.stack([rigid, rotation @ rigid])
-        turns = Rotation.from_matrix(turned @ self._upright).as_quat().tolist()
-        centres = turned @ self._geometry.platform.centre + [np.zeros(3), shift]
-        markers = [self._link(header, configuration, link) for link in LINKS]
-        s_um = 1e6 * float(np.linalg.norm(exp_twist(twist)[1]))
-        mdeg = 1e3 * float(np.degrees(np.linalg.norm(twist[3:])))
-        height = 1.5 * max(link.arc_radius for link in self._geometry.links.values())
-        return MarkerArray(
-            (
-                *markers,
-                self._platform(header, centres[0], turns[0], "platform rigid", RIGID),
-                self._platform(header, centres[1], turns[1], "platform", ACTUAL),
-                Marker(
-                    header,
-                    "shift of O",
-                    type=MarkerShape.ARROW,
-                    color=ARROW,
-                    scale=Vector3(0.0015, 0.003, 0.0),
-                    points=(Point(), Point(*shift.tolist())),
-                ),
-                Marker(
-                    header,
-                    "legend",
-                    type=MarkerShape.TEXT_VIEW_FACING,
-                    color=ARROW,
-                    pose=Pose(Point(0.0, 0.0, height)),
-                    scale=Vector3(0.0, 0.0, 0.005),
-                    text=f"s = {s_um:.2f} um, phi = {mdeg:.2f} mdeg, drawn x {factor:g}",
-                ),
+        rigid, bodies = configuration.platform, configuration.bodies
+        arcs = [self._arcs[link] @ bodies[:, BODIES.index(link)].swapaxes(1, 2) for link in LINKS]
+        numbers = {f"{i}.points.0.x": arc.reshape(n, -1) for i, arc in enumerate(arcs)}
+        for i, turned, moved in ((3, rigid, 0.0 * shift), (4, rotation @ rigid, shift)):
+            numbers[f"{i}.pose.position.x"] = turned @ self._geometry.platform.centre + moved
+            turn = Rotation.from_matrix(turned @ self._upright)
+            numbers[f"{i}.pose.orientation.x"] = turn.as_quat()
+        numbers["5.points.1.x"] = shift
+        s_um = 1e6 * np.linalg.norm(exp_twist(twist)[1], axis=1)
+        mdeg = 1e3 * np.degrees(np.linalg.norm(twist[:, 3:], axis=1))
+        texts = [
+            f"s = {s:.2f} um, phi = {phi:.2f} mdeg, drawn x {factor:g}"
+            for s, phi in zip(s_um.tolist(), mdeg.tolist(), strict=True)
+        ]
+        found = [b""] * n
+        lengths = np.array([len(text) for text in texts])
+        for length in np.unique(lengths).tolist():
+            places = np.flatnonzero(lengths == length)
+            template, layout = self._template(length)
+            rows = np.tile(np.frombuffer(template, np.uint8), (len(places), 1))
+            for leaf in layout.leaves:
+                column = numbers.get(leaf.path.removeprefix("markers."))
+                if leaf.path.endswith(".stamp_ns"):
+                    layout.write(rows, leaf, stamps[places])
+                elif column is not None:
+                    layout.write(rows, leaf, column[places])
+            for place, row in zip(places.tolist(), rows, strict=True):
+                found[place] = row.tobytes().replace(length * b"#", texts[place].encode())
+        return found
+
+    def _template(self, length: int) -> tuple[bytes, Layout]:
+        """Return what stays in pictures with a legend of this length, and where their numbers are.
+
+        The numbers of points, and of a pose's place and turn, follow one another.
+        """
+        if length not in self._templates:
+            payload = encode(MarkerArray(self._markers(length * "#")))
+            self._templates[length] = payload, layout_of(MarkerArray, payload)
+        return self._templates[length]
+
+    def _markers(self, text: str) -> tuple[Marker, ...]:
+        header, geometry, plate = Header(0, self._frame_id), self._geometry, self._geometry.platform
+        links = [
+            Marker(
+                header,
+                link,
+                type=MarkerShape.LINE_STRIP,
+                color=STEEL,
+                scale=Vector3(geometry.links[link].section_radial, 0.0, 0.0),
+                points=(Point(),) * ARC_POINTS,
             )
+            for link in LINKS
+        ]
+        platforms = [
+            Marker(
+                header,
+                name,
+                type=MarkerShape.CYLINDER,
+                color=color,
+                scale=Vector3(plate.diameter, plate.diameter, plate.thickness),
+            )
+            for name, color in (("platform rigid", RIGID), ("platform", ACTUAL))
+        ]
+        height = 1.5 * max(link.arc_radius for link in geometry.links.values())
+        return (
+            *links,
+            *platforms,
+            Marker(
+                header,
+                "shift of O",
+                type=MarkerShape.ARROW,
+                color=ARROW,
+                scale=Vector3(0.0015, 0.003, 0.0),
+                points=(Point(), Point()),
+            ),
+            Marker(
+                header,
+                "legend",
+                type=MarkerShape.TEXT_VIEW_FACING,
+                color=ARROW,
+                pose=Pose(Point(0.0, 0.0, height)),
+                scale=Vector3(0.0, 0.0, 0.005),
+                text=text,
+            ),
         )
 
-    def _link(self, header: Header, configuration: Configuration, link: str) -> Marker:
-        points = self._arcs[link] @ configuration.bodies[BODIES.index(link)].T
-        return Marker(
-            header,
-            link,
-            type=MarkerShape.LINE_STRIP,
-            color=STEEL,
-            scale=Vector3(self._geometry.links[link].section_radial, 0.0, 0.0),
-            points=tuple(Point(*each) for each in points.tolist()),
-        )
 
-    def _platform(
-        self, header: Header, centre: Array, turn: list[float], name: str, color: ColorRGBA
-    ) -> Marker:
-        plate = self._geometry.platform
-        return Marker(
-            header,
-            name,
-            type=MarkerShape.CYLINDER,
-            color=color,
-            pose=Pose(Point(*centre.tolist()), Quaternion(*turn)),
-            scale=Vector3(plate.diameter, plate.diameter, plate.thickness),
-        )
+drawing_of = lru_cache(maxsize=2)(WristDrawing)
 
 
 class Drawings:
@@ -165,11 +215,15 @@ class Drawings:
     def __init__(self, geometry: Geometry, settings: StreamSettings) -> None:
         self._pace, self._rate_hz = Pace(), settings.marker_rate_hz
         frame_id = settings.frames.prefix + BASE_FRAME
-        self.message = WristDrawing(geometry, settings.marker_exaggeration, frame_id).message
+        self._drawing = WristDrawing(geometry, settings.marker_exaggeration, frame_id)
 
-    def take(self, stamp_ns: int) -> bool:
-        """Tell whether the sample of a stamp is drawn."""
-        return self._pace.takes(stamp_ns, self._rate_hz)
+    def of(
+        self, stamps: NDArray[np.int64], configuration: Configuration, twist: Array
+    ) -> tuple[list[int], list[bytes]]:
+        """Return which of n samples are drawn, and the drawings (see `WristDrawing.payloads`)."""
+        drawn = self._pace.places(stamps, self._rate_hz)
+        at = Configuration.of_row(configuration.row[drawn])
+        return drawn, self._drawing.payloads(stamps[drawn], at, twist[drawn]) if drawn else []
 
 
 def _arc(geometry: Geometry, link: str) -> Array:

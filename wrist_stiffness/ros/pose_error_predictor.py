@@ -13,14 +13,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from wrist_stiffness.commands.wrist_drawing import Pace, WristDrawing
+from wrist_stiffness.commands.wrist_drawing import Pace, drawing_of
 from wrist_stiffness.compensation.parameters import PREDICTION, prediction_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.urdf import urdf
 from wrist_stiffness.model.error_model import Prediction
-from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.ros import static_transforms
 from wrist_stiffness.ros.body_transforms import body_transforms
 from wrist_stiffness.ros.load_wait import LoadWait
@@ -138,11 +137,11 @@ class PoseErrorPredictor(WristNode):
             self._transforms.publish(self._transforms_type(transforms=poses))
         if not self._markers.get_subscription_count():
             return
-        exaggeration = self.get_parameter("marker_exaggeration").value
         geometry = self.stream.running_model().model.table.geometry
-        drawing = WristDrawing(geometry, exaggeration, self.base_frame)
-        markers = drawing.message(stamp_ns, prediction.configuration, prediction.twist)
-        self._markers.publish(encode(markers))
+        exaggeration = self.get_parameter("marker_exaggeration").value
+        drawing = drawing_of(geometry, exaggeration, self.base_frame)
+        at, twist = prediction.configuration.as_block, prediction.twist[None]
+        self._markers.publish(*drawing.payloads(np.array([stamp_ns]), at, twist))
 
 
 def main() -> NoReturn:
