@@ -15,7 +15,7 @@ from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import triad
-from wrist_stiffness.recording.batch import Layout, layout_of
+from wrist_stiffness.recording.batch import Layout, Leaf, layout_of
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.messages import (
     ColorRGBA,
@@ -35,6 +35,7 @@ ACTUAL = ColorRGBA(0.95, 0.5, 0.1, 0.8)
 ARROW = ColorRGBA(0.8, 0.1, 0.1, 1.0)
 
 ARC_POINTS = 25
+STAMPS = "header.stamp_ns"
 
 
 class Pace:
@@ -88,7 +89,7 @@ class WristDrawing:
         across = np.eye(3)[np.argmin(np.abs(plate.normal))]
         # A cylinder stands along its own z.
         self._upright = np.roll(triad(plate.normal, across), -1, axis=1)
-        self._templates: dict[int, tuple[bytes, Layout]] = {}
+        self._templates: dict[int, tuple[bytes, Layout, dict[str, list[Leaf]]]] = {}
 
     def payloads(
         self, stamps: NDArray[np.int64], configuration: Configuration, twist: Array
@@ -129,26 +130,27 @@ class WristDrawing:
         lengths = np.array([len(text) for text in texts])
         for length in np.unique(lengths).tolist():
             places = np.flatnonzero(lengths == length)
-            template, layout = self._template(length)
+            template, layout, leaves = self._template(length)
             rows = np.tile(np.frombuffer(template, np.uint8), (len(places), 1))
-            for leaf in layout.leaves:
-                column = numbers.get(leaf.path.removeprefix("markers."))
-                if leaf.path.endswith(".stamp_ns"):
-                    layout.write(rows, leaf, stamps[places])
-                elif column is not None:
-                    layout.write(rows, leaf, column[places])
+            for leaf in leaves[STAMPS]:
+                layout.write(rows, leaf, stamps[places])
+            for path, column in numbers.items():
+                layout.write(rows, leaves[path][0], column[places])
             for place, row in zip(places.tolist(), rows, strict=True):
                 found[place] = row.tobytes().replace(length * b"#", texts[place].encode())
         return found
 
-    def _template(self, length: int) -> tuple[bytes, Layout]:
+    def _template(self, length: int) -> tuple[bytes, Layout, dict[str, list[Leaf]]]:
         """Return what stays in pictures with a legend of this length, and where their numbers are.
 
         The numbers of points, and of a pose's place and turn, follow one another.
         """
         if length not in self._templates:
             payload = encode(MarkerArray(self._markers(length * "#")))
-            self._templates[length] = payload, layout_of(MarkerArray, payload)
+            layout = layout_of(MarkerArray, payload)
+            leaves = {leaf.path.removeprefix("markers."): [leaf] for leaf in layout.leaves}
+            leaves[STAMPS] = [leaf for leaf in layout.leaves if leaf.path.endswith(STAMPS)]
+            self._templates[length] = payload, layout, leaves
         return self._templates[length]
 
     def _markers(self, text: str) -> tuple[Marker, ...]:

@@ -124,17 +124,19 @@ class RawBlock:
     @classmethod
     def of_contents(cls, contents: Contents, channels: dict[int, Channel]) -> RawBlock:
         """Return the messages of a chunk that have a channel, by log time."""
-        numbers = np.sort(np.array(list(channels), dtype=np.int64))
-        heads, begins = contents.heads, contents.begins
-        known = np.isin(heads["channel"], numbers)
-        order = np.flatnonzero(known)
-        order = order[np.argsort(heads["log_time"][known], kind="stable")]
-        heads = heads[order]
-        return cls(
+        places = np.full(1 << 16, -1)
+        places[list(channels)] = np.arange(len(channels))
+        heads = contents.heads
+        block = cls(
             contents.buffer,
-            tuple(channels[number] for number in numbers.tolist()),
-            np.searchsorted(numbers, heads["channel"].astype(np.int64)),
+            tuple(channels.values()),
+            places[heads["channel"]],
             heads["log_time"].astype(np.int64),
-            begins[order] + MESSAGE.itemsize,
+            contents.begins + MESSAGE.itemsize,
             heads["length"].astype(np.int64) - MESSAGE_HEAD_SIZE,
         )
+        if (block.channel < 0).any():
+            block = block.take(np.flatnonzero(block.channel >= 0))
+        if (np.diff(block.time_ns) < 0).any():
+            block = block.take(np.argsort(block.time_ns, kind="stable"))
+        return block

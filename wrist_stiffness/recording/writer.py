@@ -6,6 +6,7 @@ import os
 import shutil
 from contextlib import suppress
 from errno import EEXIST
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -274,7 +275,7 @@ class RecordingWriter:
                 channel.ros_type, channel.schema_encoding, channel.schema_text
             )
             metadata = {
-                "offered_qos_profiles": yaml.dump([_QOS_PROFILE], Dumper=_PlainDumper).strip(),
+                "offered_qos_profiles": _offered(),
                 "topic_type_hash": channel.type_hash,
             }
             channel_id = self._mcap.register_channel(
@@ -349,6 +350,11 @@ class RecordingWriter:
                 "ros_distro": "jazzy",
             }
         }
+
+
+@cache
+def _offered() -> str:
+    return yaml.dump([_QOS_PROFILE], Dumper=_PlainDumper).strip()
 
 
 class _PlainDumper(yaml.SafeDumper):
