@@ -195,6 +195,7 @@ def _weightless(flexibility: Array) -> Superelement:
         flexibility=flexibility,
         weight_motor_side=np.zeros((6, 3)),
         weight_platform_side=np.zeros((6, 3)),
+        mass=np.zeros((12, 12)),
         sector_wrench=np.zeros((6, 0)),
         sector_screw=np.zeros((6, 0)),
         sector_approach=np.zeros((0, 0)),

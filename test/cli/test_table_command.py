@@ -139,6 +139,25 @@ def test_pictures_show_something(small_table, tmp_path, capsys):
 
 
 @pytest.mark.slow
+def test_modes_of_the_shipped_table(tmp_path, capsys):
+    image = pytest.importorskip("matplotlib.image", reason="pictures need matplotlib")
+    found = {}
+    for name, payload in (("alone", []), ("loaded", ["--payload", "0.2", "0", "0", "-30"])):
+        report = tmp_path / f"{name}.json"
+        options = ["--modes", "-o", str(tmp_path / name), "--json", str(report), *payload]
+        assert main(["table", "show", *options]) == 0
+        found[name] = json.loads(report.read_text())
+    slowest = found["alone"]["at rest"]["min"][0]
+    assert f"below {slowest / 10:.0f} Hz" in capsys.readouterr().out
+    for state in ("open", "at rest", "closed"):
+        alone, loaded = (np.array(found[name][state]["mean"]) for name in ("alone", "loaded"))
+        assert np.all(loaded < alone)
+        assert np.all(np.diff(alone) > 0.0)
+    for picture in ("map_mode_1.png", "mode_shapes.png"):
+        assert 0.03 < coloured(image.imread(tmp_path / "alone" / picture)[..., :3]) < 0.9
+
+
+@pytest.mark.slow
 def test_statistics_are_those_of_the_closed_form(tmp_path, monkeypatch, capsys):
     """Independent of the spline: the rated load at every pose of the same fine grid."""
     pytest.importorskip("matplotlib")
@@ -168,6 +187,8 @@ def test_statistics_are_those_of_the_closed_form(tmp_path, monkeypatch, capsys):
         (["--load", "0", "0", "0"], "load: all numbers are 0"),
         (["--load", "0", "0", "nan"], "nan"),
         (["-o", "a_file"], "a_file: cannot be made"),
+        (["--modes", "--payload", "0", "0", "0", "0"], "payload of 0 kg is not above 0"),
+        (["--modes", "--payload-inertia", "1", "1", "1"], "needs its mass and place"),
     ],
 )
 def test_show_refuses(small_table, tmp_path, monkeypatch, refused, options, named):

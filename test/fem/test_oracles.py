@@ -10,6 +10,7 @@ from netgen.occ import Axes, Axis, OCCGeometry, Pnt, WorkPlane, X, Y, Z
 from wrist_stiffness.fem.elasticity import (
     body_force,
     lame,
+    mass_matrix,
     rigid_motion,
     stiffness_matrix,
     surface_integrals,
@@ -185,7 +186,8 @@ def test_swept_bushing_agrees_with_a_meshed_cad_solid(plain_sleeve, coarse):
         solid=plain_sleeve.solid,
         mesh=mesh,
         stiffness=stiffness_matrix(mesh, dimensions.material),
-        weight=body_force(mesh, dimensions.material.density),
+        mass=(mass := mass_matrix(mesh, dimensions.material.density)),
+        weight=body_force(mass),
         pressure=np.zeros((3 * len(mesh.nodes), 0)),
     )
     unstructured = np.diag(condense(body, "rigid").flexibility)

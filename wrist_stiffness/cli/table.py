@@ -33,11 +33,15 @@ example, is this still the table of that geometry?
 SHOW = """\
 Say what a table holds and draw what a load does: maps of the platform's displacement and
 orientation error over both motor angles with the border of the operative workspace, the error
-budget (whose share is it?) and the bent wrist. The default is the rated load, 1 N downward."""
+budget (whose share is it?) and the bent wrist. The default is the rated load, 1 N downward.
+With --modes it draws natural frequencies and mode shapes instead."""
 
 SHOW_EPILOG = """\
 example, 2 N along y at a point of the platform's plate:
-  wrist-stiffness table show -o maps --load 0 2 0 --at 20 0 -18"""
+  wrist-stiffness table show -o maps --load 0 2 0 --at 20 0 -18
+
+example, natural frequencies with a gripper of 0.2 kg, 30 mm below O:
+  wrist-stiffness table show -o maps --modes --payload 0.2 0 0 -30"""
 
 
 def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
@@ -106,6 +110,21 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         default=(0.0, 0.0, 0.0),
         metavar="MM",
         help="where --load acts, in wrist_platform [mm] (default: O)",
+    )
+    show.add_argument("--modes", action="store_true", help="natural frequencies and mode shapes")
+    show.add_argument(
+        "--payload",
+        nargs=4,
+        type=float,
+        metavar=("KG", "X", "Y", "Z"),
+        help="for --modes: mass [kg] and centre of gravity in wrist_platform [mm] (default: none)",
+    )
+    show.add_argument(
+        "--payload-inertia",
+        nargs=3,
+        type=float,
+        metavar=("IXX", "IYY", "IZZ"),
+        help="of the payload about its centre of gravity [kg mm^2] (default: a point)",
     )
     _add_json(show)
     show.set_defaults(run=_show)
@@ -184,6 +203,8 @@ def _show(arguments: argparse.Namespace) -> int:
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
     shown, push = load_table(path), None
+    if arguments.modes:
+        return _show_modes(shown, arguments)
     if arguments.load is not None:
         push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
     pictures = table.draw_maps(shown, arguments.output, push)
@@ -202,6 +223,36 @@ def _show(arguments: argparse.Namespace) -> int:
         print(f"written: {picture}")
     if arguments.json:
         write_json(arguments.json, asdict(summary))
+    return EXIT_DONE
+
+
+def _show_modes(shown: Table, arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.commands import modes
+    from wrist_stiffness.commands.json_file import write_json
+
+    payload = modes.payload_of(arguments.payload, arguments.payload_inertia)
+    found = modes.mode_map(shown, payload)
+    pictures = modes.draw_modes(shown, found, arguments.output, payload)
+    print("natural frequencies [Hz], motors locked, no damping, operative workspace:")
+    summary = {}
+    for state in modes.STATES:
+        values = found.operative(shown, state)
+        summary[state] = {
+            name: getattr(values, name)(axis=0).tolist() for name in ("min", "mean", "max")
+        }
+        for number in range(3):
+            lowest, mean, highest = (row[number] for row in summary[state].values())
+            label = f"flanges {state}, mode {number + 1}"
+            print(f"  {label:26} mean {mean:7.1f}   min {lowest:7.1f}   max {highest:7.1f}")
+    slowest = summary["at rest"]["min"][0]
+    print(
+        f"static corrections are right to 1 % for loads that change below {slowest / 10:.0f} Hz, "
+        "a tenth of the lowest frequency at rest"
+    )
+    for picture in pictures:
+        print(f"written: {picture}")
+    if arguments.json:
+        write_json(arguments.json, summary)
     return EXIT_DONE
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wrist_stiffness.commands.budget import PER_AXIS, Push, budget
+from wrist_stiffness.commands.picture_folder import picture_folder
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.lookup.biharmonic import Kernel
@@ -177,11 +178,7 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
     from wrist_stiffness.report.pictures.budget import draw_budget
     from wrist_stiffness.report.pictures.joint_map import draw_map
 
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
+    folder = picture_folder(folder)
     load = push or Push.rated(table)
     found = budget(table, load)
     poses = table.workspace.rectangle_grid(FINE if push is None else PER_AXIS)

@@ -21,6 +21,7 @@ from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.fem.solids import MILLIMETRES
 from wrist_stiffness.fem.wrist_model import FRAMES, SCREWS, WristAtPose, platform_weight
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.modes import RigidBody
 
 TONNES = 1e-3
 """Of a kilogram."""
@@ -56,7 +57,35 @@ def write_deck(
         Flange sectors in contact; their gaps are held at zero.
     """
     with replacing(path) as written, written.open("w") as deck:
-        deck.writelines(line + "\n" for line in _deck(model, wrench, gravity, closed))
+        for lines in (_wrist(model, closed), _static_step(model, wrench, gravity, closed)):
+            deck.writelines(line + "\n" for line in lines)
+
+
+def write_modal_deck(
+    model: WristAtPose,
+    path: Path,
+    bodies: tuple[RigidBody, ...],
+    closed: NDArray[np.bool_],
+    count: int = 6,
+) -> None:
+    """Write the CalculiX deck of a pose's natural modes, motors locked.
+
+    Parameters
+    ----------
+    model : WristAtPose
+        The pose.
+    path : Path
+        The deck, `*.inp`.
+    bodies : tuple of RigidBody
+        What moves with the platform: its plate, and a payload.
+    closed : (m,) bool
+        Flange sectors that stay in touch.
+    count : int
+        Modes.
+    """
+    with replacing(path) as written, written.open("w") as deck:
+        for lines in (_wrist(model, closed), _modal_step(model, bodies, closed, count)):
+            deck.writelines(line + "\n" for line in lines)
 
 
 def run_deck(path: Path) -> Array:
@@ -77,6 +106,27 @@ def run_deck(path: Path) -> Array:
     InputError
         If `ccx` is not installed or ends with an error.
     """
+    moved = {int(row[0]): row[1:] for row in _run(path) if len(row) == 4 and row[0].isdigit()}
+    if len(moved) != 2:
+        raise InputError(f"ccx wrote no platform displacement into {path.with_suffix('.dat').name}")
+    shift, turn = (np.array(moved[node], dtype=float) for node in sorted(moved))
+    return np.concatenate([shift / MILLIMETRES, turn])
+
+
+def run_modal_deck(path: Path) -> Array:
+    """Run CalculiX on a deck of `write_modal_deck` and read the natural frequencies, (k,) [Hz].
+
+    Raises
+    ------
+    InputError
+        If `ccx` is not installed or ends with an error.
+    """
+    rows = [row for row in _run(path) if len(row) == 5 and row[0].isdigit()]
+    return np.array([row[3] for row in rows], dtype=float)
+
+
+def _run(path: Path) -> list[list[str]]:
+    """Run CalculiX and return the words of the lines of its results."""
     solver = shutil.which("ccx")
     if solver is None:
         raise InputError("the solver ccx is not installed (Debian package calculix-ccx)")
@@ -92,24 +142,12 @@ def run_deck(path: Path) -> Array:
     if job.returncode != 0 or not results.is_file():
         last = [line for line in job.stdout.splitlines() if line.strip()][-1:]
         raise InputError(f"ccx failed on {path.name}: {' '.join(last).strip()}")
-    rows = [line.split() for line in results.read_text().splitlines()]
-    moved = {int(row[0]): row[1:] for row in rows if len(row) == 4 and row[0].isdigit()}
-    if len(moved) != 2:
-        raise InputError(f"ccx wrote no platform displacement into {results.name}")
-    shift, turn = (np.array(moved[node], dtype=float) for node in sorted(moved))
-    return np.concatenate([shift / MILLIMETRES, turn])
+    return [line.split() for line in results.read_text().splitlines()]
 
 
-def _deck(
-    model: WristAtPose, wrench: Array, gravity: Array, closed: NDArray[np.bool_]
-) -> Iterator[str]:
-    counts = [len(part.nodes) for part in model.placed]
-    first = 1 + np.concatenate([[0], np.cumsum(counts)])
-    # Two nodes per frame (shift at O, turn), one per passive joint (slide, turn), one per sector
-    # (its gap): nodes of no element, whose degrees of freedom the equations give a meaning.
-    own = int(first[-1])
-    gap_node = own + 2 * len(FRAMES) + len(PASSIVE_JOINTS)
-    platform = own + 2 * FRAMES.index("platform")
+def _wrist(model: WristAtPose, closed: NDArray[np.bool_]) -> Iterator[str]:
+    """Nodes, elements, frames and contact sectors, before any step."""
+    first, own, gap_node = _numbers(model)
 
     yield "*NODE, NSET=ALL"
     for part, start in zip(model.placed, first, strict=False):
@@ -127,6 +165,23 @@ def _deck(
     yield from (f"{gap_node + sector},2,3" for sector in range(len(closed)))
     yield from (f"{gap_node + sector},1" for sector in np.flatnonzero(~closed))
     yield from _contact_equations(model, first, own, closed)
+
+
+def _numbers(model: WristAtPose) -> tuple[NDArray[np.int64], int, int]:
+    """First node of each part, of the frames and of the sectors' gaps."""
+    counts = [len(part.nodes) for part in model.placed]
+    first = 1 + np.concatenate([[0], np.cumsum(counts)])
+    # Two nodes per frame (shift at O, turn), one per passive joint (slide, turn), one per sector
+    # (its gap): nodes of no element, whose degrees of freedom the equations give a meaning.
+    own = int(first[-1])
+    return first, own, own + 2 * len(FRAMES) + len(PASSIVE_JOINTS)
+
+
+def _static_step(
+    model: WristAtPose, wrench: Array, gravity: Array, closed: NDArray[np.bool_]
+) -> Iterator[str]:
+    _, own, gap_node = _numbers(model)
+    platform = own + 2 * FRAMES.index("platform")
     yield "*NSET, NSET=PLATFORM"
     yield f"{platform},{platform + 1}"
     yield "*STEP"
@@ -148,6 +203,40 @@ def _deck(
         )
     yield "*NODE PRINT, NSET=PLATFORM"
     yield "U"
+    yield "*END STEP"
+
+
+def _modal_step(
+    model: WristAtPose, bodies: tuple[RigidBody, ...], closed: NDArray[np.bool_], count: int
+) -> Iterator[str]:
+    """Rigid bodies as six points each, with their mass, centre and inertia; then the modes."""
+    _, own, gap_node = _numbers(model)
+    node = gap_node + len(closed)
+    solid = sum(len(part.body.mesh.elements) for part in model.placed)
+    for number, body in enumerate(bodies):
+        axes = np.linalg.eigh(body.inertia)[1] * np.sqrt(3.0 * body.second_moments / body.mass)
+        places = body.centre + np.concatenate([axes.T, -axes.T])
+        places = MILLIMETRES * places @ model.configuration.platform.T
+        numbers = range(node, node := node + len(places))
+        yield "*NODE"
+        for point, place in zip(numbers, places, strict=True):
+            yield f"{point}," + ",".join(map(_number, place))
+        yield f"*ELEMENT, TYPE=MASS, ELSET=BODY_{number}"
+        yield from (f"{solid + point},{point}" for point in numbers)
+        yield f"*MASS, ELSET=BODY_{number}"
+        yield _number(body.mass * TONNES / len(places))
+        motion = rigid_motion(places).reshape(-1, 3, 6)
+        for point, rows in zip(numbers, motion, strict=True):
+            for way, row in enumerate(rows):
+                masters = np.flatnonzero(row)
+                start = 6 * FRAMES.index("platform")
+                terms = [(*_screw_dof(own, start + int(k)), -row[k]) for k in masters]
+                yield from _equation([(point, way + 1, 1.0), *terms])
+    yield "*BOUNDARY"
+    yield from (f"{gap_node + sector},1" for sector in np.flatnonzero(closed))
+    yield "*STEP"
+    yield "*FREQUENCY"
+    yield f"{count}"
     yield "*END STEP"
 
 

@@ -144,13 +144,15 @@ def place_components(
     ElasticComponents
         At O in F with the wrist at home.
     """
-    flexibility, motor_side, platform_side = [], [], []
+    flexibility, motor_side, platform_side, mass = [], [], [], []
     contact: dict[str, FlangeContact] = {}
     for part in parts:
         element, home = condensed[part.solid], part.home
         flexibility.append(home.screw @ element.flexibility @ home.screw.T)
         motor_side.append(home.wrench @ element.weight_motor_side @ home.rotation.T)
         platform_side.append(home.wrench @ element.weight_platform_side @ home.rotation.T)
+        both = np.kron(np.eye(2), home.wrench)
+        mass.append(both @ element.mass @ both.T)
         if part.name in PASSIVE_JOINTS and part.solid.flanges:
             contact[part.name] = _flange_contact(part, element, geometry.bushings[part.name])
     return ElasticComponents(
@@ -159,6 +161,7 @@ def place_components(
         weight_platform_side=np.array(platform_side),
         platform_weight=_platform_weight(geometry.platform),
         contact=contact,
+        mass=np.array(mass),
     )
 
 

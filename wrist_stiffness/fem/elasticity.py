@@ -82,15 +82,14 @@ def thermal_load(mesh: SolidMesh, material: Material) -> Array:
     return load.ravel()
 
 
-def volume_integrals(mesh: SolidMesh) -> Array:
-    """Integral of each node's shape function over the solid (n,) [m^3]."""
+def mass_matrix(mesh: SolidMesh, density: float) -> sparse.csr_matrix:
+    """Return the consistent mass between the nodes, the same along x, y and z, (n, n) [kg]."""
     basis = Basis(mesh.tets, ElementTetP2(), intorder=LOAD_ORDER)
-    values = np.array(
-        [np.einsum("eq,eq->e", np.asarray(field[0]), basis.dx) for field in basis.basis]
-    )
-    integrals = np.zeros(len(mesh.nodes))
-    np.add.at(integrals, mesh.elements, values.T)
-    return integrals
+    shape = np.array([np.broadcast_to(np.asarray(f[0]), basis.dx.shape) for f in basis.basis])
+    block = density * np.einsum("ieq,jeq,eq->eij", shape, shape, basis.dx)
+    rows = np.repeat(mesh.elements, 10, axis=1).ravel()
+    columns = np.tile(mesh.elements, (1, 10)).ravel()
+    return sparse.csr_matrix((block.ravel(), (rows, columns)), shape=(len(mesh.nodes),) * 2)
 
 
 def surface_integrals(mesh: SolidMesh, surface: str) -> Array:
@@ -123,9 +122,9 @@ def surface_integrals(mesh: SolidMesh, surface: str) -> Array:
     return integrals
 
 
-def body_force(mesh: SolidMesh, density: float) -> Array:
-    """Nodal forces of a unit acceleration field along x, y and z (3 n, 3) [N/(m/s^2)]."""
-    forces = density * volume_integrals(mesh)[:, None, None] * np.eye(3)
+def body_force(mass: sparse.csr_matrix) -> Array:
+    """Nodal forces of a unit acceleration field along x, y and z on a mass (3 n, 3) [kg]."""
+    forces = np.asarray(mass.sum(axis=1))[:, :, None] * np.eye(3)
     return forces.reshape(-1, 3)
 
 

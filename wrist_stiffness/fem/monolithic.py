@@ -6,11 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 from scipy.optimize import nnls
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
 from wrist_stiffness.fem.wrist_model import SCREWS, PlacedBody, WristAtPose, platform_weight
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.modes import RigidBody
+from wrist_stiffness.mechanism.vectors import block_diagonal
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,55 @@ def solve_pose(
         ],
         screws=unknowns[-SCREWS:],
     )
+
+
+def natural_frequencies(
+    model: WristAtPose,
+    bodies: tuple[RigidBody, ...],
+    closed: NDArray[np.bool_],
+    count: int = 6,
+) -> Array:
+    """Solve for the slowest natural modes of a pose, every node with its mass, motors locked.
+
+    Parameters
+    ----------
+    model : WristAtPose
+        The factored pose.
+    bodies : tuple of RigidBody
+        What moves with the platform: its plate, and a payload.
+    closed : (m,) bool
+        Flange sectors that stay in touch.
+    count : int
+        Modes.
+
+    Returns
+    -------
+    (count,) float
+        Frequencies, the slowest first [Hz].
+    """
+    size = model.openings.shape[1]
+    mass = sum(
+        follow.T @ sparse.kron(part.body.mass, sparse.eye(3)) @ follow
+        for part, follow in zip(model.placed, model.follow, strict=True)
+    )
+    turn = block_diagonal(model.configuration.platform)
+    platform = turn @ sum(body.at_centre for body in bodies) @ turn.T
+    place = np.arange(size)[model.platform_columns]
+    rows, columns = np.repeat(place, 6), np.tile(place, 6)
+    mass = sparse.csr_matrix(mass) + sparse.csr_matrix(
+        (platform.ravel(), (rows, columns)), shape=(size, size)
+    )
+    touching, pushed = model.openings[closed], model.by_force[:, closed]
+    approach = touching @ pushed
+
+    def flexibility(load: Array) -> Array:
+        free = model.factor.solve(load)
+        return free - pushed @ np.linalg.solve(approach, touching @ free) if any(closed) else free
+
+    operator = LinearOperator((size, size), matvec=flexibility, dtype=float)
+    # About zero only the flexibility is asked for, never the stiffness.
+    square = eigsh(mass, k=count, M=mass, sigma=0.0, OPinv=operator, return_eigenvectors=False)
+    return np.sqrt(np.sort(square)) / (2.0 * np.pi)
 
 
 def _contact_forces(model: WristAtPose, gaps: Array) -> Array:

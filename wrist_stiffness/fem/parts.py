@@ -12,7 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from wrist_stiffness.fem.elasticity import body_force, stiffness_matrix, surface_integrals
+from wrist_stiffness.fem.elasticity import (
+    body_force,
+    mass_matrix,
+    stiffness_matrix,
+    surface_integrals,
+)
 from wrist_stiffness.fem.mesh import SolidMesh, mesh_solid
 from wrist_stiffness.fem.revolve import SECTORS, revolve
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings, bushing_section, link_shape
@@ -126,6 +131,8 @@ class ElasticBody:
         Its mesh.
     stiffness : sparse.csr_matrix
         (3 n, 3 n) [N/m].
+    mass : sparse.csr_matrix
+        (n, n) along each direction [kg].
     weight : (3 n, 3) float
         Nodal forces of unit accelerations [N/(m/s^2)].
     pressure : (3 n, m) float
@@ -136,6 +143,7 @@ class ElasticBody:
     solid: Solid
     mesh: SolidMesh
     stiffness: sparse.csr_matrix
+    mass: sparse.csr_matrix
     weight: Array
     pressure: Array
 
@@ -183,11 +191,13 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
         share = surface_integrals(mesh, sector)[:, 0]
         away_from_hub = -1.0 if sector.startswith(FLANGES[0]) else 1.0
         pressure[:, 2, k] = away_from_hub * share / share.sum()
+    mass = mass_matrix(mesh, solid.material.density)
     return ElasticBody(
         solid=solid,
         mesh=mesh,
         stiffness=stiffness_matrix(mesh, solid.material),
-        weight=body_force(mesh, solid.material.density),
+        mass=mass,
+        weight=body_force(mass),
         pressure=pressure.reshape(3 * len(mesh.nodes), len(solid.sectors)),
     )
 

@@ -62,6 +62,8 @@ class Superelement:
         Mean displacement of each sector away from the hub for 1 N on each sector [m/N].
     sector_weight : (m, 3) float
         The same for unit accelerations with both frames held [m/(m/s^2)].
+    mass : (12, 12) float
+        Of the motion that follows the frames without inertia, motor side first [kg, kg m, kg m^2].
     """
 
     flexibility: Array
@@ -71,6 +73,7 @@ class Superelement:
     sector_screw: Array
     sector_approach: Array
     sector_weight: Array
+    mass: Array
 
 
 def condense(body: ElasticBody, interface: Interface) -> Superelement:
@@ -90,10 +93,10 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
     """
     loads = np.hstack([body.weight, body.pressure])
     if interface == "distributing":
-        flexibility, on_motor, on_platform, inner = _condense_distributing(body, loads)
+        flexibility, on_motor, on_platform, inner, shape = _condense_distributing(body, loads)
     else:
         slides = interface == "sliding" and body.solid.is_bushing
-        stiffness, on_frames, inner = frame_stiffness(body, loads, slides)
+        stiffness, on_frames, inner, shape = frame_stiffness(body, loads, slides)
         carried = np.ix_(ACROSS, ACROSS) if slides else np.ix_(ALL, ALL)
         flexibility = np.zeros((6, 6))
         flexibility[carried] = _inverse(stiffness[6:, 6:][carried])
@@ -107,12 +110,13 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
         sector_screw=sector_screw,
         sector_approach=_symmetric(inner[3:, 3:] + on_platform[:, 3:].T @ sector_screw),
         sector_weight=inner[3:, :3],
+        mass=_moving_mass(body, shape),
     )
 
 
 def frame_stiffness(
     body: ElasticBody, loads: Array, slides: bool = False
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Guyan condensation onto the motor-side and the platform-side rigid frame.
 
     Parameters
@@ -132,6 +136,8 @@ def frame_stiffness(
         Wrenches on the frames that do the loads' work.
     inner : (k, k) float
         Work of each load along each load's displacements with both frames held.
+    shape : (3 n, 12) float
+        Displacements of the nodes by the frames' unit screws.
     """
     axes = _axes(body)
     rigid = axes.T @ rigid_motion(body.mesh.nodes)
@@ -152,7 +158,15 @@ def frame_stiffness(
     by_frames, by_loads = solution[:, :12], solution[:, 12:]
     stiffness = _symmetric(motion.T @ pull - pull[free].T @ by_frames)
     on_frames = motion.T @ loads - pull[free].T @ by_loads
-    return stiffness, on_frames, _symmetric(loads[free].T @ by_loads)
+    inner = _symmetric(loads[free].T @ by_loads)
+    motion[free] -= by_frames
+    return stiffness, on_frames, inner, axes @ motion
+
+
+def _moving_mass(body: ElasticBody, shape: Array) -> Array:
+    """Mass of a body whose nodes move by shapes (3 n, k), (k, k)."""
+    by_node = shape.reshape(len(body.mesh.nodes), -1)
+    return _symmetric(shape.T @ (body.mass @ by_node).reshape(shape.shape))
 
 
 def _axes(body: ElasticBody) -> sparse.csr_matrix:
@@ -171,7 +185,9 @@ def _factorise_inside(
     return factorise((axes.T @ body.stiffness @ axes)[free][:, free], free)
 
 
-def _condense_distributing(body: ElasticBody, loads: Array) -> tuple[Array, Array, Array, Array]:
+def _condense_distributing(
+    body: ElasticBody, loads: Array
+) -> tuple[Array, Array, Array, Array, Array]:
     """Held by its averaged motor-side frame, a solid is supported statically determinately."""
     nodes = body.mesh.nodes
     rigid = rigid_motion(nodes)
@@ -189,7 +205,11 @@ def _condense_distributing(body: ElasticBody, loads: Array) -> tuple[Array, Arra
     flexibility = work[:6, :6]
     on_platform = _inverse(flexibility) @ work[:6, 6:]
     inner = work[6:, 6:] - on_platform.T @ flexibility @ on_platform
-    return flexibility, rigid.T @ loads - on_platform, on_platform, inner
+    # The motor side's mean motion taken out, what is left follows the platform side.
+    bent = displacement[:, :6] - rigid @ (motor.T @ displacement[:, :6])
+    by_platform = bent @ _inverse(flexibility)
+    shape = np.hstack([rigid - by_platform, by_platform])
+    return flexibility, rigid.T @ loads - on_platform, on_platform, inner, shape
 
 
 def _wall_average(body: ElasticBody, wall: str) -> Array:

@@ -188,7 +188,10 @@ def _check(table: Table, path: str | Path) -> None:
         ("operators", table.operators, (n, column_count(sectors))),
         ("map_values", table.map_values, (n, len(MAP_COLUMNS))),
         ("flexibility", table.components.flexibility, (len(ELASTIC), 6, 6)),
+        ("mass", table.components.mass, (len(ELASTIC), 12, 12)),
     ):
+        if array is None:
+            continue
         if array.shape != shape:
             raise TableError(f"{path}: {name} has shape {array.shape}, not {shape}")
         if not np.all(np.isfinite(array)):
@@ -217,6 +220,8 @@ def _to_arrays(table: Table) -> dict[str, Array]:
     for joint, contact in parts.contact.items():
         for field in fields(FlangeContact):
             arrays[f"{joint}_{field.name}"] = getattr(contact, field.name)
+    if parts.mass is not None:
+        arrays["mass"] = parts.mass
     return arrays
 
 
@@ -232,6 +237,7 @@ def _from_arrays(header: TableHeader, arrays: Mapping[str, Array], checksum: str
         weight_platform_side=arrays["weight_platform_side"],
         platform_weight=arrays["platform_weight"],
         contact=contact,
+        mass=arrays.get("mass"),
     )
     return Table(
         header, components, arrays["nodes"], arrays["operators"], arrays["map_values"], checksum

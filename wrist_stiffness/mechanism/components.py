@@ -118,6 +118,9 @@ class ElasticComponents:
         The same for the rigid platform.
     contact : dict of str to FlangeContact
         Flange contact by passive joint; a joint without flanges is absent.
+    mass : (8, 12, 12) float
+        Of each part, condensed onto its motor-side and its platform-side frame; only the natural
+        modes need it, a table of an older version has none [kg, kg m, kg m^2].
     """
 
     flexibility: Array
@@ -125,6 +128,7 @@ class ElasticComponents:
     weight_platform_side: Array
     platform_weight: Array
     contact: dict[str, FlangeContact]
+    mass: Array | None = None
 
     @cached_property
     def sectors(self) -> ContactSectors:

@@ -19,7 +19,8 @@ from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, ENDS, JOINTS,
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.energy import component_screws
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.mechanism.modes import NaturalModes
+from wrist_stiffness.mechanism.statics import contact_operators, platform_twist
 from wrist_stiffness.mechanism.vectors import cross, unit
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
@@ -72,10 +73,26 @@ def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:
     table.check_load(wrench)
     response = respond(contact_operators(configuration, table.components, np.zeros(3)), wrench)
     screws = component_screws(configuration, table.components, wrench, response.force)
-    frames = [_frame_screws(laws, screws) for laws in influence(configuration).of_frames()]
+    return moved_shapes(table, configuration, screws)
+
+
+def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> list[Shape]:
+    """Return the bodies of the wrist at a pose with their displacements.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+    configuration : Configuration
+        One pose.
+    screws : (8, 6) float
+        Elastic screw of each component at O in F [m, rad].
+    """
+    projectors = influence(configuration)
+    frames = [_frame_screws(laws, screws) for laws in projectors.of_frames()]
     shapes = [_link(table, configuration, name, *_pair(frames, name)) for name in LINKS]
     shapes += [_bushing(table, configuration, name, *_pair(frames, name)) for name in JOINTS]
-    return [*shapes, _platform(table, configuration, response.twist)]
+    return [*shapes, _platform(table, configuration, platform_twist(projectors, screws))]
 
 
 def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
@@ -101,23 +118,8 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
     colours = ScalarMappable(Normalize(0.0, 1e6 * largest), "viridis")
     figure = new_figure(8.0, 7.0)
     plot: Any = figure.add_subplot(projection="3d")
-    for shape in shapes:
-        # Micrometres decide the colour, millimetres the place.
-        micrometres = 1e6 * np.linalg.norm(shape.shift, axis=-1)
-        faces = colours.to_rgba(0.25 * _corner_sum(micrometres))
-        bent = 1e3 * (shape.points + factor * shape.shift)
-        rigid = 1e3 * shape.points
-        plot.plot_surface(
-            *np.moveaxis(bent, -1, 0), facecolors=faces, rstride=1, cstride=1, shade=False
-        )
-        plot.plot_wireframe(
-            *np.moveaxis(rigid, -1, 0), color="grey", linewidth=0.3, rstride=2, cstride=3, alpha=0.5
-        )
+    _draw_shapes(plot, shapes, factor, colours, 1e6)
     _draw_load(plot, table, theta, push)
-    plot.set_aspect("equal")
-    plot.set_xlabel("x [mm]")
-    plot.set_ylabel("y [mm]")
-    plot.set_zlabel("z [mm]")
     degrees = np.degrees(theta)
     plot.set_title(
         f"{table.geometry.name} at ({degrees[0]:.0f}, {degrees[1]:.0f}) deg under "
@@ -127,6 +129,64 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
     )
     figure.colorbar(colours, ax=plot, shrink=0.7, label="displacement [µm]")
     save_figure(figure, path)
+
+
+def draw_mode_shapes(
+    table: Table, configuration: Configuration, modes: NaturalModes, path: Path
+) -> None:
+    """Draw the shapes of the four slowest natural modes at a pose, rigid in grey.
+
+    Parameters
+    ----------
+    table : Table
+        The lookup.
+    configuration : Configuration
+        One pose, as a stack of one.
+    modes : NaturalModes
+        There.
+    path : Path
+        PNG to write.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    colours = ScalarMappable(Normalize(0.0, 1.0), "viridis")
+    figure = new_figure(10.0, 9.0)
+    pose = Configuration.of_row(configuration.row)
+    for number in range(4):
+        plot: Any = figure.add_subplot(2, 2, number + 1, projection="3d")
+        shapes = moved_shapes(table, pose, modes.screws[0, number])
+        largest = max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
+        _draw_shapes(plot, shapes, SHOWN_M / largest, colours, 1.0 / largest)
+        plot.set_title(f"mode {number + 1}: {modes.frequency[0, number]:.0f} Hz", fontsize=10)
+    degrees = np.degrees(pose.theta)
+    figure.suptitle(
+        f"{table.geometry.name} at ({degrees[0]:.0f}, {degrees[1]:.0f}) deg: natural modes, motors "
+        "locked, flanges as they rest\ncolour: displacement over the largest one",
+        fontsize=10,
+    )
+    save_figure(figure, path)
+
+
+def _draw_shapes(
+    plot: Any, shapes: list[Shape], factor: float, colours: Any, colour_per_metre: float
+) -> None:
+    for shape in shapes:
+        # The displacement decides the colour, millimetres the place.
+        size = colour_per_metre * np.linalg.norm(shape.shift, axis=-1)
+        faces = colours.to_rgba(0.25 * _corner_sum(size))
+        bent = 1e3 * (shape.points + factor * shape.shift)
+        rigid = 1e3 * shape.points
+        plot.plot_surface(
+            *np.moveaxis(bent, -1, 0), facecolors=faces, rstride=1, cstride=1, shade=False
+        )
+        plot.plot_wireframe(
+            *np.moveaxis(rigid, -1, 0), color="grey", linewidth=0.3, rstride=2, cstride=3, alpha=0.5
+        )
+    plot.set_aspect("equal")
+    plot.set_xlabel("x [mm]")
+    plot.set_ylabel("y [mm]")
+    plot.set_zlabel("z [mm]")
 
 
 def _frame_screws(laws: Array, screws: Array) -> Array:
