@@ -92,3 +92,24 @@ def test_a_correction_fades_while_it_is_paused(stream):
     assert np.abs(stream.applied).max() == pytest.approx(0.5 * np.abs(before).max())
     stream.resume(1.0)
     assert not stream.applied.any()
+
+
+@pytest.mark.parametrize("released", [True, False])
+def test_after_a_pause_a_payload_must_be_seen_again(stream, released):
+    """It may have been released meanwhile: the first command must not carry its correction."""
+    stream.settings = StreamSettings()
+
+    def last(first, seconds, newtons):
+        for i in range(first, first + round(50 * seconds)):
+            stamp = SECOND + i * SECOND // 50
+            stream.loads.add(stamp, "wrist_base", [0.0, 0.0, -newtons], [0.0, 0.0, 0.0])
+            given = stream.on_command(stamp, "", NAMES, [0.1, -0.2])
+        return np.abs(given.theta - [0.1, -0.2]).max()
+
+    none, full = last(0, 3.0, 0.0), last(150, 4.0, 3.0)
+    assert full > none + 1e-5
+    stream.active = False
+    stream.resume(2.0)
+    assert last(450, 0.02, 0.0 if released else 3.0) <= none
+    again = last(451, 4.0, 0.0 if released else 3.0)
+    assert again == pytest.approx(none if released else full, rel=0.05)

@@ -37,7 +37,15 @@ def test_a_signal_ends_a_node_cleanly(graph, name, ending):
         try:
             graph.until(lambda: name in listed_nodes(graph), name)
             graph.status(name, lambda status, values: True)
-            process.send_signal(ending)
+            # In the midst of its work, where publishing fails from one moment to the next.
+            topic = "/motor_commands" if name == "angle_corrector" else "/joint_states"
+            graph.until(lambda: graph.probe.count_subscribers(topic), topic)
+            until, sent = time.monotonic() + DEADLINE_S, 0
+            while process.poll() is None and time.monotonic() < until:
+                graph.joints(topic, time.time_ns())
+                sent += 1
+                if sent == 200:
+                    process.send_signal(ending)
             _, errors = process.communicate(timeout=DEADLINE_S)
         finally:
             process.kill()

@@ -103,9 +103,10 @@ class CorrectionStream(Stream):
         return self._corrector.applied.value
 
     def resume(self, paused_s: float) -> None:
-        """Correct again after a pause [s], in which the correction faded as time passed."""
+        """Correct again after a pause [s]: the correction faded, and what is held is seen anew."""
         self._corrector.applied.fade(paused_s, self.settings.safety)
         self._corrector.release()
+        self.supervisor.lost()
         self.active = True
 
     def use_zero(self, zero: Zero | None) -> None:

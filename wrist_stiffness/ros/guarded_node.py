@@ -174,6 +174,9 @@ class GuardedNode(LifecycleNode):
 
     def on_fault(self, error: Exception) -> None:
         """Count what a callback raised, log it, at most every five seconds, and go on."""
+        if not self.context.ok():
+            # Told to end in the midst of a callback: all of ROS fails then, and nothing is wrong.
+            return
         self.health.fault(error)
         if isinstance(error, WristError):
             self.get_logger().warning(str(error), throttle_duration_sec=LOG_EVERY_S)
