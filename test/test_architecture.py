@@ -26,7 +26,7 @@ ROOMS_USED = {
     "simulation": {"mechanism", "lookup", "recording"},
     "analysis": CORE,
     "report": CORE | {"commands"},
-    "commands": CORE | {"analysis", "report", "shipped"},
+    "commands": CORE | {"analysis", "shipped"},
     "web": CORE | {"analysis", "commands", "report", "shipped"},
     "cli": CORE | {"commands", "report", "shipped", "web"},
     "ros": CORE | {"commands", "shipped"},

@@ -5,10 +5,10 @@ import pytest
 from matplotlib.image import imread
 
 from wrist_stiffness.commands.budget import Push, budget
-from wrist_stiffness.commands.table import draw_maps
 from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.report.pictures.bent_wrist import bent_shapes
+from wrist_stiffness.report.table_pictures import draw_maps
 from wrist_stiffness.shipped import shipped_file
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from wrist_stiffness.cli.main import main
-from wrist_stiffness.commands.diagnose_fleet import FleetDiagnosis
 from wrist_stiffness.commands.fleet import FleetRow
+from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -40,7 +40,7 @@ def test_each_wrist_has_a_line_that_says_what_is_missing():
         FleetRow(Path("d.mcap"), diagnosed("unknown", keys=("phi_mdeg",))),
         FleetRow(Path("e.mcap"), None, "e.mcap: no measured pose"),
     )
-    lines = FleetDiagnosis(rows).lines()
+    lines = diagnosed_lines(rows)
     said = {line.split()[0]: line for line in lines[2:7]}
     assert said["a.mcap"].endswith("  nothing")
     assert said["b.mcap"].endswith("  backlash@motor_2")

@@ -28,6 +28,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.model.python_laws import python_laws
+from wrist_stiffness.report.fit_lines import extension_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.instrument import instrument
@@ -118,7 +119,7 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert abs(abs(size.value) - 150.0) < 3.5 * size.sigma
     assert abs(abs(soft.value) - 0.2) < 3.5 * soft.sigma
     assert size.value * soft.value > 0.0
-    (line,) = (line for line in found.lines() if "sag_mdeg  " in line)
+    (line,) = (line for line in extension_lines(found) if "sag_mdeg  " in line)
     assert "usual size" not in line
     before, after = found.errors.rows.values()
     assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
@@ -171,7 +172,7 @@ def test_an_effect_that_is_not_there_is_added_with_a_word(model, extend_by):
     assert "on its bound" not in words
     assert words.count("not told by these recordings") < 2
     assert "does not fall beyond chance" in words or "GROWS" in words
-    assert any(line.startswith("WARNING") for line in found.lines())
+    assert any(line.startswith("WARNING") for line in extension_lines(found))
     assert "frame_compliance@frame" in {effect.name for effect in load_model(output).effects}
 
 
@@ -182,7 +183,7 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
     found, _ = extend_by(CatalogueEffect("encoder_eccentricity@motor_1"), session)
     moved = {before.effect for before, _ in found.extension.base_moved}
     assert moved == {"encoder_offset@motor_1"}
-    assert "what the effect moved in the rest of the model:" in found.lines()
+    assert "what the effect moved in the rest of the model:" in extension_lines(found)
 
 
 @pytest.mark.parametrize(

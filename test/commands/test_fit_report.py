@@ -13,7 +13,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.report.fit_report import told_lines, tolerances, untold_lines, used_lines
+from wrist_stiffness.report.fit_lines import told_lines, tolerances, untold_lines, used_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file

@@ -113,10 +113,10 @@ def performed(model, timeline, path):
 @pytest.mark.slow
 def test_what_was_recorded_before_calibrates_but_leaves_open_what_is_asked(files, alone, tmp_path):
     """The plan was to settle it and has been performed, yet the diagnosis asks again."""
-    model, first = alone
+    model, first = alone.model, alone
     assert all(answer.settled for answer in first.plan.answers)
     recording = performed(model, first.plan.timeline, tmp_path / "day_1")
-    _, second = between(files, Recordings([recording], {}))
+    second = between(files, Recordings([recording], {}))
     assert all(answer.settled for answer in second.plan.answers)
     assert len(second.plan.visits) >= len(first.plan.visits) > 0
     for name in set(WRIST) - {TARE}:
@@ -152,7 +152,7 @@ def test_options_reach_the_plan_in_si(files, monkeypatch):
 
 
 def test_values_for_programs_are_those_of_the_plan(alone):
-    _, planned = alone
+    planned = alone
     values, timeline = planned.as_values(), planned.plan.timeline
     assert values["duration_s"] == timeline.duration_s
     for row, dwell in zip(values["dwells"], timeline.dwells, strict=True):

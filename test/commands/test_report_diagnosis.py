@@ -16,7 +16,8 @@ from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.comparing.explained import explain
 from wrist_stiffness.inference import Diagnosis, Finding, Observations
 from wrist_stiffness.inference.answer import NotExcited, Standing
-from wrist_stiffness.report.diagnosis_report import Shown, report_of_diagnosis
+from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
+from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
 from wrist_stiffness.report.page import html_of
 from wrist_stiffness.sessions.observing import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
@@ -76,6 +77,8 @@ def observations():
 
 MISTAKE = "Look at the set-up first: with the load's sign turned the error falls from 9 to 1 um"
 
+PROVENANCE = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
+
 
 class Units:
     """What is asked of a session beside its table: the scatter of one measurement."""
@@ -94,11 +97,16 @@ def page_of(result, observations, notes=(), mistake=""):
     registration = np.broadcast_to(np.diag(np.repeat(1e-3, 6)), (n, 6, 6))
     weights = np.full((n, 6), 1.0 / np.repeat([1e-6, 1e-4], 3) ** 2)
     left = explain(observations, [Units(n)], registration, np.zeros(6), weights)
-    shown = Shown(left, 0.1 * observations.values)
-    provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
-    told = (mistake, notes, provenance)
-    page = report_of_diagnosis(result, shown, ["monday"], *told)
-    return unescape(html_of(page))
+    found = SimpleNamespace(
+        result=result,
+        answer=SimpleNamespace(fitted=SimpleNamespace(residual=0.1 * observations.values)),
+        recordings=["monday"],
+        mistake=mistake,
+        remarks=notes,
+        provenance=PROVENANCE,
+        depends=lambda: left,
+    )
+    return unescape(html_of(report_of_diagnosis(found)))
 
 
 def test_everything_of_a_finding_is_on_the_page(observations):
@@ -132,10 +140,10 @@ def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
     page = page_of(RESULT, observations, mistake=MISTAKE)
     assert 0 < page.index("Look at the set-up first") < page.index("Missing in the model")
     answer = SimpleNamespace(diagnosis=RESULT, absorbed=())
-    provenance = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
-    told = Diagnosed(answer, ("monday",), MISTAKE, (), provenance)
-    assert told.lines()[:2] == [MISTAKE, ""]
-    assert told.lines()[2].startswith("Missing in the model")
+    told = Diagnosed(answer, ("monday",), MISTAKE, (), PROVENANCE)
+    lines = diagnosis_lines(told)
+    assert lines[:2] == [MISTAKE, ""]
+    assert lines[2].startswith("Missing in the model")
     assert told.as_values()["set_up_mistake"] == MISTAKE
 
 

@@ -1,13 +1,13 @@
 """What a terminal tells of the refit: what left its tolerance a line each, the rest in one."""
 
-from wrist_stiffness.commands.diagnose import taken_up_lines
 from wrist_stiffness.identification.taken_up import TakenUp
+from wrist_stiffness.report.diagnosis_lines import absorbed_lines
 
 MOVED = {"s": 1.0, "phi": 2.0}
 
 
 def test_only_what_left_its_tolerance_has_a_line_of_its_own():
-    lines = taken_up_lines(
+    lines = absorbed_lines(
         [
             TakenUp("load_bias@load_sensor in a day", MOVED),
             TakenUp("link_stiffness@link_1", MOVED, "flexibility_percent", 55.0, 3.2),

@@ -6,7 +6,7 @@ import pytest
 
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.inference import Diagnosis, Finding
-from wrist_stiffness.report.verdict import class_of, correction_of, verdict_lines
+from wrist_stiffness.report.diagnosis_lines import class_of, correction_of, verdict_lines
 
 GROWTH = Finding(
     (("thermal_expansion", "platform", 1.0),), 0.97, {}, 25.0, 0.9, {}, "no", "it grows", ""

@@ -78,6 +78,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.this_run import this_run
     from wrist_stiffness.commands.calibrate import calibrate_model
     from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.report.fit_lines import calibration_lines
     from wrist_stiffness.shipped import shipped_file
 
     require_new_model(arguments)
@@ -89,7 +90,7 @@ def _run(arguments: argparse.Namespace) -> int:
         Progress("calibrate"),
         Progress("a likely mistake put right"),
     )
-    print("\n".join(found.lines()))
+    print("\n".join(calibration_lines(found)))
     print(f"\nwritten: {arguments.output}")
     if arguments.json:
         write_json(arguments.json, found.as_values())

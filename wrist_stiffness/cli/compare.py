@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from wrist_stiffness.cli.fleet_options import add_fleet_options, for_each
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
@@ -51,23 +52,24 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.cli.this_run import this_run
+    from wrist_stiffness.commands.compare import compare
     from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.shipped import shipped_file
 
     models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
     recordings = recordings_named(arguments.recordings, arguments)
     if for_each(arguments):
-        from wrist_stiffness.commands.compare_fleet import compare_each
+        from wrist_stiffness.commands.fleet import each_recording, table_values
+        from wrist_stiffness.report.fleet_lines import compared_lines
 
-        fleet = compare_each(
-            models, recordings, this_run(), arguments.scheduler, Progress("recordings")
-        )
-        lines, values = fleet.lines(), fleet.as_values()
+        one = partial(compare, models, run=this_run())
+        rows = each_recording(one, recordings, arguments.scheduler, Progress("recordings"))
+        lines, values = compared_lines(rows), table_values(rows, "comparison")
     else:
-        from wrist_stiffness.commands.compare import compare
+        from wrist_stiffness.report.comparison_lines import comparison_lines
 
         found = compare(models, recordings, this_run(), Progress)
-        lines, values = found.lines(), found.as_values()
+        lines, values = comparison_lines(found), found.as_values()
     print("\n".join(lines))
     if arguments.report:
         from wrist_stiffness.report.comparison_report import report_of_comparison

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from wrist_stiffness.cli.parser import EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO, PROG
 from wrist_stiffness.cli.progress import Progress
@@ -37,6 +38,8 @@ def _run(output: str, seconds: float) -> int:
     from wrist_stiffness.commands.before_after import rms
     from wrist_stiffness.commands.demo import beyond, run_demo
     from wrist_stiffness.commands.table import facts
+    from wrist_stiffness.report.pictures.before_after import draw_before_after
+    from wrist_stiffness.report.table_pictures import draw_maps
     from wrist_stiffness.shipped import shipped_file
 
     model = shipped_file("config/palmieri2015_model.yaml")
@@ -71,7 +74,9 @@ def _run(output: str, seconds: float) -> int:
     print("  (two motors turn the platform about O, they cannot shift it)")
     print(f"  shift s, if a manipulator takes it:{shift[2]:7.2f} um")
     print(f"\nwritten: {output}/live, {output}/replayed")
-    for picture in result.pictures:
+    motion = Path(output) / "before_after.png"
+    draw_before_after(before, after, motion)
+    for picture in (*draw_maps(result.table, output), motion):
         print(f"written: {picture}")
     agreed = live.unexplained == 0 and live.equal > 0
     return EXIT_DONE if agreed else EXIT_NO

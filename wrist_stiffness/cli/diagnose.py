@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from wrist_stiffness.cli.fleet_options import add_fleet_options, for_each
 from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
@@ -75,13 +76,15 @@ def _run(arguments: argparse.Namespace) -> int:
     model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
     recordings = recordings_named(arguments.recordings, arguments)
     if for_each(arguments):
-        from wrist_stiffness.commands.diagnose_fleet import diagnose_each
+        from wrist_stiffness.commands.fleet import each_recording, table_values
+        from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
-        fleet = diagnose_each(
-            model, recordings, this_run(), arguments.scheduler, Progress("recordings")
-        )
-        lines, values = fleet.lines(), fleet.as_values()
+        one = partial(diagnose_recordings, model, run=this_run())
+        rows = each_recording(one, recordings, arguments.scheduler, Progress("recordings"))
+        lines, values = diagnosed_lines(rows), table_values(rows, "diagnosis")
     else:
+        from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
+
         with Status() as status:
             found = diagnose_recordings(
                 model,
@@ -92,12 +95,13 @@ def _run(arguments: argparse.Namespace) -> int:
                 arguments.probability / 100.0,
                 arguments.seconds,
             )
-        lines, values = found.lines(), found.as_values(arguments.ranking)
+        lines, values = diagnosis_lines(found), found.as_values(arguments.ranking)
     print("\n".join(lines))
     if arguments.report:
+        from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
         from wrist_stiffness.report.page import write_page
 
-        write_page(arguments.report, found.report())
+        write_page(arguments.report, report_of_diagnosis(found))
     if arguments.json:
         write_json(arguments.json, values)
     return EXIT_DONE

@@ -75,6 +75,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.this_run import this_run
     from wrist_stiffness.commands.extend import extend_model
     from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.report.fit_lines import extension_lines
     from wrist_stiffness.shipped import shipped_file
 
     require_new_model(arguments)
@@ -86,7 +87,7 @@ def _run(arguments: argparse.Namespace) -> int:
         this_run(),
         Progress("extend"),
     )
-    print("\n".join(found.lines()))
+    print("\n".join(extension_lines(found)))
     print(f"\nwritten: {arguments.output}")
     if arguments.json:
         write_json(arguments.json, found.as_values())

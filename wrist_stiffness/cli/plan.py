@@ -87,26 +87,19 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from pathlib import Path
-
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.commands.plan import (
         Options,
         plan_between_rivals,
         plan_commissioning,
-        write_plan,
     )
     from wrist_stiffness.errors import InputError
+    from wrist_stiffness.report.plan_folder import require_new_folder, write_plan
+    from wrist_stiffness.report.plan_summary import plan_summary
     from wrist_stiffness.shipped import shipped_file
 
-    output = Path(arguments.output)
-    if not output.resolve().parent.is_dir():
-        raise InputError(f"{output} cannot be written: its folder does not exist")
-    if output.exists():
-        raise InputError(
-            f"{output} exists already and is not overwritten; choose another name or remove it"
-        )
+    require_new_folder(arguments.output)
     options = Options(
         arguments.minutes,
         speed_deg_per_s=arguments.speed,
@@ -121,19 +114,21 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.commissioning:
         if arguments.recording:
             raise InputError("--recording belongs to --diagnosis: a commissioning is the first one")
-        known, planned = plan_commissioning(model, arguments.loads, options, progress)
+        planned = plan_commissioning(model, arguments.loads, options, progress)
     else:
         recordings = None
         if arguments.recording:
             recordings = recordings_named(arguments.recording, arguments)
-        known, planned = plan_between_rivals(
+        planned = plan_between_rivals(
             model, arguments.diagnosis, arguments.loads, options, recordings, progress
         )
-    print(planned.text)
+    text = plan_summary(planned)
+    print(text)
     if arguments.json:
         write_json(arguments.json, planned.as_values())
-    if planned.plan.timeline is None:
+    timeline = planned.plan.timeline
+    if timeline is None:
         return EXIT_NO
-    write_plan(known, planned, arguments.output)
+    write_plan(planned.model.table, timeline, text, arguments.output)
     print(f"written: {arguments.output}")
     return EXIT_DONE

@@ -12,7 +12,7 @@ from wrist_stiffness.cli.recording_options import add_recording_options, setting
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.output_changes import TopicChanges
-    from wrist_stiffness.report.replay_summary import ReplaySummary
+    from wrist_stiffness.commands.replay_summary import ReplaySummary
 
 DESCRIPTION = """\
 Run the very code of the nodes over a recording and write it again with predicted pose errors and

@@ -199,6 +199,7 @@ def _show(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands.budget import Push
     from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.lookup.table_file import load_table
+    from wrist_stiffness.report.table_pictures import draw_maps
     from wrist_stiffness.shipped import shipped_file
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
@@ -207,7 +208,7 @@ def _show(arguments: argparse.Namespace) -> int:
         return _show_modes(shown, arguments)
     if arguments.load is not None:
         push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
-    pictures = table.draw_maps(shown, arguments.output, push)
+    pictures = draw_maps(shown, arguments.output, push)
     _print_facts(shown)
     summary = table.summarise(shown)
     print("rated load (1 N downward, own weight left out), operative workspace:")
@@ -229,10 +230,11 @@ def _show(arguments: argparse.Namespace) -> int:
 def _show_modes(shown: Table, arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands import modes
     from wrist_stiffness.commands.json_file import write_json
+    from wrist_stiffness.report.table_pictures import draw_modes
 
     payload = modes.payload_of(arguments.payload, arguments.payload_inertia)
     found = modes.mode_map(shown, payload)
-    pictures = modes.draw_modes(shown, found, arguments.output, payload)
+    pictures = draw_modes(shown, found, arguments.output, payload)
     print("natural frequencies [Hz], motors locked, no damping, operative workspace:")
     summary = {}
     for state in modes.STATES:

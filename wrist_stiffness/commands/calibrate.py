@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wrist_stiffness.atomic_file import require_room
+from wrist_stiffness.commands.fit_values import fit_values, parameter_values
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import (
     Recordings,
@@ -22,16 +23,6 @@ from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.report.fit_report import (
-    Errors,
-    far_lines,
-    fit_values,
-    left_lines,
-    parameter_values,
-    told_lines,
-    untold_lines,
-    used_lines,
-)
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 
@@ -56,39 +47,11 @@ class Calibrated:
     output: Path
     mistake: str
 
-    @property
-    def errors(self) -> Errors:
-        """Before and after."""
-        found = self.calibration
-        rows = {"model as it stands": found.before, "calibrated": found.after}
-        return Errors(rows, found.fit)
-
-    def lines(self) -> list[str]:
-        """Return what a technician reads."""
-        found = self.calibration
-        parameters = found.parameters
-        lines = used_lines(self.sessions, found.fit)
-        lines += ["", *self.errors.lines(), *left_lines(found.fit, found.judged_by)]
-        lines += [self.mistake] if self.mistake else []
-        for session in self.sessions:
-            own = told_lines(each for each in parameters if each.session == session.name)
-            lines += ["", f"set up in {session.name}:", *(own or ["  nothing that the data tell"])]
-        wrist = told_lines(each for each in parameters if each.session is None)
-        lines += ["", "of this wrist:", *(wrist or ["  nothing that the data tell"])]
-        for title, part in (
-            ("farther off than usual:", far_lines(found.fit, parameters)),
-            ("not told by these recordings:", untold_lines(found.fit, parameters)),
-        ):
-            lines += ["", title, *part] if part else []
-        if found.calibrated:
-            lines += ["", f"not fitted, calibrated as the notes say: {', '.join(found.calibrated)}"]
-        return lines
-
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""
         found = self.calibration
         return {
-            **fit_values(self.errors, found.judged_by, self.sessions, found.fit),
+            **fit_values(found.fit, found.before, found.after, found.judged_by, self.sessions),
             "set_up_mistake": self.mistake,
             "calibrated_otherwise": list(found.calibrated),
             "parameters": parameter_values(found.parameters),

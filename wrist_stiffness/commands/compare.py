@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from math import isnan
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from wrist_stiffness.commands.provenance import Provenance, Run
 from wrist_stiffness.commands.read_sessions import (
@@ -19,8 +16,7 @@ from wrist_stiffness.commands.read_sessions import (
     was_fitted_to,
 )
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, Size
-from wrist_stiffness.comparing.sentences import sentences
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.wiring import WORTH_ASKING
 from wrist_stiffness.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.mechanism.components import Array
@@ -77,42 +73,6 @@ class Compared:
         )
         return (*self.remarks, *fitted, drawn)
 
-    def lines(self) -> list[str]:
-        """Return the answer for a terminal."""
-        found = self.comparison
-        out = [*found.verdict, "", *self._table()]
-        last = found.models[-1]
-        out += ["", f"{last.name}: on what the error depends"]
-        out += [f"  - {sentence}" for sentence in sentences(last.explained)]
-        out += ["", f"{last.name}: worst poses", *self._worst_lines(last)]
-        if self.notes:
-            out += ["", *(f"note: {note}" for note in self.notes)]
-        return out
-
-    def _table(self) -> list[str]:
-        found = self.comparison
-        wide = max(38, *(len(model.name) + 4 for model in found.models))
-        keys = [q.key for q in found.quantities]
-        heads = "".join(f"{f'{q.name} [{q.unit}]':>29}" for q in found.quantities)
-        out = [" " * wide + heads, " " * wide + f"{'mean':>11}{'RMS':>9}{'max':>9}" * len(keys)]
-        for title, stage in (
-            ("as it stands", "before"),
-            ("registrations, zeros, tare refitted", "after"),
-        ):
-            out.append(title)
-            for model in found.models:
-                sizes: dict[str, Size] = getattr(model, stage)
-                cells = "".join(
-                    f"{_shown(sizes[k].mean, 4):>11}{_shown(sizes[k].rms, 4):>9}"
-                    f"{_shown(sizes[k].maximum, 4):>9}"
-                    for k in keys
-                )
-                out.append(f"  {model.name:{wide - 2}}{cells}")
-        for title, level in self.levels():
-            cells = "".join(f"{'':11}{_shown(level[k], 4):>9}{'':9}" for k in keys)
-            out.append(f"{title:{wide}}{cells}".rstrip())
-        return out
-
     def levels(self) -> list[tuple[str, dict[str, float]]]:
         """Return what the errors are to be compared with, by name."""
         found, last = self.comparison, self.comparison.models[-1].explained
@@ -126,17 +86,6 @@ class Compared:
         if found.repeated:
             levels.append(("repeatability, from any side", found.repeated))
         return [*levels, ("laws of the conditions, unseen part", found.reachable)]
-
-    def _worst_lines(self, model: ComparedModel) -> list[str]:
-        keys = [q.key for q in self.comparison.quantities]
-        titles = "".join(f"{f'{q.name} [{q.unit}]':>13}" for q in self.comparison.quantities)
-        out = [f"{'time [s]':>10}{'motors [deg]':>18}{'force [N]':>24}{titles}  session"]
-        for pose in self.worst(model):
-            motors = " ".join(f"{angle:.1f}" for angle in pose.theta_deg)
-            force = " ".join(f"{value:.2f}" for value in np.round(pose.load[:3], 2) + 0.0)
-            errors = "".join(f"{_shown(pose.errors[key], 3):>13}" for key in keys)
-            out.append(f"{pose.time_s:10.1f}{motors:>18}{force:>24}{errors}  {pose.session}")
-        return out
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""
@@ -204,13 +153,6 @@ def unique_names(paths: Sequence[str | Path]) -> list[str]:
     return [
         stem if count[stem] == 1 else str(path) for stem, path in zip(stems, paths, strict=True)
     ]
-
-
-def _shown(value: float, digits: int) -> str:
-    """Return a number without an exponent, so that columns stay apart; "-" for what is unknown."""
-    if isnan(value):
-        return "-"
-    return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.{digits}g}"
 
 
 def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:

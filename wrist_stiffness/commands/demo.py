@@ -13,17 +13,13 @@ from wrist_stiffness.commands.before_after import Pass, before_and_after
 from wrist_stiffness.commands.cell import Tell, check_numbers, run_cell
 from wrist_stiffness.commands.compare_runs import RunComparison, compare_runs
 from wrist_stiffness.commands.replay import replay
-from wrist_stiffness.commands.table import draw_maps
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.progress import Progress
 from wrist_stiffness.recording.writer import is_only_recording
-from wrist_stiffness.report.pictures.before_after import draw_before_after
-from wrist_stiffness.report.replay_summary import ReplaySummary
 
 LIVE, REPLAYED = "live", "replayed"
-PICTURES = ("map_s.png", "map_phi.png", "budget.png", "bent.png", "before_after.png")
 
 
 @dataclass(frozen=True)
@@ -34,22 +30,16 @@ class DemoResult:
     ----------
     table : Table
         That the nodes used.
-    replayed : ReplaySummary
-        Of the offline run.
     comparison : RunComparison
         Live against replayed.
     before, after : Pass
         True errors without and with correction.
-    pictures : list of Path
-        PNG files.
     """
 
     table: Table
-    replayed: ReplaySummary
     comparison: RunComparison
     before: Pass
     after: Pass
-    pictures: list[Path]
 
 
 def run_demo(
@@ -59,7 +49,7 @@ def run_demo(
     progress: Callable[[str], Progress],
     tell: Tell,
 ) -> DemoResult:
-    """Run the main job and leave its recordings and pictures in a folder.
+    """Run the main job and leave its recordings in a folder.
 
     Parameters
     ----------
@@ -97,26 +87,19 @@ def run_demo(
             raise InputError(f"{left} is not only a recording and is never overwritten")
     for left in left_over:
         shutil.rmtree(left)
-    for name in PICTURES:
-        (folder / name).unlink(missing_ok=True)
     table = load_model(model).table
-    pictures = draw_maps(table, folder)
     sound = run_cell(
         Path(model), seconds, folder / LIVE, progress=progress("live nodes"), tell=tell
     )
     if not sound:
         raise InputError(f"demo: not every node answered and ended; {folder / LIVE} is kept")
-    replayed = replay(folder / LIVE, model, folder / REPLAYED, progress=progress("replay"))
+    replay(folder / LIVE, model, folder / REPLAYED, progress=progress("replay"))
     before, after = before_and_after(folder / LIVE, table)
-    picture = folder / PICTURES[-1]
-    draw_before_after(before, after, picture)
     return DemoResult(
         table=table,
-        replayed=replayed,
         comparison=compare_runs(folder / LIVE, folder / REPLAYED, model),
         before=before,
         after=after,
-        pictures=[*pictures, picture],
     )
 
 

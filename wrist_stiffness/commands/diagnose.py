@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,28 +18,19 @@ from wrist_stiffness.commands.read_sessions import (
     was_fitted_to,
 )
 from wrist_stiffness.comparing.compare import suspicion_in
-from wrist_stiffness.comparing.sentences import percent
+from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.wiring import WORTH_ASKING, told_mistake
 from wrist_stiffness.comparing.wrong_load import wrong_load
 from wrist_stiffness.identification.free_effects import unfitted
-from wrist_stiffness.identification.taken_up import TakenUp
+from wrist_stiffness.identification.likelihood import WristTable
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
-from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.inference import Diagnosis
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.report.fit_report import TITLES, plus_minus
-from wrist_stiffness.report.verdict import class_of, correction_of, verdict_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
-
-if TYPE_CHECKING:
-    from wrist_stiffness.report.page import Page
-
-
-USUAL = 1.0
-"""Standard deviations of its prior within which a tolerance needs no line of its own."""
 
 FAR_FROM_DRAWN = 3.0
 """Standard deviations of its prior at which a part is softer or stiffer than any is built."""
@@ -74,23 +65,19 @@ class Diagnosed:
         """What the statistics say."""
         return self.answer.diagnosis
 
-    def lines(self) -> list[str]:
-        """Return the answer for a terminal, the verdict first."""
-        result = self.result
-        out = [*([self.mistake, ""] if self.mistake else []), *verdict_lines(result), ""]
-        out += _table(result)
-        for place, finding in enumerate(result.findings, 1):
-            out += ["", *_finding_lines(f"{place}. ", finding)]
-        if result.suspects:
-            out += ["", "not sure enough to be named:"]
-            out += [f"  {class_of(e)}: {percent(e.probability)} sure" for e in result.suspects]
-        if result.not_excited:
-            out += ["", "these recordings cannot show:"]
-            out += [f"  {names}: {needs}" for needs, names in _needs(result).items()]
-        out += ["", "absorbed by calibration, largest first:"]
-        out += taken_up_lines(self.answer.absorbed)
-        out.append(f"held out was {result.scope}")
-        return [*out, *(f"note: {remark}" for remark in (*result.notes, *self.remarks))]
+    def depends(self) -> Explained:
+        """Return what the calibrated model leaves without any effect, and on what it depends."""
+        nominal = self.answer.nominal
+        problem = nominal.problem
+        left = problem.table.with_values(nominal.residual)
+        return explain(
+            left,
+            problem.sessions,
+            nominal.columns,
+            nominal.z,
+            left.measured / WristTable(left, problem.sessions).variance,
+            problem.weights,
+        )
 
     def as_values(self, ranking: bool = False) -> dict[str, Any]:
         """Return what programs read, with units in the names.
@@ -112,19 +99,6 @@ class Diagnosed:
                 name: self.answer.change_by(name).tolist() for name in fitted
             }
         return found
-
-    def report(self) -> Page:
-        """Return the report with pictures."""
-        from wrist_stiffness.report.diagnosis_report import (
-            report_of_diagnosis,
-            shown_by,
-        )
-
-        explained = self.answer.fitted.residual if self.result.findings else None
-        shown = shown_by(self.answer.nominal, explained)
-        return report_of_diagnosis(
-            self.result, shown, self.recordings, self.mistake, self.remarks, self.provenance
-        )
 
 
 def diagnose_recordings(
@@ -225,59 +199,3 @@ def _doubts_load(answer: WristDiagnosis) -> bool:
         each.name.partition("@")[0] for each in answer.absorbed if each.deviations > FAR_FROM_DRAWN
     }
     return not ANSWERS_LOAD.isdisjoint(named | far)
-
-
-def _table(result: Diagnosis) -> list[str]:
-    rows = (
-        ("calibrated model", result.before),
-        ("with the findings", result.after),
-        ("instrument noise", result.noise),
-        ("left above the noise", result.discrepancy),
-    )
-    out = [
-        f"{'RMS, the first two held out':28}" + "".join(f"{TITLES[k]:>12}" for k in result.before)
-    ]
-    return out + [f"  {name:26}" + "".join(f"{row[k]:12.3g}" for k in row) for name, row in rows]
-
-
-def _finding_lines(place: str, finding: Finding) -> list[str]:
-    out = [f"{place}{class_of(finding)}", f"   {finding.evidence}"]
-    out += [
-        f"   {name} = {plus_minus(value, error)}"
-        for name, (value, error) in finding.parameters.items()
-    ]
-    if finding.check:
-        out.append(f"   to be sure: {finding.check}")
-    out.append(f"   reduces the held-out error by {_sizes(finding.buys)}; {correction_of(finding)}")
-    out.append(
-        f"   {percent(finding.probability)} sure; log evidence {finding.log_gain:+.0f} "
-        "against the model without it"
-    )
-    return out
-
-
-def _sizes(sizes: Mapping[str, tuple[float, float]]) -> str:
-    """Return sizes with their uncertainties, by keys such as `s_um`."""
-    parts = []
-    for key, (size, error) in sizes.items():
-        name, _, unit = key.rpartition("_")
-        parts.append(f"{name} {plus_minus(size, error)} {unit}")
-    return ", ".join(parts)
-
-
-def taken_up_lines(absorbed: Sequence[TakenUp]) -> list[str]:
-    """Return set-up and what left its usual range a line each, all the rest in one."""
-    within = [each for each in absorbed if each.parameter and each.deviations <= USUAL]
-    out = [f"  {each.sentence}" for each in absorbed if each not in within]
-    if within:
-        names = ", ".join(each.name for each in within)
-        out.append(f"  within {USUAL:g} standard deviation of their tolerances: {names}")
-    return out
-
-
-def _needs(result: Diagnosis) -> dict[str, str]:
-    """Return what effects need to be recorded, by what it is."""
-    needs: dict[str, list[str]] = {}
-    for each in result.not_excited:
-        needs.setdefault(each.needs, []).append(f"{each.effect}@{each.component}")
-    return {need: ", ".join(names) for need, names in needs.items()}

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from wrist_stiffness.commands.calibrate import writable
+from wrist_stiffness.commands.fit_values import fit_values, parameter_values
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.errors import InputError
@@ -24,23 +25,11 @@ from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate, has_unit
 from wrist_stiffness.model.registry import find_law, law_from_file
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.report.fit_report import (
-    Errors,
-    fit_values,
-    left_lines,
-    parameter_values,
-    plus_minus,
-    told_lines,
-    used_lines,
-)
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 KINDS = ("along", "about")
 AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
 """How `compare` names directions."""
-
-MOST_MOVED = 8
-"""Parameters of the base that are told of, those that moved farthest."""
 
 
 class Addition(Protocol):
@@ -203,50 +192,20 @@ class Extended:
     sessions: tuple[MeasuredSession, ...]
 
     @property
-    def errors(self) -> Errors:
-        """Before and after on the unseen part."""
-        found = self.extension
-        rows = {
-            name: {q.key: left.rmse(q) for q in found.quantities}
-            for name, left in (
-                ("without the effect", found.before),
-                (f"with {found.effect.name}", found.after),
-            )
-        }
-        return Errors(rows, found.fit)
+    def before(self) -> dict[str, float]:
+        """Errors on the unseen part without the effect, RMS by the key of the quantity."""
+        return {q.key: self.extension.before.rmse(q) for q in self.extension.quantities}
 
-    def lines(self) -> list[str]:
-        """Return what a technician reads."""
-        found = self.extension
-        sentence = found.effect.law.sentence.format(place=found.effect.component)
-        lines = [*used_lines(self.sessions, found.fit), ""]
-        lines += [*self.errors.lines(), *left_lines(found.fit, found.judged_by)]
-        lines += ["", f"{found.effect.name}: {sentence}"]
-        usual = all(np.isfinite(parameter.scale) for parameter in found.effect.parameters)
-        lines += told_lines(found.own, all_of_them=True, usual=usual)
-        lines += [f"WARNING: {warning}" for warning in found.warnings]
-        moved = found.base_moved[:MOST_MOVED]
-        lines += (
-            ["", "the rest of the model moved by no more than chance"]
-            if not moved
-            else [
-                "",
-                "what the effect moved in the rest of the model:",
-                *(
-                    f"  {before.effect:30} {before.key:24}"
-                    f"{plus_minus(before.value, before.sigma):>20} -> "
-                    f"{plus_minus(after.value, after.sigma)}"
-                    for before, after in moved
-                ),
-            ]
-        )
-        return lines
+    @property
+    def after(self) -> dict[str, float]:
+        """Errors on the unseen part with it."""
+        return {q.key: self.extension.after.rmse(q) for q in self.extension.quantities}
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""
         found = self.extension
         return {
-            **fit_values(self.errors, found.judged_by, self.sessions, found.fit),
+            **fit_values(found.fit, self.before, self.after, found.judged_by, self.sessions),
             "buys": {key: list(gain) for key, gain in found.bought.items()},
             "effect": found.effect.law.id,
             "component": found.effect.component,

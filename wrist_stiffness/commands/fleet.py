@@ -21,14 +21,17 @@ import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from itertools import islice
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
+from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.reading.folder import recordings_in
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -69,39 +72,6 @@ class FleetRow(Generic[Result]):
         return self.error.removeprefix(f"{self.path}: ").removeprefix(f"{self.path} ")
 
 
-def table_lines(
-    rows: Sequence[FleetRow[Result]],
-    titles: str,
-    cells: Callable[[Result], str],
-    undone: str,
-    mistakes: Callable[[Result], Sequence[str]],
-) -> list[str]:
-    """Return a table for a terminal: a line for each recording, and below what is wrong in a cell.
-
-    Parameters
-    ----------
-    rows : sequence of FleetRow
-        In the order of the lines.
-    titles : str
-        Of the columns beside the recording's.
-    cells : callable
-        What stands there of a result.
-    undone : str
-        What was not done where there is none, in a word.
-    mistakes : callable
-        Of a result, sentences that come below.
-    """
-    wide = max([len("recording"), *(len(str(row.path)) for row in rows)])
-    out, below = [f"{'recording':{wide}}{titles}"], []
-    for row in rows:
-        if row.result is None:
-            out.append(f"{row.path!s:{wide}}  not {undone}: {row.reason}")
-            continue
-        out.append(f"{row.path!s:{wide}}{cells(row.result)}")
-        below += [f"{row.path}: {sentence}" for sentence in mistakes(row.result)]
-    return [*out, *(["", *below] if below else [])]
-
-
 def table_values(rows: Sequence[FleetRow[dict[str, Any]]], what: str) -> dict[str, Any]:
     """Return what programs read of rows: under this name each result, or None and the error."""
     return {
@@ -111,6 +81,51 @@ def table_values(rows: Sequence[FleetRow[dict[str, Any]]], what: str) -> dict[st
             for row in rows
         ],
     }
+
+
+class Told(Protocol):
+    """What a command returns."""
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read."""
+
+
+def each_recording(
+    command: Callable[[Recordings], Told],
+    recordings: Recordings,
+    scheduler_address: str | None,
+    progress: Progress,
+) -> list[FleetRow[dict[str, Any]]]:
+    """Run a command on every recording by itself, as of a wrist of its own, in parallel.
+
+    Parameters
+    ----------
+    command : callable
+        Of recordings; can be pickled.
+    recordings : Recordings
+        Recordings, or folders of them.
+    scheduler_address, progress
+        As those of `map_recordings`.
+
+    Returns
+    -------
+    list of FleetRow
+        With what the command gives for a program.
+
+    Raises
+    ------
+    InputError
+        If there is no recording, or no scheduler answers.
+    """
+    one = partial(_values, command=command, recordings=recordings)
+    paths = recordings_in(recordings.paths)
+    return map_recordings(one, paths, scheduler_address, progress=progress)
+
+
+def _values(
+    path: Path, command: Callable[[Recordings], Told], recordings: Recordings
+) -> dict[str, Any]:
+    return command(replace(recordings, paths=[path])).as_values()
 
 
 def map_recordings(

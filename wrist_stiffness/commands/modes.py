@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.commands.picture_folder import picture_folder
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
@@ -20,8 +18,6 @@ from wrist_stiffness.mechanism.vectors import cross
 
 PER_AXIS = 31
 """Grid of the map; a pose costs some 5 ms for each state of the flanges."""
-
-PICTURED_POSE = np.radians([25.0, -20.0])
 
 STATES = ("open", "at rest", "closed")
 """No flange touches; those touch that do under own weight and payload; all do."""
@@ -134,49 +130,3 @@ def _touching(
         for each in wrench:
             table.check_load(each)
     return respond(table.operators_at(configuration, "closed_form"), wrench).active
-
-
-def draw_modes(
-    table: Table, found: ModeMap, folder: str | Path, payload: RigidBody | None = None
-) -> list[Path]:
-    """Draw the first natural frequency over both motor angles, and the shapes of four modes.
-
-    Parameters
-    ----------
-    table : Table
-        The lookup.
-    found : ModeMap
-        Of the table and the payload.
-    folder : path
-        Where the PNG files go; made if missing.
-    payload : RigidBody, optional
-        What the platform carries.
-
-    Returns
-    -------
-    list of Path
-        `map_mode_1.png` and `mode_shapes.png`.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made.
-    """
-    from wrist_stiffness.report.pictures.bent_wrist import draw_mode_shapes
-    from wrist_stiffness.report.pictures.joint_map import draw_map
-
-    pictures = [picture_folder(folder) / name for name in ("map_mode_1.png", "mode_shapes.png")]
-    carried = "no payload" if payload is None else f"payload {payload.mass:g} kg"
-    draw_map(
-        table,
-        found.poses,
-        found.frequency["at rest"][..., 0],
-        "first natural frequency, motors locked [Hz]",
-        f"{carried}, flanges as they rest",
-        pictures[0],
-    )
-    configuration = table.mechanism.forward(PICTURED_POSE[None])
-    draw_mode_shapes(
-        table, configuration, modes_at(table, configuration, payload, "at rest"), pictures[1]
-    )
-    return pictures

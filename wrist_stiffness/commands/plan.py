@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import os
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness import topics
-from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
@@ -26,12 +21,6 @@ from wrist_stiffness.planning.question import Question, between, commissioning
 from wrist_stiffness.planning.rivals import read_rivals
 from wrist_stiffness.planning.timeline import Experiment, Pace, Timeline
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.recording.messages import JointTrajectory, JointTrajectoryPoint
-from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.report.pictures.experiment_plan import draw_plan
-from wrist_stiffness.report.plan_summary import summary
-
-JOINTS = ("motor_1_joint", "motor_2_joint")
 
 MDEG = float(np.radians(1e-3))
 
@@ -102,18 +91,21 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan and what to say of it.
+    """A plan and what it is for.
 
     Parameters
     ----------
+    model : ErrorModel
+        Of the wrist.
+    question : Question
+        What was asked.
     plan : Plan
         The experiment.
-    text : str
-        For a technician.
     """
 
+    model: ErrorModel
+    question: Question
     plan: Plan
-    text: str
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""
@@ -121,7 +113,7 @@ class Planned:
         return {
             "schema": 1,
             "duration_s": None if timeline is None else timeline.duration_s,
-            "dwells": [] if timeline is None else _rows(timeline),
+            "dwells": [] if timeline is None else plan_rows(timeline),
             "answers": [
                 {
                     "truth": answer.goal.truth,
@@ -139,7 +131,7 @@ class Planned:
 
 def plan_commissioning(
     model_file: str | Path, loads: str | Path, options: Options, progress: Progress | None = None
-) -> tuple[ErrorModel, Planned]:
+) -> Planned:
     """Plan the first experiment on a wrist.
 
     Parameters
@@ -153,8 +145,6 @@ def plan_commissioning(
 
     Returns
     -------
-    ErrorModel
-        Of the file.
     Planned
         The plan.
 
@@ -169,7 +159,7 @@ def plan_commissioning(
     white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
     noise = MeasurementNoise(white, model.table.geometry.limits.encoder_step)
     question = commissioning(np.random.default_rng(options.seed))
-    return model, _planned(model, question, loads, noise, options, (), progress)
+    return _planned(model, question, loads, noise, options, (), progress)
 
 
 def plan_between_rivals(
@@ -179,7 +169,7 @@ def plan_between_rivals(
     options: Options,
     recordings: Recordings | None = None,
     progress: Progress | None = None,
-) -> tuple[ErrorModel, Planned]:
+) -> Planned:
     """Plan the next experiment, between the effects that a diagnosis could not tell apart.
 
     Parameters
@@ -195,8 +185,6 @@ def plan_between_rivals(
 
     Returns
     -------
-    ErrorModel
-        Of the file.
     Planned
         The plan.
 
@@ -212,7 +200,7 @@ def plan_between_rivals(
     if recordings is not None:
         sessions = read_sessions(recordings, [model], silent)
         earlier = [as_experiment(model, session) for session in sessions.values()]
-    return model, _planned(model, question, loads, noise, options, earlier, progress)
+    return _planned(model, question, loads, noise, options, earlier, progress)
 
 
 def _planned(
@@ -232,73 +220,11 @@ def _planned(
         None if options.minutes is None else 60.0 * options.minutes,
         options.seed,
     )
-    found = plan(model, question, conditions, earlier, progress)
-    return Planned(found, summary(found, question))
+    return Planned(model, question, plan(model, question, conditions, earlier, progress))
 
 
-def write_plan(model: ErrorModel, planned: Planned, folder: str | Path) -> None:
-    """Write `plan.csv`, the recording `trajectory`, `plan.png` and `summary.txt`, all or nothing.
-
-    Parameters
-    ----------
-    model : ErrorModel
-        For the picture.
-    planned : Planned
-        With a timeline.
-    folder : path
-        To make; its parent must exist.
-
-    Raises
-    ------
-    InputError
-        If the folder exists or cannot be written.
-    """
-    folder = Path(folder)
-    timeline = planned.plan.timeline
-    if timeline is None:
-        raise InputError(f"{folder}: there is no experiment to write")
-    if folder.exists():
-        raise InputError(
-            f"{folder} exists already and is not overwritten; choose another name or remove it"
-        )
-    partial = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    try:
-        partial.mkdir()
-        with replacing(partial / "plan.csv") as path, path.open("w", newline="") as stream:
-            table = csv.DictWriter(stream, COLUMNS)
-            table.writeheader()
-            table.writerows(_rows(timeline))
-        with RecordingWriter(partial / "trajectory") as recording:
-            recording.write(topics.MOTOR_TRAJECTORY, trajectory(timeline), 0)
-        draw_plan(model.table, timeline, partial / "plan.png")
-        (partial / "summary.txt").write_text(planned.text + "\n", encoding="utf-8")
-        os.rename(partial, folder)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}") from error
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-
-
-def trajectory(timeline: Timeline) -> JointTrajectory:
-    """Return the motors' motion.
-
-    All points are rests: a joint_trajectory_controller joins points with zero velocity and
-    acceleration by the same minimum-jerk moves.
-    """
-    rest = (0.0, 0.0)
-    points = tuple(
-        JointTrajectoryPoint(
-            positions=(float(theta[0]), float(theta[1])),
-            velocities=rest,
-            accelerations=rest,
-            time_from_start_ns=round(1e9 * time_s),
-        )
-        for time_s, theta, _ in timeline.knots[1:]
-    )
-    return JointTrajectory(joint_names=JOINTS, points=points)
-
-
-def _rows(timeline: Timeline) -> list[dict[str, Any]]:
+def plan_rows(timeline: Timeline) -> list[dict[str, Any]]:
+    """Return the measurements at rest, each with the columns of `plan.csv`."""
     rows = []
     for dwell in timeline.dwells:
         angles = np.degrees(dwell.visit.theta)

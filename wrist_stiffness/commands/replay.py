@@ -10,6 +10,7 @@ import numpy as np
 
 from wrist_stiffness.commands.parameter_file import node_settings
 from wrist_stiffness.commands.replay_block import BlockReplay
+from wrist_stiffness.commands.replay_summary import MICROMETRES, MILLIDEGREES, ReplaySummary
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
@@ -45,7 +46,6 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.recording.raw_block import RawMessage
 from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.report.replay_summary import MICROMETRES, MILLIDEGREES, ReplaySummary
 from wrist_stiffness.topics import (
     BASE_FRAME,
     CORRECTED_FRAME,

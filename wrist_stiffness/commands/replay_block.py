@@ -13,6 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.commands.replay_summary import (
+    MICROMETRES,
+    MILLIDEGREES,
+    ReplaySummary,
+)
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
@@ -37,11 +42,6 @@ from wrist_stiffness.recording.messages import (
 )
 from wrist_stiffness.recording.raw_block import Integers, RawBlock
 from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.report.replay_summary import (
-    MICROMETRES,
-    MILLIDEGREES,
-    ReplaySummary,
-)
 from wrist_stiffness.topics import (
     BASE_FRAME,
     CORRECTED_FRAME,

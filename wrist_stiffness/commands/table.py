@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wrist_stiffness.commands.budget import PER_AXIS, Push, budget
-from wrist_stiffness.commands.picture_folder import picture_folder
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.lookup.biharmonic import Kernel
@@ -18,10 +16,6 @@ from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.mechanism.fits import check_fits
 from wrist_stiffness.mechanism.geometry_file import geometry_of
 from wrist_stiffness.progress import Progress, silent
-
-FINE = 161
-
-PICTURED_POSE = np.radians([25.0, -20.0])
 
 MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
 """The corners alone carry no plane to be judged inside; the splines' matrices grow with n^4."""
@@ -147,57 +141,6 @@ def summarise(table: Table) -> MapSummary:
     }
     domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
     return MapSummary(operative, domain)
-
-
-def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> list[Path]:
-    """Draw what a load does: two maps, the error budget, and the bent wrist.
-
-    Parameters
-    ----------
-    table : Table
-        The lookup.
-    folder : path
-        Where the PNG files go; made if missing.
-    push : Push, optional
-        The load; the rated one if None, for which the maps are the table's splines of s and phi
-        (the paper's Figs. 5 and 6), else the closed form.
-
-    Returns
-    -------
-    list of Path
-        `map_s.png`, `map_phi.png`, `budget.png` and `bent.png`.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made.
-    LoadRangeError
-        If the load is outside the table's range.
-    """
-    from wrist_stiffness.report.pictures.bent_wrist import draw_bent_wrist
-    from wrist_stiffness.report.pictures.budget import draw_budget
-    from wrist_stiffness.report.pictures.joint_map import draw_map
-
-    folder = picture_folder(folder)
-    load = push or Push.rated(table)
-    found = budget(table, load)
-    poses = table.workspace.rectangle_grid(FINE if push is None else PER_AXIS)
-    inside = table.workspace.domain(poses)
-    values = np.full((*poses.shape[:-1], 2), np.nan)
-    if push is None:
-        values[inside] = table.map_spline(poses[inside])[:, 3:]
-    else:
-        halves = found.twist.reshape(-1, 2, 3)
-        values[inside] = np.linalg.norm(halves, axis=-1)
-    pictures = [folder / name for name in ("map_s.png", "map_phi.png", "budget.png", "bent.png")]
-    s, phi = MICRO * values[..., 0], MDEG * values[..., 1]
-    label = "shift s of the platform at O [µm]"
-    draw_map(table, poses, s, label, load.text, pictures[0])
-    label = "rotation phi of the platform [mdeg]"
-    draw_map(table, poses, phi, label, load.text, pictures[1])
-    draw_budget(table, found, load.text, pictures[2])
-    draw_bent_wrist(table, PICTURED_POSE, load, pictures[3])
-    return pictures
 
 
 def facts(table: Table) -> Iterable[tuple[str, str]]:

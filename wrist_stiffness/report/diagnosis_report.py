@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from wrist_stiffness.commands.provenance import Provenance
-from wrist_stiffness.comparing.explained import Explained, explain
+from wrist_stiffness.commands.diagnose import Diagnosed
+from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
-from wrist_stiffness.identification.base_fit import BaseFit
-from wrist_stiffness.identification.likelihood import WristTable
 from wrist_stiffness.inference import Diagnosis, Finding, Quantity
-from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.report.fit_report import plus_minus
+from wrist_stiffness.report.diagnosis_lines import (
+    class_of,
+    correction_of,
+    needs_of,
+    rest_lines,
+    verdict_lines,
+)
 from wrist_stiffness.report.page import (
     Bullets,
     Page,
@@ -25,18 +27,13 @@ from wrist_stiffness.report.page import (
 from wrist_stiffness.report.parts import (
     against,
     number,
+    plus_minus,
     provenance_section,
     typeset,
     unit_of,
 )
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars
-from wrist_stiffness.report.verdict import (
-    class_of,
-    correction_of,
-    rest_lines,
-    verdict_lines,
-)
 
 MOST_PICTURED = 4
 """Conditions that are drawn."""
@@ -58,88 +55,25 @@ HOW = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """What the pictures of a diagnosis need beside its result.
-
-    Parameters
-    ----------
-    left : Explained
-        Residuals after the base was refitted, without any effect, and on what they depend.
-    explained : (n, 6) float, optional
-        Residuals with the findings in the model, of the same units.
-    """
-
-    left: Explained
-    explained: Array | None = None
-
-
-def shown_by(nominal: BaseFit, explained: Array | None = None) -> Shown:
-    """Return what the pictures need.
-
-    Parameters
-    ----------
-    nominal : BaseFit
-        The base without any effect.
-    explained : (n, 6) float, optional
-        Residuals with the findings in the model, of the same units.
-    """
-    problem = nominal.problem
-    left = problem.table.with_values(nominal.residual)
-    return Shown(
-        explain(
-            left,
-            problem.sessions,
-            nominal.columns,
-            nominal.z,
-            left.measured / WristTable(left, problem.sessions).variance,
-            problem.weights,
-        ),
-        explained,
-    )
-
-
-def report_of_diagnosis(
-    result: Diagnosis,
-    shown: Shown,
-    recordings: Sequence[str],
-    mistake: str,
-    notes: Sequence[str],
-    provenance: Provenance,
-) -> Page:
-    """Return the report of a diagnosis.
-
-    Parameters
-    ----------
-    result : Diagnosis
-        What the statistics say.
-    shown : Shown
-        For the pictures and the sentences.
-    recordings : sequence of str
-        Names.
-    mistake : str
-        Of the set-up, told first; empty for none.
-    notes : sequence of str
-        What could not be used.
-    provenance : Provenance
-        Files and versions.
-    """
-    quantities, units = shown.left.observations.reported, shown.left.observations.n_units
+def report_of_diagnosis(found: Diagnosed) -> Page:
+    """Return the report of a diagnosis."""
+    result, left = found.result, found.depends()
+    quantities, units = left.observations.reported, left.observations.n_units
     sections = [
         Section("Findings", tuple(_findings(result, quantities))),
         Section("How much it brings", _fall(result, quantities)),
         Section("Every candidate", _ranking(result)),
-        Section("Where it shows", _depends(shown)),
+        Section("Where it shows", _depends(found, left)),
         Section("What remains", _remains(result)),
         Section("What these recordings cannot show", _not_excited(result)),
-        Section("Absorbed by calibration", _absorbed(result, notes)),
+        Section("Absorbed by calibration", _absorbed(result, found.remarks)),
         Section("How it was computed", (Bullets(HOW),)),
-        provenance_section(provenance),
+        provenance_section(found.provenance),
     ]
     return Page(
         "Which physical effect is missing?",
-        f"{', '.join(recordings)}: {units} dwells and half seconds in motion",
-        (*([mistake] if mistake else []), *_verdict(result, quantities)),
+        f"{', '.join(found.recordings)}: {units} dwells and half seconds in motion",
+        (*([found.mistake] if found.mistake else []), *_verdict(result, quantities)),
         tuple(sections),
     )
 
@@ -218,14 +152,14 @@ def _ranking(result: Diagnosis) -> tuple[Part, ...]:
     return (Table(caption, ("effect", "probability", "log evidence", ""), rows),)
 
 
-def _depends(shown: Shown) -> tuple[Part, ...]:
-    left = shown.left
+def _depends(found: Diagnosed, left: Explained) -> tuple[Part, ...]:
     parts: list[Part] = [Bullets(tuple(typeset(line) for line in sentences(left)))]
     if not left.told:
         return tuple(parts)
     series = []
-    if shown.explained is not None:
-        series.append(("with the findings", left.observations.with_values(shown.explained)))
+    if found.result.findings:
+        after = left.observations.with_values(found.answer.fitted.residual)
+        series.append(("with the findings", after))
     pictures = [against(each.curve, each.name, series) for each in left.told[:MOST_PICTURED]]
     parts.append(
         drawn(
@@ -246,10 +180,7 @@ def _remains(result: Diagnosis) -> tuple[Part, ...]:
 def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
     if not result.not_excited:
         return (Text("Every effect of the catalogue would have shown."),)
-    needs: dict[str, list[str]] = {}
-    for each in result.not_excited:
-        needs.setdefault(each.needs, []).append(f"{each.effect} at {each.component}")
-    rows = tuple((", ".join(names), need) for need, names in needs.items())
+    rows = tuple((", ".join(names), need) for need, names in needs_of(result).items())
     return (Table("To be recorded if one of these is suspected.", ("effects", "needs"), rows),)
 
 

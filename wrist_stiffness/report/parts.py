@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isnan
 
+import numpy as np
+
 from wrist_stiffness.commands.provenance import Provenance
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.inference import Observations
@@ -13,6 +15,10 @@ from wrist_stiffness.report.pictures.dependence import Against
 
 SIGNS = {" um": " µm", "+-": "±", "degC": "°C", " deg/s": " °/s"}
 """What a terminal writes in ASCII."""
+
+
+TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
+"""Of columns, by the key of the quantity."""
 
 
 def typeset(text: str) -> str:
@@ -27,11 +33,19 @@ def unit_of(unit: str) -> str:
     return typeset(f" {unit}").strip()
 
 
-def number(value: float) -> str:
-    """Return three significant digits, without an exponent where a person writes none; NaN is -."""
+def number(value: float, digits: int = 3) -> str:
+    """Return significant digits, without an exponent where a person writes none; NaN is -."""
     if isnan(value):
         return "-"
-    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+def plus_minus(value: float, sigma: float) -> str:
+    """Return a value and its uncertainty with two digits of the latter."""
+    digits = 3
+    if np.isfinite(sigma) and sigma > 0.0:
+        digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
+    return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
 
 
 def against(curve: Curve, title: str, models: Sequence[tuple[str, Observations]] = ()) -> Against:

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from wrist_stiffness.commands.plan import Planned
 from wrist_stiffness.planning.aims import LONGER, Answer
 from wrist_stiffness.planning.information import chance_right
 from wrist_stiffness.planning.plan import Plan
-from wrist_stiffness.planning.question import Question
 
 MOST_LINES = 15
 """Of each list; the rest is counted."""
 
 
-def summary(plan: Plan, question: Question) -> str:
-    """Return what a technician wants to know of a plan.
-
-    Parameters
-    ----------
-    plan : Plan
-        The experiment and its answers.
-    question : Question
-        What was asked.
-
-    Returns
-    -------
-    str
-        Lines.
-    """
+def plan_summary(planned: Planned) -> str:
+    """Return what a technician wants to know of a plan, as lines."""
+    plan, question = planned.plan, planned.question
     lines = [_what(plan)]
     seen = [a for a in plan.answers if not a.goal.rival]
     blind = {a.goal.truth for a in seen if not a.settled}

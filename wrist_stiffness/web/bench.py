@@ -17,7 +17,6 @@ import numpy as np
 from wrist_stiffness.analysis import Analysis, Version
 from wrist_stiffness.commands.extend import FormulaEffect
 from wrist_stiffness.commands.import_csv import import_csv
-from wrist_stiffness.commands.plan import Planned, write_plan
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.curve import Curve
@@ -31,6 +30,7 @@ from wrist_stiffness.planning.loads_file import Weight
 from wrist_stiffness.planning.plan import Conditions
 from wrist_stiffness.planning.rivals import Rivals
 from wrist_stiffness.planning.timeline import Pace
+from wrist_stiffness.report.plan_folder import write_plan
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.web.examples import EXAMPLES, recordings_of
@@ -253,7 +253,7 @@ class Bench:
         if found.timeline is None:
             return {"planned": (text, "")}
         name = self._workspace.free("next_experiment")
-        write_plan(analysis.model, Planned(found, text), self._workspace.path(name))
+        write_plan(table, found.timeline, text, self._workspace.path(name))
         return {"planned": (text, name)}
 
     def export(self, number: int) -> Changes:

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.model.formula_law import SIGNALS
-from wrist_stiffness.report.verdict import verdict_lines
+from wrist_stiffness.report.diagnosis_lines import verdict_lines
 from wrist_stiffness.web.formula_form import FormulaForm
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import events, ui
 
-from wrist_stiffness.report.fit_report import plus_minus
+from wrist_stiffness.report.parts import plus_minus
 from wrist_stiffness.web.figures import number
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, save_model
 from wrist_stiffness.planning.plan import Plan
+from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
 from wrist_stiffness.report.page import write_page
 from wrist_stiffness.web.workspace import Workspace
 
@@ -78,7 +79,7 @@ def write_result(
         made = {parent.stem: file_sha256(parent)}
         provenance = Provenance("wrist-stiffness workbench", date, made, hashes)
         answered = Diagnosed(answer, tuple(hashes), "", (), provenance)
-        write_page(workspace.path(files[2]), answered.report())
+        write_page(workspace.path(files[2]), report_of_diagnosis(answered))
     return tuple(files)
 
 

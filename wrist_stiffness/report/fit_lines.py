@@ -1,18 +1,20 @@
-"""What a fit tells: a technician in lines of text, a program in values."""
+"""What a fit tells a technician, in lines of text."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from wrist_stiffness.commands.calibrate import Calibrated
+from wrist_stiffness.commands.extend import Extended
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import Fit, FittedParameter
+from wrist_stiffness.report.parts import TITLES, plus_minus
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
-TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
+MOST_MOVED = 8
+"""Parameters of the base that are told of, those that moved farthest."""
 
 NOT_AT_THE_FLOOR = (
     "an effect is missing ('wrist-stiffness diagnose' finds out which), or the fit was caught "
@@ -26,36 +28,66 @@ JUDGED_BY = {
 }
 
 
-@dataclass(frozen=True)
-class Errors:
-    """Root mean squares by the key of the quantity, in the order in which they are told.
+def calibration_lines(found: Calibrated) -> list[str]:
+    """Return what a technician reads of a calibration."""
+    result, parameters = found.calibration, found.calibration.parameters
+    rows = {"model as it stands": result.before, "calibrated": result.after}
+    lines = _judged_lines(found.sessions, result.fit, result.judged_by, rows)
+    lines += [found.mistake] if found.mistake else []
+    for session in found.sessions:
+        own = told_lines(each for each in parameters if each.session == session.name)
+        lines += ["", f"set up in {session.name}:", *(own or ["  nothing that the data tell"])]
+    wrist = told_lines(each for each in parameters if each.session is None)
+    lines += ["", "of this wrist:", *(wrist or ["  nothing that the data tell"])]
+    for title, part in (
+        ("farther off than usual:", far_lines(result.fit, parameters)),
+        ("not told by these recordings:", untold_lines(result.fit, parameters)),
+    ):
+        lines += ["", title, *part] if part else []
+    if result.calibrated:
+        lines += ["", f"not fitted, calibrated as the notes say: {', '.join(result.calibrated)}"]
+    return lines
 
-    Parameters
-    ----------
-    rows : dict of str to dict
-        Errors by what they are of.
-    fit : Fit
-        What noise alone gives, and what a model leaves above it.
-    """
 
-    rows: Mapping[str, Mapping[str, float]]
-    fit: Fit
+def extension_lines(found: Extended) -> list[str]:
+    """Return what a technician reads of an extension."""
+    result = found.extension
+    effect = result.effect
+    sentence = effect.law.sentence.format(place=effect.component)
+    rows = {"without the effect": found.before, f"with {effect.name}": found.after}
+    lines = _judged_lines(found.sessions, result.fit, result.judged_by, rows)
+    lines += ["", f"{effect.name}: {sentence}"]
+    usual = all(np.isfinite(parameter.scale) for parameter in effect.parameters)
+    lines += told_lines(result.own, all_of_them=True, usual=usual)
+    lines += [f"WARNING: {warning}" for warning in result.warnings]
+    moved = [
+        f"  {before.effect:30} {before.key:24}{plus_minus(before.value, before.sigma):>20} -> "
+        f"{plus_minus(after.value, after.sigma)}"
+        for before, after in result.base_moved[:MOST_MOVED]
+    ]
+    if not moved:
+        return [*lines, "", "the rest of the model moved by no more than chance"]
+    return [*lines, "", "what the effect moved in the rest of the model:", *moved]
 
-    def lines(self) -> list[str]:
-        """Return a table for people."""
-        keys = list(self.fit.noise)
-        out = [" " * 28 + "".join(f"{TITLES.get(key, key):>12}" for key in keys)]
-        for name, row in {**self.rows, "noise and drift alone": self.fit.noise}.items():
-            out.append(f"{name:28}" + "".join(f"{row[key]:12.3f}" for key in keys))
-        return out
 
-    def as_values(self, names: Sequence[str]) -> dict[str, dict[str, float]]:
-        """Return the errors for programs, under names of theirs in the order of the rows."""
-        rows = {
-            name: {f"rmse_{key}": value for key, value in row.items()}
-            for name, row in zip(names, self.rows.values(), strict=True)
-        }
-        return {"noise": dict(self.fit.noise), "discrepancy": dict(self.fit.discrepancy), **rows}
+def _judged_lines(
+    sessions: Sequence[MeasuredSession],
+    fit: Fit,
+    judged_by: str,
+    rows: Mapping[str, Mapping[str, float]],
+) -> list[str]:
+    """Tell what a fit saw, its errors as a table, and how they were judged."""
+    table = {**rows, "noise and drift alone": fit.noise}
+    return [
+        *used_lines(sessions, fit),
+        "",
+        " " * 28 + "".join(f"{TITLES.get(key, key):>12}" for key in fit.noise),
+        *(
+            f"{name:28}" + "".join(f"{row[key]:12.3f}" for key in fit.noise)
+            for name, row in table.items()
+        ),
+        *left_lines(fit, judged_by),
+    ]
 
 
 def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
@@ -145,53 +177,6 @@ def untold_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]
             f"    {law}@{', '.join(places)}: {keys}" for (law, keys), places in effects.items()
         ]
     return lines
-
-
-def parameter_values(parameters: Iterable[FittedParameter]) -> list[dict[str, Any]]:
-    """Return all parameters for programs."""
-    values = []
-    for each in parameters:
-        effect, _, component = each.effect.partition("@")
-        values.append(
-            {
-                "effect": effect,
-                "component": component,
-                "session": each.session,
-                "parameter": each.key,
-                "value": each.value,
-                "sigma": each.sigma,
-                "prior": each.prior,
-                "prior_sigma": each.prior_sigma,
-                "excited": each.excited,
-                "at_bound": each.at_bound,
-                "together_with": list(each.together),
-            }
-        )
-    return values
-
-
-def fit_values(
-    errors: Errors, judged_by: str, sessions: Iterable[MeasuredSession], found: Fit
-) -> dict[str, Any]:
-    """Return what programs read of any fit, with units in the names."""
-    return {
-        "schema": 2,
-        **errors.as_values(("before", "after")),
-        "judged_by": judged_by,
-        "sessions": [
-            {"name": session.name, "remarks": list(session.remarks)} for session in sessions
-        ],
-        "lost": found.lost,
-        "settled": found.arrived,
-    }
-
-
-def plus_minus(value: float, sigma: float) -> str:
-    """Return a value and its uncertainty with two digits of the latter."""
-    digits = 3
-    if np.isfinite(sigma) and sigma > 0.0:
-        digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
-    return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
 
 
 def tolerances(parameter: FittedParameter) -> str:
