@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, PROG, OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, PROG, Commands, add_command
 
 DESCRIPTION = """\
 Start pose_error_predictor, angle_corrector, model_monitor and a virtual wrist as ROS 2 nodes on
@@ -22,15 +22,10 @@ example:
   wrist-stiffness replay live -o replayed"""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `cell`."""
-    parser = commands.add_parser(
-        "cell",
-        help="run the nodes with a virtual wrist",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    what = "run the nodes with a virtual wrist"
+    parser = add_command(commands, "cell", what, (DESCRIPTION, EPILOG), _run, json=False)
     parser.add_argument(
         "--model", type=Path, help="model of the nodes and of the cell (default: the shipped one)"
     )
@@ -40,11 +35,8 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument(
         "--record", type=Path, metavar="OUT", help="recording to write: a folder or a .mcap file"
     )
-    parser.add_argument(
-        "--rate", type=float, default=100.0, metavar="HZ", help="samples per second (default: 100)"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of motion and noise (default: 0)")
-    parser.set_defaults(run=_run)
+    parser.option("--rate", 100.0, "samples per second", "HZ")
+    parser.option("--seed", 0, "of motion and noise")
 
 
 def _run(arguments: argparse.Namespace) -> int:

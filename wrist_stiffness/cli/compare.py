@@ -5,9 +5,14 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from wrist_stiffness.cli.fleet_options import add_fleet_options, for_each
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
-from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
+from wrist_stiffness.cli.options import (
+    add_compared_recordings,
+    for_each,
+    recordings_named,
+)
+from wrist_stiffness.cli.output import say, this_run
+from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.shipped import shipped_file
 
 DESCRIPTION = """\
 Say how far a model is off from recordings with a measured pose of the platform: as it stands, and
@@ -22,39 +27,18 @@ examples:
   wrist-stiffness compare all_wrists --each --json fleet.json"""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `compare`."""
-    parser = commands.add_parser(
-        "compare",
-        help="how far a model is off from recordings, where and when",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        "recordings", nargs="+", metavar="RECORDING", help="recording, or folder of recordings"
-    )
-    parser.add_argument(
-        "--model",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="model file; may be repeated, the first is what the others are to improve upon "
-        "(default: the shipped wrist's)",
-    )
-    parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
-    add_fleet_options(parser)
-    add_recording_options(parser)
-    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
-    parser.set_defaults(run=_run)
+    what = "how far a model is off from recordings, where and when"
+    parser = add_command(commands, "compare", what, (DESCRIPTION, EPILOG), _run)
+    first = "the first is what the others are to improve upon (default: the shipped wrist's)"
+    parser.repeated("--model", "FILE", f"model file; {first}")
+    add_compared_recordings(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.cli.this_run import this_run
     from wrist_stiffness.commands.compare import compare
-    from wrist_stiffness.commands.json_file import write_json
-    from wrist_stiffness.shipped import shipped_file
 
     models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
     recordings = recordings_named(arguments.recordings, arguments)
@@ -64,18 +48,14 @@ def _run(arguments: argparse.Namespace) -> int:
 
         one = partial(compare, models, run=this_run())
         rows = each_recording(one, recordings, arguments.scheduler, Progress("recordings"))
-        lines, values = compared_lines(rows), table_values(rows, "comparison")
-    else:
-        from wrist_stiffness.report.comparison_lines import comparison_lines
+        return say(arguments, compared_lines(rows), table_values(rows, "comparison"))
+    from wrist_stiffness.report.comparison_lines import comparison_lines
 
-        found = compare(models, recordings, this_run(), Progress)
-        lines, values = comparison_lines(found), found.as_values()
-    print("\n".join(lines))
+    found = compare(models, recordings, this_run(), Progress)
+    code = say(arguments, comparison_lines(found), found.as_values())
     if arguments.report:
         from wrist_stiffness.report.comparison_report import report_of_comparison
         from wrist_stiffness.report.page import write_page
 
         write_page(arguments.report, report_of_comparison(found))
-    if arguments.json:
-        write_json(arguments.json, values)
-    return EXIT_DONE
+    return code

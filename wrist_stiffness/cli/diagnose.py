@@ -5,9 +5,15 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from wrist_stiffness.cli.fleet_options import add_fleet_options, for_each
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
-from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
+from wrist_stiffness.cli.options import (
+    add_compared_recordings,
+    add_model,
+    for_each,
+    model_named,
+    recordings_named,
+)
+from wrist_stiffness.cli.output import say, this_run
+from wrist_stiffness.cli.parser import Commands, add_command
 
 DESCRIPTION = """\
 Say which physical effect a model misses, from recordings with a measured pose of the platform.
@@ -28,80 +34,47 @@ next: 'extend MODEL --effect NAME@COMPONENT' adds what was found; 'plan --diagno
 what to record where rivals remain."""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `diagnose`."""
-    parser = commands.add_parser(
-        "diagnose",
-        help="which physical effect is missing in a model",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        "recordings", nargs="+", metavar="RECORDING", help="recording, or folder of recordings"
-    )
-    parser.add_argument("--model", metavar="FILE", help="model file (default: the shipped wrist's)")
-    parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
-    parser.add_argument(
-        "--probability",
-        type=float,
-        default=90.0,
-        metavar="PERCENT",
-        help="name an effect from this probability on (default: %(default)g)",
-    )
+    what = "which physical effect is missing in a model"
+    parser = add_command(commands, "diagnose", what, (DESCRIPTION, EPILOG), _run)
+    add_model(parser, "--model")
+    parser.option("--probability", 90.0, "name an effect from this probability on", "PERCENT")
     parser.add_argument(
         "--seconds",
         type=float,
         default=float("inf"),
         help="begin no further fit after this time; the answer says what was not tried",
     )
-    parser.add_argument(
-        "--ranking",
-        action="store_true",
-        help="with --json: every candidate, and what each rival changes in every unit",
-    )
-    add_fleet_options(parser)
-    add_recording_options(parser)
-    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
-    parser.set_defaults(run=_run)
+    ranking = "with --json: every candidate, and what each rival changes in every unit"
+    parser.flag("--ranking", ranking)
+    add_compared_recordings(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress, Status
-    from wrist_stiffness.cli.this_run import this_run
     from wrist_stiffness.commands.diagnose import diagnose_recordings
-    from wrist_stiffness.commands.json_file import write_json
-    from wrist_stiffness.shipped import shipped_file
 
-    model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
+    model = model_named(arguments)
     recordings = recordings_named(arguments.recordings, arguments)
+    naming, seconds = arguments.probability / 100.0, arguments.seconds
     if for_each(arguments):
         from wrist_stiffness.commands.fleet import each_recording, table_values
         from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
-        one = partial(diagnose_recordings, model, run=this_run())
+        one = partial(diagnose_recordings, model, run=this_run(), naming=naming, seconds=seconds)
         rows = each_recording(one, recordings, arguments.scheduler, Progress("recordings"))
-        lines, values = diagnosed_lines(rows), table_values(rows, "diagnosis")
-    else:
-        from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
+        return say(arguments, diagnosed_lines(rows), table_values(rows, "diagnosis"))
+    from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
 
-        with Status() as status:
-            found = diagnose_recordings(
-                model,
-                recordings,
-                this_run(),
-                Progress,
-                status,
-                arguments.probability / 100.0,
-                arguments.seconds,
-            )
-        lines, values = diagnosis_lines(found), found.as_values(arguments.ranking)
-    print("\n".join(lines))
+    with Status() as status:
+        found = diagnose_recordings(
+            model, recordings, this_run(), Progress, status, naming, seconds
+        )
+    code = say(arguments, diagnosis_lines(found), found.as_values(arguments.ranking))
     if arguments.report:
         from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
         from wrist_stiffness.report.page import write_page
 
         write_page(arguments.report, report_of_diagnosis(found))
-    if arguments.json:
-        write_json(arguments.json, values)
-    return EXIT_DONE
+    return code

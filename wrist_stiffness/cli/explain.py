@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser, named_numbers
-from wrist_stiffness.cli.pose_options import add_pose_options, whole_load
+from wrist_stiffness.cli.options import add_pose, model_named, whole_load
+from wrist_stiffness.cli.output import say
+from wrist_stiffness.cli.parser import Commands, add_command, named_numbers
+
+POSE = ("X", "Y", "Z", "QX", "QY", "QZ", "QW")
 
 DESCRIPTION = """\
 Say why the platform is off at given motor angles under a given load: the error split by component
@@ -17,19 +20,12 @@ examples:
   wrist-stiffness explain --angles 20 -10 --load 0 0 -1
   wrist-stiffness explain --angles 0 0 --load 0 0 -1 --measured 0.001 0 -0.012 0 0 0.0001 1"""
 
-POSE = ("X", "Y", "Z", "QX", "QY", "QZ", "QW")
 
-
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `explain`."""
-    parser = commands.add_parser(
-        "explain",
-        help="why the platform is off at one pose",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_pose_options(parser)
+    what = "why the platform is off at one pose"
+    parser = add_command(commands, "explain", what, (DESCRIPTION, EPILOG), _run)
+    add_pose(parser)
     parser.add_argument(
         "--measured",
         nargs=7,
@@ -37,63 +33,28 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         metavar=POSE,
         help="measured pose: the platform's point O in wrist_base [mm] and its quaternion",
     )
-    parser.add_argument(
-        "--temperature",
-        action="append",
-        default=[],
-        metavar="PART=DEGC",
-        help="temperature of a component or of ambient; may be given several times",
-    )
-    parser.add_argument(
-        "--covariate",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="value of a covariate that the model's formulas use; may be given several times",
-    )
-    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
-    parser.set_defaults(run=_run)
+    parser.repeated("--temperature", "PART=DEGC", "temperature of a component or of ambient")
+    used = "value of a covariate that the model's formulas use"
+    parser.repeated("--covariate", "NAME=VALUE", used)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from wrist_stiffness.commands.explain import explain
-    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.model.block import Load
-    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.report.pose_lines import explanation_lines
 
     load = np.array(whole_load(arguments.load))
     measured = arguments.measured
     if measured is not None:
         measured = [*(1e-3 * value for value in measured[:3]), *measured[3:]]
-    explanation = explain(
-        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+    found = explain(
+        model_named(arguments),
         np.radians(arguments.angles).tolist(),
         Load(load, arguments.on_platform),
         measured,
         named_numbers(arguments.temperature, "--temperature"),
         named_numbers(arguments.covariate, "--covariate"),
     )
-    values = explanation.as_values()
-    print(f"{'':34}{'s [um]':>9}          {'phi [mdeg]':>12}")
-    for row in values["rows"]:
-        numbers = (row[key] for key in ("s_um", "s_sigma_um", "phi_mdeg", "phi_sigma_mdeg"))
-        print(_line(row["name"], *numbers), row["meaning"])
-    sigma = values["prediction_sigma_um"], values["prediction_sigma_mdeg"]
-    if explanation.measured:
-        print(_line("measured", values["s_um"], 0.0, values["phi_mdeg"], 0.0))
-        print(f"uncertainty of the prediction: {sigma[0]:.3f} um, {sigma[1]:.3f} mdeg")
-        print(values["verdict"])
-    else:
-        print(_line("predicted", values["s_um"], sigma[0], values["phi_mdeg"], sigma[1]))
-    for warning in values["warnings"]:
-        print(f"note: {warning}")
-    if arguments.json:
-        write_json(arguments.json, values)
-    return EXIT_DONE
-
-
-def _line(name: str, s: float, s_sigma: float, phi: float, phi_sigma: float) -> str:
-    spread = [f"+-{sigma:7.3f}" if sigma else " " * 9 for sigma in (s_sigma, phi_sigma)]
-    return f"{name:34}{s:9.3f} {spread[0]} {phi:11.3f} {spread[1]}"
+    return say(arguments, explanation_lines(found), found.as_values())

@@ -5,9 +5,16 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.calibrate import add_fit_options, require_new_model
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser, named_numbers
-from wrist_stiffness.cli.recording_options import recordings_named
+from wrist_stiffness.cli.options import (
+    add_fit,
+    add_model,
+    model_named,
+    recordings_named,
+    require_new_model,
+)
+from wrist_stiffness.cli.output import say, this_run
+from wrist_stiffness.cli.parser import Commands, add_command, named_numbers
+from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.extend import Addition
@@ -29,16 +36,11 @@ In a formula every name that is no signal and no covariate of the recordings is 
 parameter whose name ends in a unit (_um, _mdeg, _N ...) is in SI units inside the formula."""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `extend`."""
-    parser = commands.add_parser(
-        "extend",
-        help="add one effect to a model and fit it",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
+    what = "add one effect to a model and fit it"
+    parser = add_command(commands, "extend", what, (DESCRIPTION, EPILOG), _run)
+    add_model(parser)
     added = parser.add_mutually_exclusive_group(required=True)
     added.add_argument("--effect", metavar="NAME@COMPONENT", help="an effect of the catalogue")
     added.add_argument(
@@ -58,40 +60,27 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         "the component's home frame",
     )
     own.add_argument("--name", default="own_formula", help="its name (default: own_formula)")
-    own.add_argument(
-        "--start",
-        action="append",
-        default=[],
-        metavar="PARAMETER=VALUE",
-        help="size of a parameter that would not surprise, in the unit of its name (default: 1); "
-        "may be repeated",
-    )
-    add_fit_options(parser)
-    parser.set_defaults(run=_run)
+    usual = "size of a parameter that would not surprise, in the unit of its name (default: 1)"
+    parser.repeated("--start", "PARAMETER=VALUE", f"with --formula: {usual}")
+    add_fit(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.cli.this_run import this_run
     from wrist_stiffness.commands.extend import extend_model
-    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.report.fit_lines import extension_lines
-    from wrist_stiffness.shipped import shipped_file
 
     require_new_model(arguments)
     found = extend_model(
-        arguments.model or shipped_file("config/palmieri2015_model.yaml"),
+        model_named(arguments),
         _addition(arguments),
         recordings_named(arguments.fit, arguments),
         arguments.output,
         this_run(),
         Progress("extend"),
     )
-    print("\n".join(extension_lines(found)))
-    print(f"\nwritten: {arguments.output}")
-    if arguments.json:
-        write_json(arguments.json, found.as_values())
-    return EXIT_DONE
+    lines = [*extension_lines(found), "", f"written: {arguments.output}"]
+    return say(arguments, lines, found.as_values())
 
 
 def _addition(arguments: argparse.Namespace) -> Addition:
@@ -101,7 +90,6 @@ def _addition(arguments: argparse.Namespace) -> Addition:
         FormulaEffect,
         direction_of,
     )
-    from wrist_stiffness.errors import InputError
 
     if arguments.formula is None:
         if arguments.component or arguments.direction or arguments.start:

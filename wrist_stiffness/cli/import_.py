@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
+from wrist_stiffness.cli.output import say
+from wrist_stiffness.cli.parser import Commands, add_command
 
 DESCRIPTION = """\
 Make a recording of a table, as a campaign with a CMM, a tracker or dial gauges ends in. Every
@@ -31,62 +32,45 @@ examples:
   wrist-stiffness import gauge.csv -o gauge.mcap --unloaded"""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `import`."""
-    parser = commands.add_parser(
-        "import",
-        help="a table of measured poses (CSV) becomes a recording",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    what = "a table of measured poses (CSV) becomes a recording"
+    parser = add_command(commands, "import", what, (DESCRIPTION, EPILOG), _run)
     parser.add_argument(
         "table", metavar="FILE.csv", help="UTF-8; commas, semicolons or tabs between columns"
     )
     parser.add_argument(
         "-o", "--output", required=True, metavar="RECORDING", help="folder or .mcap file"
     )
-    parser.add_argument(
-        "--unloaded",
-        action="store_true",
-        help="there are no load columns because nothing pulled at the platform",
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing recording")
-    parser.add_argument("--json", metavar="FILE", help="write the summary here as well")
-    parser.set_defaults(run=_run)
+    parser.flag("--unloaded", "there are no load columns because nothing pulled at the platform")
+    parser.flag("--overwrite", "replace an existing recording")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.commands.import_csv import import_csv
-    from wrist_stiffness.commands.json_file import write_json
 
-    imported = import_csv(
+    found = import_csv(
         arguments.table,
         arguments.output,
         arguments.unloaded,
         arguments.overwrite,
         Progress("rows"),
     )
-    print(f"{imported.path}: {imported.rows} rows, {imported.measured} with a measured value")
+    lines = [f"{found.path}: {found.rows} rows, {found.measured} with a measured value"]
     for what, names in (
-        ("temperatures of", imported.temperatures),
-        ("covariates", imported.covariates),
+        ("temperatures of", found.temperatures),
+        ("covariates", found.covariates),
     ):
-        if names:
-            print(f"  {what} {', '.join(names)}")
-    if imported.cut_row:
-        print(f"  row {imported.cut_row}, the last one, is cut and left out")
-    if arguments.json:
-        write_json(
-            arguments.json,
-            {
-                "recording": str(imported.path),
-                "rows": imported.rows,
-                "measured": imported.measured,
-                "temperatures": imported.temperatures,
-                "covariates": imported.covariates,
-                "cut_row": imported.cut_row,
-            },
-        )
-    return EXIT_DONE
+        lines += [f"  {what} {', '.join(names)}"] if names else []
+    if found.cut_row:
+        lines.append(f"  row {found.cut_row}, the last one, is cut and left out")
+    values = {
+        "recording": str(found.path),
+        "rows": found.rows,
+        "measured": found.measured,
+        "temperatures": found.temperatures,
+        "covariates": found.covariates,
+        "cut_row": found.cut_row,
+    }
+    return say(arguments, lines, values)

@@ -33,6 +33,7 @@ from wrist_stiffness.cli.parser import (
     EXIT_INTERRUPTED,
     EXIT_PIPE_CLOSED,
     PROG,
+    Commands,
     OneLineParser,
 )
 from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
@@ -80,7 +81,7 @@ class CommandModule(Protocol):
     workflow it needs, so that `--help` and the other commands do not wait for it.
     """
 
-    def add_parser(self, commands: "argparse._SubParsersAction[OneLineParser]") -> None:
+    def add_parser(self, commands: Commands) -> None:
         """Add this command's parser."""
 
 

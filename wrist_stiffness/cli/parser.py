@@ -2,9 +2,9 @@
 
 import argparse
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeAlias
 
 from wrist_stiffness.errors import InputError
 
@@ -47,6 +47,29 @@ class OneLineParser(argparse.ArgumentParser):
         self.register("action", None, _StoreOnce)
         self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
 
+    def flag(self, name: str, what: str) -> None:
+        """Add an option without a value."""
+        self.add_argument(name, action="store_true", help=what)
+
+    def option(
+        self, name: str, default: float | int | str, what: str, metavar: str | None = None
+    ) -> None:
+        """Add an option with a value like the default, which its help tells."""
+        shown = f"{default:g}" if isinstance(default, float) else default
+        self.add_argument(
+            name,
+            type=type(default),
+            default=default,
+            metavar=metavar,
+            help=f"{what} (default: {shown})",
+        )
+
+    def repeated(self, name: str, metavar: str, what: str) -> None:
+        """Add an option that may be given several times."""
+        self.add_argument(
+            name, action="append", default=[], metavar=metavar, help=f"{what}; may be repeated"
+        )
+
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
@@ -62,6 +85,46 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one line on stderr."""
         self.exit(EXIT_BAD_INPUT, f"{PROG}: error: {message} (see '{self.prog} --help')\n")
+
+
+Commands: TypeAlias = "argparse._SubParsersAction[OneLineParser]"
+
+
+def add_command(
+    commands: Commands,
+    name: str,
+    what: str,
+    texts: tuple[str, str],
+    run: Callable[[argparse.Namespace], int],
+    json: bool = True,
+) -> OneLineParser:
+    """Return the parser of a command that is new.
+
+    Parameters
+    ----------
+    commands
+        Where to.
+    name, what
+        The command, and what it does in a line.
+    texts
+        What its help says before and after the options.
+    run
+        Runs it and returns the exit code.
+    json
+        Whether it gives its result to programs as well.
+    """
+    description, epilog = texts
+    parser = commands.add_parser(
+        name,
+        help=what,
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if json:
+        parser.add_argument("--json", metavar="FILE", help="write the result here as well")
+    parser.set_defaults(run=run)
+    return parser
 
 
 def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
-from wrist_stiffness.cli.recording_options import add_recording_options, recordings_named
+from wrist_stiffness.cli.options import (
+    add_model,
+    add_sensor_names,
+    model_named,
+    recordings_named,
+)
+from wrist_stiffness.cli.output import say
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.errors import InputError
 
 DESCRIPTION = """\
 Plan an experiment: which poses, approached from where, under which of your loads, how long. With
@@ -32,26 +39,16 @@ loads.yaml:
 Exit code 1: no experiment with these loads would settle any of the questions."""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `plan`."""
-    parser = commands.add_parser(
-        "plan",
-        help="plan the first or the next experiment",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("model", nargs="?", help="model file (default: the shipped wrist's)")
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--commissioning", action="store_true", help="the first experiment")
-    what.add_argument("--diagnosis", metavar="FILE", help="result of diagnose --json")
-    parser.add_argument(
-        "--recording",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="recording that the diagnosis read, so that the plan adds to it; may be repeated",
-    )
+    what = "plan the first or the next experiment"
+    parser = add_command(commands, "plan", what, (DESCRIPTION, EPILOG), _run)
+    add_model(parser)
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument("--commissioning", action="store_true", help="the first experiment")
+    which.add_argument("--diagnosis", metavar="FILE", help="result of diagnose --json")
+    earlier = "recording that the diagnosis read, so that the plan adds to it"
+    parser.repeated("--recording", "FILE", earlier)
     parser.add_argument("--loads", metavar="FILE", required=True, help="loads you can apply")
     parser.add_argument("-o", "--output", metavar="PLAN", required=True, help="folder to make")
     parser.add_argument(
@@ -59,19 +56,9 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         type=float,
         help="duration (default with --diagnosis: as long as it takes, up to 60)",
     )
-    parser.add_argument(
-        "--speed", type=float, default=30.0, metavar="DEG_S", help="fastest motor speed (30)"
-    )
-    parser.add_argument(
-        "--dwell",
-        type=float,
-        default=2.0,
-        metavar="S",
-        help="time for one measurement at rest, settling included (default: 2)",
-    )
-    parser.add_argument(
-        "--static", action="store_true", help="the pose sensor measures at rest only (a CMM)"
-    )
+    parser.option("--speed", 30.0, "fastest motor speed", "DEG_S")
+    parser.option("--dwell", 2.0, "time for one measurement at rest, settling included", "S")
+    parser.flag("--static", "the pose sensor measures at rest only (a CMM)")
     parser.add_argument(
         "--noise",
         nargs=2,
@@ -80,24 +67,15 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         metavar=("UM", "MDEG"),
         help="scatter of each component of a measured pose, with --commissioning (1 um, 1 mdeg)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="another one, another plan (0)")
-    add_recording_options(parser)
-    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
-    parser.set_defaults(run=_run)
+    parser.option("--seed", 0, "another one, another plan")
+    add_sensor_names(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.commands.json_file import write_json
-    from wrist_stiffness.commands.plan import (
-        Options,
-        plan_between_rivals,
-        plan_commissioning,
-    )
-    from wrist_stiffness.errors import InputError
+    from wrist_stiffness.commands.plan import Options, plan_between_rivals, plan_commissioning
     from wrist_stiffness.report.plan_folder import require_new_folder, write_plan
     from wrist_stiffness.report.plan_summary import plan_summary
-    from wrist_stiffness.shipped import shipped_file
 
     require_new_folder(arguments.output)
     options = Options(
@@ -109,23 +87,20 @@ def _run(arguments: argparse.Namespace) -> int:
         noise_mdeg=arguments.noise[1],
         seed=arguments.seed,
     )
-    model = arguments.model or shipped_file("config/palmieri2015_model.yaml")
-    progress = Progress("plan")
+    model, loads, progress = model_named(arguments), arguments.loads, Progress("plan")
     if arguments.commissioning:
         if arguments.recording:
             raise InputError("--recording belongs to --diagnosis: a commissioning is the first one")
-        planned = plan_commissioning(model, arguments.loads, options, progress)
+        planned = plan_commissioning(model, loads, options, progress)
     else:
         recordings = None
         if arguments.recording:
             recordings = recordings_named(arguments.recording, arguments)
         planned = plan_between_rivals(
-            model, arguments.diagnosis, arguments.loads, options, recordings, progress
+            model, arguments.diagnosis, loads, options, recordings, progress
         )
     text = plan_summary(planned)
-    print(text)
-    if arguments.json:
-        write_json(arguments.json, planned.as_values())
+    say(arguments, [text], planned.as_values())
     timeline = planned.plan.timeline
     if timeline is None:
         return EXIT_NO

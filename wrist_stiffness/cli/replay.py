@@ -7,8 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wrist_stiffness.cli.options import add_sensor_names, settings_named
 from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
-from wrist_stiffness.cli.recording_options import add_recording_options, settings_named
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.output_changes import TopicChanges
@@ -42,7 +42,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument("recording", help="rosbag2 folder with MCAP storage, or a .mcap file")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder or .mcap file")
     parser.add_argument("--model", help="model file (default: the shipped wrist's)")
-    add_recording_options(parser, "sensor frames, objective, contact policy ...")
+    add_sensor_names(parser, "sensor frames, objective, contact policy ...")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing OUT")
     parser.add_argument(
         "--against", metavar="OLD_OUT", help="earlier replay to compare with: what changed?"

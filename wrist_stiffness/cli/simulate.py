@@ -6,7 +6,10 @@ import argparse
 from math import pi
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
+from wrist_stiffness.cli.options import table_named
+from wrist_stiffness.cli.output import say
+from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:
     from wrist_stiffness.lookup.table import Table
@@ -23,6 +26,7 @@ examples:
   wrist-stiffness simulate -o riddle --blind 7 --seconds 120   # what is it?
   wrist-stiffness simulate -o judge --blind 7 --seconds 120 --day 2   # the same wrist tomorrow
   wrist-stiffness simulate --reveal 7 --seconds 120            # the same options open it"""
+
 
 USUAL_SIZE = 3.0
 """Of an effect that is named without one."""
@@ -44,54 +48,25 @@ USUAL_UNITS = {"rad": (180e3 / pi, "mdeg"), "m": (1e6, "um"), "kg": (1e3, "g"), 
 """Factor and name of the units in which models and diagnoses speak, by that of SI."""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `simulate`."""
-    parser = commands.add_parser(
-        "simulate",
-        help="write a recording of a virtual cell",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    what = "write a recording of a virtual cell"
+    parser = add_command(commands, "simulate", what, (DESCRIPTION, EPILOG), _run)
     parser.add_argument("-o", "--output", metavar="RECORDING", help="rosbag2 folder or .mcap file")
     parser.add_argument("--table", help="table of the true wrist (default: the shipped one)")
-    parser.add_argument("--seconds", type=float, default=60.0, help="duration (default: 60)")
-    parser.add_argument("--rate", type=float, default=100.0, help="samples per second (100)")
-    parser.add_argument("--seed", type=int, default=0, help="of program and noise (default: 0)")
-    parser.add_argument(
-        "--day",
-        type=int,
-        default=1,
-        help="another day of the same wrist and effect: instrument set up anew, other poses, loads "
-        "and noise (default: 1)",
-    )
-    parser.add_argument(
-        "--experiment",
-        default="rich",
-        help="rich, paper, dead_weights or production (default: rich)",
-    )
-    parser.add_argument(
-        "--instrument",
-        default="interferometer",
-        help="pose sensor: interferometer, tracker, cmm, ideal (default: interferometer); "
-        "a cmm measures once in each rest",
-    )
-    parser.add_argument(
-        "--sees",
-        default="pose",
-        help="what the pose sensor sees: pose, points (position alone) or pointing (rotation "
-        "alone) (default: pose)",
-    )
-    parser.add_argument(
-        "--lost-beams",
-        type=float,
-        default=0.0,
-        metavar="SHARE",
-        help="of its samples, half of them missing and half wild; 0.02 is usual (default: 0)",
-    )
-    parser.add_argument(
-        "--base", default="exact", help="exact, or wrong as real wrists are (default: exact)"
-    )
+    parser.option("--seconds", 60.0, "duration")
+    parser.option("--rate", 100.0, "samples per second")
+    parser.option("--seed", 0, "of program and noise")
+    anew = "instrument set up anew, other poses, loads and noise"
+    parser.option("--day", 1, f"another day of the same wrist and effect: {anew}")
+    parser.option("--experiment", "rich", "rich, paper, dead_weights or production")
+    sensors = "interferometer, tracker, cmm, ideal; a cmm measures once in each rest"
+    parser.option("--instrument", "interferometer", f"pose sensor: {sensors}")
+    seen = "pose, points (position alone) or pointing (rotation alone)"
+    parser.option("--sees", "pose", f"what the pose sensor sees: {seen}")
+    lost = "of its samples, half of them missing and half wild; 0.02 is usual"
+    parser.option("--lost-beams", 0.0, lost, "SHARE")
+    parser.option("--base", "exact", "exact, or wrong as real wrists are")
     secret = parser.add_mutually_exclusive_group()
     secret.add_argument(
         "--effect", metavar="NAME@COMPONENT[:FORM]", help="hide this effect (names: docs)"
@@ -101,14 +76,11 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
     parser.add_argument(
         "--size", type=float, help=f"of --effect (default: {USUAL_SIZE:g}); --blind draws its own"
     )
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing recording")
-    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
-    parser.set_defaults(run=_run)
+    parser.flag("--overwrite", "replace an existing recording")
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress, Status
-    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.commands.simulate import (
         DAY_SEEDS,
         check_bounds,
@@ -117,10 +89,7 @@ def _run(arguments: argparse.Namespace) -> int:
         on_day,
         simulate_recording,
     )
-    from wrist_stiffness.errors import InputError
-    from wrist_stiffness.lookup.table_file import load_table
     from wrist_stiffness.recording import RecordingWriter
-    from wrist_stiffness.shipped import shipped_file
 
     if arguments.reveal is not None and arguments.output is not None:
         raise InputError("--reveal tells a secret and writes no recording: leave out -o")
@@ -130,7 +99,7 @@ def _run(arguments: argparse.Namespace) -> int:
             "nothing is hidden"
         )
     check_bounds(arguments.seconds, arguments.rate, arguments.seed)
-    table = load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
+    table = table_named(arguments)
     settings = _settings(arguments)
     on_day(arguments.day, settings)  # Also where nothing is written, there is no such day.
     if arguments.reveal is not None:
@@ -154,17 +123,13 @@ def _run(arguments: argparse.Namespace) -> int:
         Progress("samples"),
         arguments.overwrite,
     )
-    if arguments.json:
-        write_json(
-            arguments.json,
-            {
-                "recording": str(written.path),
-                "samples": written.samples,
-                "seconds": written.seconds,
-            },
-        )
-    print(f"{written.path}: {written.samples} samples, {written.seconds:g} s")
-    return EXIT_DONE
+    values = {
+        "recording": str(written.path),
+        "samples": written.samples,
+        "seconds": written.seconds,
+    }
+    lines = [f"{written.path}: {written.samples} samples, {written.seconds:g} s"]
+    return say(arguments, lines, values)
 
 
 def _settings(arguments: argparse.Namespace) -> CellSettings:
@@ -188,7 +153,6 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     from dataclasses import asdict
 
     from wrist_stiffness.cli.progress import Status
-    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.sessions.refitted import SET_UP
     from wrist_stiffness.simulation.blind import draw
     from wrist_stiffness.simulation.catalogue import ALL
@@ -196,19 +160,19 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     with Status() as status:
         secret = draw(arguments.reveal, table, settings, arguments.seconds, status)
     hidden = secret.hidden
-    if arguments.json:
-        write_json(arguments.json, {"size": secret.size, **asdict(hidden)})
-    print(
+    lines = [
         f"{hidden.effect}@{hidden.component} ({hidden.form}): "
         f"{in_usual_units(hidden.magnitude, ALL[hidden.effect].unit)}, size {secret.size:.3g} "
         "times the noise of one sample"
-    )
+    ]
     if hidden.effect in {law for law, _ in SET_UP}:
-        print("every session sets this up anew: the right diagnosis is that nothing is missing")
+        lines.append(
+            "every session sets this up anew: the right diagnosis is that nothing is missing"
+        )
     values = {name: getattr(arguments, name) for name in DRAWN_FOR}
     told = (f"--{n.replace('_', '-')} {value}" for n, value in values.items() if value is not None)
-    print(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(told)}")
-    return EXIT_DONE
+    lines.append(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(told)}")
+    return say(arguments, lines, {"size": secret.size, **asdict(hidden)})
 
 
 def in_usual_units(magnitude: float, si: str) -> str:

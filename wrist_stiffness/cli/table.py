@@ -6,8 +6,8 @@ import argparse
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from wrist_stiffness.cli.options import whole_load
 from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
-from wrist_stiffness.cli.pose_options import whole_load
 
 if TYPE_CHECKING:
     from wrist_stiffness.lookup.table import Table

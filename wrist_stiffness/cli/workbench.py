@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import EXIT_DONE, OneLineParser
+from wrist_stiffness.cli.parser import EXIT_DONE, Commands, add_command
 
 DESCRIPTION = """\
 Open a page on this machine: drop a recording, see where the error is, which effect is missing and
@@ -18,28 +18,16 @@ examples:
   wrist-stiffness workbench --host 0.0.0.0     other machines too; the address has a token"""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parser of `workbench`."""
-    parser = commands.add_parser(
-        "workbench",
-        help="the same in the browser, on this machine",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        "--folder",
-        default="workbench",
-        help="workspace: recordings and models that the page offers, and what it writes "
-        "(default: %(default)s)",
-    )
-    parser.add_argument("--host", default="127.0.0.1", help="address (default: %(default)s)")
-    parser.add_argument("--port", type=int, default=8080, help="port (default: %(default)s)")
-    parser.add_argument(
-        "--largest-upload", type=int, default=1024, metavar="MB", help="(default: %(default)s)"
-    )
-    parser.add_argument("--no-browser", action="store_true", help="only print the address")
-    parser.set_defaults(run=_run)
+    what = "the same in the browser, on this machine"
+    parser = add_command(commands, "workbench", what, (DESCRIPTION, EPILOG), _run, json=False)
+    where = "workspace: recordings and models that the page offers, and what it writes"
+    parser.option("--folder", "workbench", where)
+    parser.option("--host", "127.0.0.1", "address")
+    parser.option("--port", 8080, "port")
+    parser.option("--largest-upload", 1024, "largest file that the page takes", "MB")
+    parser.flag("--no-browser", "only print the address")
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -1,0 +1,39 @@
+"""What a command says of its result, and of the run that made it."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from wrist_stiffness.cli.parser import EXIT_DONE, PROG
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.provenance import Run
+
+
+def say(arguments: argparse.Namespace, lines: Iterable[str], values: Any) -> int:
+    """Print the answer, write it for programs where `--json` asks for that; return the exit code.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    print("\n".join(lines))
+    if arguments.json:
+        from wrist_stiffness.commands.json_file import write_json
+
+        write_json(arguments.json, values)
+    return EXIT_DONE
+
+
+def this_run() -> Run:
+    """Return the command of this process and the time."""
+    from wrist_stiffness.commands.provenance import Run
+
+    command = shlex.join([PROG, *sys.argv[1:]])
+    return Run(command, datetime.now(UTC).isoformat(timespec="seconds"))
