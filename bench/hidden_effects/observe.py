@@ -23,7 +23,6 @@ from wrist_stiffness.sessions.reading.signals import Signal
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
-from wrist_stiffness.simulation.plausibility import LARGEST
 from wrist_stiffness.simulation.residual import BasePose, base_pose
 from wrist_stiffness.simulation.size import Scale, sample_covariance
 
@@ -201,7 +200,7 @@ def hidden_effects(case: Case) -> tuple[HiddenEffect, ...]:
     if case.ordinary:
         factors = np.exp(SPREAD * np.random.default_rng(shape).normal(size=len(drawn)))
         return tuple(
-            replace(each, magnitude=min(f * each.magnitude, LARGEST[each.effect][0]))
+            replace(each, magnitude=min(f * each.magnitude, ALL[each.effect].largest))
             for each, f in zip(drawn, factors, strict=True)
         )
     return tuple(_sized(scale_of(case), each, case.size) for each in drawn)

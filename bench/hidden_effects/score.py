@@ -15,7 +15,7 @@ from scipy.stats import spearmanr
 from solvers import Answer
 from whitened import Whitened, whitened
 
-from wrist_stiffness.simulation.plausibility import is_plausible
+from wrist_stiffness.simulation.catalogue import is_plausible
 
 Z = 1.96
 """Of a two-sided 95 % interval."""

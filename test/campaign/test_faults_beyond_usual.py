@@ -13,7 +13,7 @@ from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.simulation.makers import Draw
+from wrist_stiffness.simulation.effect_entry import Draw
 
 SECONDS, REACH_S = 60.0, 300.0
 COMMISSIONED = [

@@ -18,8 +18,13 @@ if TYPE_CHECKING:
 
 def add_model(parser: OneLineParser, name: str = "model") -> None:
     """Add the model, as an argument or under the name of an option."""
-    many = {} if name.startswith("-") else {"nargs": "?"}
-    parser.add_argument(name, help="model file (default: the shipped wrist's)", **many)
+    option = name.startswith("-")
+    parser.add_argument(
+        name,
+        nargs=None if option else "?",
+        metavar="FILE" if option else None,
+        help="model file (default: the shipped wrist's)",
+    )
 
 
 def model_named(arguments: argparse.Namespace) -> Path:

@@ -1,15 +1,22 @@
-"""How the laws are drawn: each maker gives a law of the drawn place, form, magnitude and shape."""
+"""The laws that a diagnosis knows by name, and how each is drawn.
+
+The comment says why a wrist with more than the largest magnitude would not work.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 
-from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.components import (
+    ELASTIC,
+    JOINTS,
+    LINKS,
+    MOTORS,
+    PASSIVE_JOINTS,
+    Array,
+)
 from wrist_stiffness.mechanism.vectors import block_diagonal, skew, unit
+from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
 from wrist_stiffness.simulation.laws.added_spring import (
     MountSpring,
     OuterSpring,
@@ -47,66 +54,8 @@ from wrist_stiffness.simulation.laws.pose_sensor import Drift, MeasurementFrame,
 from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
 from wrist_stiffness.simulation.laws.time_delay import TimeDelay
 from wrist_stiffness.simulation.seat import Seat
-from wrist_stiffness.simulation.strangers.motion import OilFilm, Resonance
-from wrist_stiffness.simulation.strangers.places import CableStop, Dent
-from wrist_stiffness.simulation.strangers.slow import FloorTilt, Swelling, ThermalBow
-from wrist_stiffness.simulation.strangers.steps import HeadChange, LooseSeat, PlasticSet
 
-LEVER = 0.03
-"""Arm at which a turn counts like a shift where both are drawn together [m]."""
-
-
-@dataclass(frozen=True)
-class Draw:
-    """What a law is made from."""
-
-    table: Table
-    component: str
-    form: str
-    magnitude: float
-    rng: np.random.Generator
-
-    @property
-    def seat(self) -> Seat:
-        """Bushing of the component, which is a joint."""
-        return Seat.of(self.table.geometry, self.component)
-
-    @property
-    def platform_spot(self) -> Array:
-        """A place near the platform's plate, in U (3,) [m]."""
-        return self.table.geometry.platform.centre + self.rng.uniform(-0.015, 0.015, 3)
-
-    def direction(self) -> Array:
-        """Return a random unit vector (3,)."""
-        return unit(self.rng.normal(size=3))
-
-    def twist(self) -> Array:
-        """Return a random small twist (6,) of the drawn magnitude: a shift and a turn as large."""
-        return self.magnitude * np.concatenate([self.direction(), self.direction() / LEVER])
-
-
-def link_stiffness(d: Draw) -> Law:
-    """Return softer steel, or one bore that gives way."""
-    if d.form == "uniform":
-        return UniformSoftness(d.component, d.magnitude)
-    end = d.table.geometry.link_ends(d.component)[d.rng.integers(2)]
-    return EndHinge(d.component, d.magnitude, d.table.geometry.links[d.component].arc_radius * end)
-
-
-def drive_compliance(d: Draw) -> Law:
-    """Return a linear or a stiffening drive."""
-    axis = d.table.geometry.axes[DRIVEN[d.component]]
-    if d.form == "stiffening":
-        return StiffeningDrive(DRIVEN[d.component], axis, d.magnitude, 0.01)
-    axes = d.table.mechanism.a1, d.table.mechanism.a2
-    return MountSpring(d.component, drive_flexibility(d.component, axes, d.magnitude))
-
-
-def mount_compliance(d: Draw) -> Law:
-    """Return a bracket 20 mm behind the bushing."""
-    seat = Seat.of(d.table.geometry, DRIVEN[d.component])
-    place = seat.centre + 0.02 * seat.axis
-    return MountSpring(d.component, d.magnitude * spring(d, place))
+GROWING = ("link_1", "link_2", "frame", "platform")
 
 
 def spring(d: Draw, place: Array) -> Array:
@@ -119,16 +68,60 @@ def spring(d: Draw, place: Array) -> Array:
     return move @ turn @ np.diag(sizes) @ turn.T @ move.T
 
 
-def outer_spring(on_platform: bool) -> Callable[[Draw], Law]:
-    """Return the maker of a spring under the limbs or behind them."""
+# Aluminium where steel was drawn bends three times as much.
+@effect(LINKS, "-", 0.2, 2.0, 50.0, ("uniform", "hinge"))
+def link_stiffness(d: Draw) -> Law:
+    """Return softer steel, or one bore that gives way."""
+    if d.form == "uniform":
+        return UniformSoftness(d.component, d.magnitude)
+    end = d.table.geometry.link_ends(d.component)[d.rng.integers(2)]
+    return EndHinge(d.component, d.magnitude, d.table.geometry.links[d.component].arc_radius * end)
 
-    def make(d: Draw) -> Law:
-        place = d.platform_spot if on_platform else d.rng.uniform(-0.05, 0.05, 3)
-        return OuterSpring(d.magnitude * spring(d, place), on_platform)
 
-    return make
+# The softest grade of the polymer has a quarter of the modulus.
+@effect(JOINTS, "-", 0.2, 3.0, 50.0)
+def bushing_stiffness(d: Draw) -> Law:
+    """Return softer polymer."""
+    return UniformSoftness(d.component, d.magnitude)
 
 
+# A belt that gives 3 deg at 1 N m is off its wheel.
+@effect(MOTORS, "rad/(N m)", 2e-3, 0.05, 5.0, ("linear", "stiffening"))
+def drive_compliance(d: Draw) -> Law:
+    """Return a linear or a stiffening drive."""
+    axis = d.table.geometry.axes[DRIVEN[d.component]]
+    if d.form == "stiffening":
+        return StiffeningDrive(DRIVEN[d.component], axis, d.magnitude, 0.01)
+    axes = d.table.mechanism.a1, d.table.mechanism.a2
+    return MountSpring(d.component, drive_flexibility(d.component, axes, d.magnitude))
+
+
+# A bracket that gives 10 um at 1 N is seen to move by hand.
+@effect(MOTORS, "m/N", 5e-7, 1e-5, 2e-4)
+def mount_compliance(d: Draw) -> Law:
+    """Return a bracket 20 mm behind the bushing."""
+    seat = Seat.of(d.table.geometry, DRIVEN[d.component])
+    place = seat.centre + 0.02 * seat.axis
+    return MountSpring(d.component, d.magnitude * spring(d, place))
+
+
+# As a bracket.
+@effect(("frame",), "m/N", 5e-7, 1e-5, 2e-4)
+def frame_compliance(d: Draw) -> Law:
+    """Return a spring under the limbs."""
+    place = d.rng.uniform(-0.05, 0.05, 3)
+    return OuterSpring(d.magnitude * spring(d, place), on_platform=False)
+
+
+# As a bracket.
+@effect(("platform",), "m/N", 5e-7, 1e-5, 2e-4)
+def platform_compliance(d: Draw) -> Law:
+    """Return a spring behind the limbs."""
+    return OuterSpring(d.magnitude * spring(d, d.platform_spot), on_platform=True)
+
+
+# 200 g are several times the platform, and a tilt of 4 m/s2 is 24 deg.
+@effect(("platform", *LINKS), "kg", 3e-3, 0.2, 5.0, ("mass", "tilt"))
 def gravity(d: Draw) -> Law:
     """Return a mass, or a tilt with the weight of the magnitude at 50 g."""
     if d.component == "platform":
@@ -141,17 +134,23 @@ def gravity(d: Draw) -> Law:
     return AddedMass(d.component, d.magnitude, place + d.rng.uniform(-0.01, 0.01, 3))
 
 
+# A pin with 0.1 mm of play rattles.
+@effect(JOINTS, "m", 5e-6, 1e-4, 5e-4, ("algebraic", "exponential"))
 def joint_clearance(d: Draw) -> Law:
     """Return play with a random roughness."""
     return JointClearance(d.component, d.seat, d.magnitude, d.rng.uniform(0.005, 0.03), d.form)
 
 
+# Shims are graded in tenths of a millimetre.
+@effect(PASSIVE_JOINTS, "m", 1e-6, 1e-4, 5e-4, ("open", "pressed"))
 def flange_contact(d: Draw) -> Law:
     """Return a flange that was opened or pressed on."""
     sign = 1.0 if d.form == "open" else -1.0
     return FlangeGap(d.component, sign * d.magnitude)
 
 
+# Half of the flexibility is gone under load.
+@effect(JOINTS, "-", 0.2, 0.5, 0.5, ("saturating", "power"))
 def bushing_hardening(d: Draw) -> Law:
     """Return hardening that sets in below 1 N."""
     flexibility = d.table.components.flexibility[ELASTIC.index(d.component)]
@@ -161,6 +160,8 @@ def bushing_hardening(d: Draw) -> Law:
     return BushingHardening(d.component, d.magnitude, energy, d.form)
 
 
+# Dry polymer on rough steel.
+@effect(PASSIVE_JOINTS, "-", 0.1, 0.5, 0.5, ("coulomb", "stribeck"))
 def joint_friction(d: Draw) -> Law:
     """Return friction with a few micrometres of pre-sliding."""
     stribeck = 0.5 if d.form == "stribeck" else 0.0
@@ -168,18 +169,31 @@ def joint_friction(d: Draw) -> Law:
     return JointFriction(d.component, d.seat, d.magnitude, 0.2 * d.magnitude, stiffness, stribeck)
 
 
+# 0.3 deg of lost motion is felt by hand.
+@effect(MOTORS, "rad", 1e-4, 5e-3, 0.02, ("single", "train"))
 def backlash(d: Draw) -> Law:
     """Return one pair of teeth or a train of them."""
     widths = [1.0] if d.form == "single" else [0.4, 0.8, 1.2, 1.6]
     return Backlash(d.component, d.magnitude * np.array(widths))
 
 
+# 1 deg is seen at the home mark.
+@effect(MOTORS, "rad", 2e-4, 0.02, 0.05)
+def encoder_offset(d: Draw) -> Law:
+    """Return a wrong zero."""
+    return EncoderOffset(d.component, d.magnitude)
+
+
+# A disc of 20 mm that is 0.1 mm off its centre.
+@effect(MOTORS, "-", 2e-4, 5e-3, 0.05, ("once", "twice"))
 def encoder_eccentricity(d: Draw) -> Law:
     """Return a disc off its centre, or oval."""
     lobes = {"once": 1, "twice": 2}[d.form]
     return EccentricEncoder(d.component, d.magnitude, d.rng.uniform(0.0, 2.0 * np.pi), lobes)
 
 
+# Teeth of the worst grade.
+@effect(MOTORS, "rad", 1e-4, 2e-3, 0.02, ("single", "train"))
 def transmission_error(d: Draw) -> Law:
     """Return one order or a row of harmonics."""
     count = 1 if d.form == "single" else 3
@@ -188,6 +202,8 @@ def transmission_error(d: Draw) -> Law:
     return TransmissionError(d.component, d.magnitude, orders, phases, 0.3 * (count > 1))
 
 
+# A bore that is 0.2 mm and 0.4 deg off is not assembled.
+@effect(JOINTS, "m", 2e-5, 2e-4, 2e-3)
 def axis_misalignment(d: Draw) -> Law:
     """Return shift and tilt across the axis; along it the joint is free."""
     axis = d.table.geometry.axes[d.component]
@@ -197,6 +213,10 @@ def axis_misalignment(d: Draw) -> Law:
     return AxisMisalignment(d.component, d.seat.to_origin(np.eye(3)) @ local)
 
 
+# The polymer with the largest growth.
+@effect(
+    ("link_1", "link_2", "frame", "platform"), "1/K", 1.2e-5, 1e-4, 2e-2, ("linear", "quadratic")
+)
 def thermal_expansion(d: Draw) -> Law:
     """Return linear or quadratic growth."""
     quadratic = 0.0 if d.form == "linear" else 0.05
@@ -204,6 +224,15 @@ def thermal_expansion(d: Draw) -> Law:
     return ThermalExpansion(d.component, d.magnitude, spots, quadratic)
 
 
+# A polymer at its glass transition loses 5 % in each kelvin.
+@effect(JOINTS, "1/K", 0.01, 0.05, 1.0, ("exponential", "glassy"))
+def thermal_softening(d: Draw) -> Law:
+    """Return softening at the mean temperature of the joined bodies."""
+    return ThermalSoftening(d.component, JOINED[d.component], d.magnitude, d.form)
+
+
+# As much creep as elastic strain.
+@effect(JOINTS, "-", 0.2, 1.0, 2.0, ("standard_solid", "power_law"))
 def creep(d: Draw) -> Law:
     """Return one time constant or a row of three."""
     time_s = d.rng.uniform(5.0, 40.0)
@@ -214,6 +243,8 @@ def creep(d: Draw) -> Law:
     )
 
 
+# A hose, not a cable.
+@effect(("platform",), "N/m", 2.0, 50.0, 500.0, ("smooth", "rubbing"))
 def cable_wrench(d: Draw) -> Law:
     """Return a cable from a random side."""
     azimuth = d.rng.uniform(0.0, 2.0 * np.pi)
@@ -222,17 +253,23 @@ def cable_wrench(d: Draw) -> Law:
     return CableWrench(frame, d.platform_spot, d.magnitude, d.rng.uniform(0.02, 0.06), rub)
 
 
+# Half of the rated force is seen at rest.
+@effect(("load_sensor",), "N", 0.02, 0.5, 5.0, ("constant", "warm_up"))
 def load_bias(d: Draw) -> Law:
     """Return a bias in a random direction."""
     bias = d.magnitude * np.concatenate([d.direction(), 0.01 * d.direction()])
     return LoadBias(bias, 0.0 if d.form == "constant" else d.rng.uniform(60.0, 200.0))
 
 
+# Another sensor's calibration sheet.
+@effect(("load_sensor",), "-", 0.03, 0.3, 20.0, ("scale",))
 def load_scale(d: Draw) -> Law:
     """Return one gain for all axes."""
     return LoadMatrix((1.0 + d.magnitude) * np.eye(6))
 
 
+# A tenth of full scale on the wrong axis: the cable is torn.
+@effect(("load_sensor",), "-", 0.01, 0.1, 5.0)
 def load_cross_talk(d: Draw) -> Law:
     """Return a calibration matrix that is off by the magnitude at random, relative to full scale.
 
@@ -243,111 +280,50 @@ def load_cross_talk(d: Draw) -> Law:
     return LoadMatrix(np.eye(6) + talk)
 
 
-def measured(law: type[MeasurementFrame] | type[TargetMounting]) -> Callable[[Draw], Law]:
-    """Return the maker of a registration error."""
-
-    def make(d: Draw) -> Law:
-        return law(d.twist())
-
-    return make
-
-
-def inertia(d: Draw) -> Law:
-    """Return a tool in motion."""
-    return Inertia(d.magnitude, d.platform_spot, d.rng.uniform(0.01, 0.025))
-
-
-def cable_stop(d: Draw) -> Law:
-    """Return a stop for a random point of the rim."""
-    azimuth = d.rng.uniform(0.0, 2.0 * np.pi)
-    rim = 0.025 * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    up = -unit(d.table.geometry.gravity)
-    return CableStop(d.magnitude, rim, up, -0.005)
-
-
-def dent(d: Draw) -> Law:
-    """Return a dent at a random turn."""
-    lift = d.magnitude * d.direction()
-    return Dent(d.component, d.seat, lift, d.rng.uniform(-0.4, 0.4), d.rng.uniform(0.06, 0.12))
-
-
-def floor_tilt(d: Draw) -> Law:
-    """Return two waves of sway."""
-    sway = d.magnitude * np.stack([d.direction(), 0.6 * d.direction()])
-    return FloorTilt(1.0, d.platform_spot, sway, d.rng.uniform([15.0, 40.0], [30.0, 90.0]))
-
-
-def swelling(d: Draw) -> Law:
-    """Return three waves of humidity."""
-    periods = d.rng.uniform([40.0, 100.0, 250.0], [80.0, 200.0, 500.0])
-    return Swelling(d.component, d.twist(), periods, d.rng.uniform(0.0, 6.0, 3))
-
-
-def plastic_set(d: Draw) -> Law:
-    """Return yielding beyond 0.1 N."""
-    seat = d.seat
-    local = np.concatenate([unit(np.cross(seat.axis, d.direction())), np.zeros(3)])
-    direction = seat.to_origin(np.eye(3)) @ local
-    return PlasticSet(d.component, direction, d.magnitude, 0.1)
-
-
-def loose_seat(d: Draw) -> Law:
-    """Return two seats."""
-    return LooseSeat(d.twist(), d.direction(), 0.004)
-
-
-def bushing_stiffness(d: Draw) -> Law:
-    """Return softer polymer."""
-    return UniformSoftness(d.component, d.magnitude)
-
-
-def encoder_offset(d: Draw) -> Law:
-    """Return a wrong zero."""
-    return EncoderOffset(d.component, d.magnitude)
-
-
-def thermal_softening(d: Draw) -> Law:
-    """Return softening at the mean temperature of the joined bodies."""
-    return ThermalSoftening(d.component, JOINED[d.component], d.magnitude, d.form)
-
-
+# 11 deg are seen by eye.
+@effect(("load_sensor",), "rad", 0.03, 0.2, 3.0)
 def load_misalignment(d: Draw) -> Law:
     """Return a sensor turned about a random axis."""
     return LoadMatrix(turned_sensor(d.magnitude * d.direction()))
 
 
+# As far off as the sensor is long.
+@effect(("load_sensor",), "m", 2e-3, 0.03, 0.5, ("frame", "platform"))
 def load_point(d: Draw) -> Law:
     """Return a lever-arm error in F or in U."""
     return LoadPoint(d.magnitude * d.direction(), d.form == "platform")
 
 
+# Seen by eye.
+@effect(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
+def measurement_frame(d: Draw) -> Law:
+    """Return a registration error of the sensor."""
+    return MeasurementFrame(d.twist())
+
+
+# Seen by eye.
+@effect(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
+def target_mounting(d: Draw) -> Law:
+    """Return a registration error of the target."""
+    return TargetMounting(d.twist())
+
+
+# 0.1 mm in five minutes: the tripod is not fixed.
+@effect(("pose_sensor",), "m", 5e-6, 1e-4, 1e-2, ("linear", "settling", "daily"))
 def drift(d: Draw) -> Law:
     """Return a drift that has its magnitude after 5 minutes."""
     return Drift(d.twist(), 300.0, d.form)
 
 
+# A tenth of a second is a dropped message.
+@effect(("pose_sensor", "load_sensor", *MOTORS), "s", 5e-3, 0.1, 0.5)
 def time_delay(d: Draw) -> Law:
     """Return a late stamp."""
     return TimeDelay(d.component, d.magnitude, d.table.mechanism)
 
 
-def resonance(d: Draw) -> Law:
-    """Return a weakly damped tool."""
-    return Resonance(d.magnitude, d.platform_spot, d.rng.uniform(5.0, 9.0), 0.03)
-
-
-def oil_film(d: Draw) -> Law:
-    """Return a floating pin."""
-    lift = d.magnitude * unit(np.cross(d.seat.axis, d.direction()))
-    return OilFilm(d.component, d.seat, lift, 0.3)
-
-
-def head_change(d: Draw) -> Law:
-    """Return two heads, on both sides of a vertical plane."""
-    normal = d.table.mechanism.n0
-    return HeadChange(d.twist(), unit(np.cross(d.direction(), normal)), normal)
-
-
-def thermal_bow(d: Draw) -> Law:
-    """Return a bow in a random direction."""
-    return ThermalBow(d.twist())
+# More than twenty times the platform.
+@effect(("platform",), "kg", 0.05, 0.5, 50.0)
+def inertia(d: Draw) -> Law:
+    """Return a tool in motion."""
+    return Inertia(d.magnitude, d.platform_spot, d.rng.uniform(0.01, 0.025))
