@@ -125,7 +125,7 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "the time was over",
         "others explain far more, to first order",
         "monday: 5 spikes",
-        "creep at joint_2, creep at joint_5",
+        "creep@joint_2, creep@joint_5",
         "hold a load for 60 s",
         "When motor 1 is approached",
     ):
