@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from before_after import before_and_after
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.commands.before_after import before_and_after
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import (

@@ -2,8 +2,8 @@
 
 import numpy as np
 import yaml
+from compare_runs import compare_runs
 
-from wrist_stiffness.commands.compare_runs import compare_runs
 from wrist_stiffness.commands.replay import pose_message, replay
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.error_model import Load

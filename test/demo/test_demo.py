@@ -1,8 +1,8 @@
 """The demo's folder belongs to its user."""
 
 import pytest
+from run_demo import run_demo
 
-from wrist_stiffness.commands.demo import run_demo
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
 

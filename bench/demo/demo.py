@@ -21,7 +21,7 @@ def main() -> int:
     int
         0 done, 1 live and replayed predictions do not agree, 2 a step failed.
     """
-    parser = argparse.ArgumentParser(prog="python -m wrist_stiffness.cli.demo", description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", default="demo", help="folder (default: demo)")
     parser.add_argument("--seconds", type=float, default=SECONDS, help="of the live run")
     arguments = parser.parse_args()
@@ -34,11 +34,11 @@ def main() -> int:
 
 def _run(output: str, seconds: float) -> int:
     import numpy as np
+    from before_after import rms
+    from picture import draw_before_after
+    from run_demo import beyond, run_demo
 
-    from wrist_stiffness.commands.before_after import rms
-    from wrist_stiffness.commands.demo import beyond, run_demo
     from wrist_stiffness.commands.table import facts
-    from wrist_stiffness.report.pictures.before_after import draw_before_after
     from wrist_stiffness.report.table_pictures import draw_maps
     from wrist_stiffness.shipped import shipped_file
 

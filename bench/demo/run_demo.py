@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from before_after import Pass, before_and_after
+from compare_runs import RunComparison, compare_runs
 
-from wrist_stiffness.commands.before_after import Pass, before_and_after
 from wrist_stiffness.commands.cell import Tell, check_numbers, run_cell
-from wrist_stiffness.commands.compare_runs import RunComparison, compare_runs
 from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from before_after import Pass
 
-from wrist_stiffness.commands.before_after import Pass
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 
