@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from wrist_stiffness.commands.provenance import Provenance, Run
 from wrist_stiffness.commands.read_sessions import (
     Recordings,
     read_sessions,
+    remarks_of,
     sha256_by_name,
     was_fitted_to,
 )
@@ -22,7 +23,6 @@ from wrist_stiffness.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +153,3 @@ def unique_names(paths: Sequence[str | Path]) -> list[str]:
     return [
         stem if count[stem] == 1 else str(path) for stem, path in zip(stems, paths, strict=True)
     ]
-
-
-def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
-    """Return what the sessions say of themselves, each with its session's name."""
-    return tuple(f"{session.name}: {remark}" for session in sessions for remark in session.remarks)

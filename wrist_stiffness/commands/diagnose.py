@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.commands.compare import remarks_of
 from wrist_stiffness.commands.provenance import Provenance, Run
 from wrist_stiffness.commands.read_sessions import (
     Recordings,
     read_sessions,
+    remarks_of,
     sha256_by_name,
     was_fitted_to,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -123,6 +123,11 @@ def _without_signal(session: MeasuredSession, models: Sequence[ErrorModel]) -> l
     first = replace(first, theta=np.zeros((1, 2)), load=np.zeros((1, 6)))
     warnings = (warning for model in models for warning in model.batch(first).warnings)
     return list(dict.fromkeys(each for each in warnings if each.endswith(LEFT_OUT)))
+
+
+def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
+    """Return what the sessions say of themselves, each with its session's name."""
+    return tuple(f"{session.name}: {remark}" for session in sessions for remark in session.remarks)
 
 
 def was_fitted_to(model: ErrorModel, sessions: Mapping[Path, MeasuredSession]) -> bool:

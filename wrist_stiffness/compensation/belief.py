@@ -21,7 +21,7 @@ from wrist_stiffness.compensation.payload import (
 from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 
 JUDGE_S = 0.1
 """A contact, a release or a new weight that departs by one threshold is believed after this time,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.compensation.correction import Correction
-from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
+from wrist_stiffness.compensation.measured_pose import NOT_MEASURED
 from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.trajectory import PlannedPoint
 from wrist_stiffness.errors import WristError

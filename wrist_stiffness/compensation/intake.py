@@ -14,7 +14,7 @@ import numpy as np
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
 JOINT_STATE, COMMAND = "joint state", "command"

@@ -9,7 +9,7 @@ from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 
 
 def judged_load(

@@ -14,7 +14,7 @@ from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.errors import InputError, StaleLoadError, WristError
 from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 
 NANOSECONDS = 1_000_000_000
 

@@ -15,6 +15,9 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.readout import fit_markers
 from wrist_stiffness.mechanism.components import Array
 
+NOT_MEASURED = 1.0
+"""A variance of this or more says that a component is not measured [m^2, rad^2]."""
+
 UNIT_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's norm from one."""
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.measured_pose import (
+    NOT_MEASURED,
     FrameMotion,
     measured_pose,
     pose_of_markers,
@@ -34,9 +35,6 @@ JOINT_STATES_KEPT = 1024
 
 JointStateKept = tuple[int, Array, Array | None]
 """Stamp [ns], motor angles [rad] and, where given, motor speeds [rad/s]."""
-
-NOT_MEASURED = 1.0
-"""A variance of this or more says that a component is not measured [m^2, rad^2]."""
 
 
 @dataclass(frozen=True)

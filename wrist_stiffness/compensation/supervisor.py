@@ -46,7 +46,7 @@ from wrist_stiffness.compensation.payload import Payload, PayloadEstimate, Readi
 from wrist_stiffness.compensation.scales import Held, Scales
 from wrist_stiffness.compensation.supervision import State, Supervision, SupervisorSettings
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 
 COMING_IN = "the correction is coming in"
 YIELDED = "the correction yielded to a contact, and comes back when the command leaves this place"

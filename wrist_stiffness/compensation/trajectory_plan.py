@@ -17,7 +17,7 @@ from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
 from wrist_stiffness.mechanism.compiled import CompiledCommands, CorrectedRows, CorrectorState
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 
 AT_ONCE = 8
 """Points that are corrected in one step: up to 40 searches, in a millisecond."""

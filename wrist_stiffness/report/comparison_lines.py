@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from wrist_stiffness.commands.compare import Compared
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.report.parts import number
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.compare import Compared
 
 
 def comparison_lines(compared: Compared) -> list[str]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from wrist_stiffness.commands.compare import Compared
 from wrist_stiffness.comparing.comparison import ComparedModel, lengths
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.inference import Quantity
@@ -26,6 +27,9 @@ from wrist_stiffness.report.parts import (
 )
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars, draw_map, draw_time_line
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.compare import Compared
 
 MOST_PICTURED = 4
 """Conditions that are drawn."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from wrist_stiffness.commands.diagnose import Diagnosed
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.parts import TITLES, plus_minus
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.diagnose import Diagnosed
 
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from wrist_stiffness.commands.diagnose import Diagnosed
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
 from wrist_stiffness.inference import Diagnosis, Finding, Quantity
@@ -34,6 +34,9 @@ from wrist_stiffness.report.parts import (
 )
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.diagnose import Diagnosed
 
 MOST_PICTURED = 4
 """Conditions that are drawn."""

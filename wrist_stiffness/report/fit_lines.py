@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wrist_stiffness.commands.calibrate import Calibrated
-from wrist_stiffness.commands.extend import Extended
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import Fit, FittedParameter
 from wrist_stiffness.report.parts import TITLES, plus_minus
 from wrist_stiffness.sessions.measured_session import MeasuredSession
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.calibrate import Calibrated
+    from wrist_stiffness.commands.extend import Extended
 
 MOST_MOVED = 8
 """Parameters of the base that are told of, those that moved farthest."""

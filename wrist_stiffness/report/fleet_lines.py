@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from wrist_stiffness.commands.fleet import FleetRow
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.report.parts import TITLES
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.fleet import FleetRow
 
 Values = dict[str, Any]
 Rows = Sequence[FleetRow[Values]]

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wrist_stiffness.commands.provenance import Provenance
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.report.page import Section, Table, Text
 from wrist_stiffness.report.pictures.dependence import Against
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.provenance import Provenance
 
 SIGNS = {" um": " µm", "+-": "±", "degC": "°C", " deg/s": " °/s"}
 """What a terminal writes in ASCII."""

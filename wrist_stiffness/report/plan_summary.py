@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from wrist_stiffness.commands.plan import Planned
 from wrist_stiffness.planning.aims import LONGER, Answer
 from wrist_stiffness.planning.information import chance_right
 from wrist_stiffness.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.plan import Planned
 
 MOST_LINES = 15
 """Of each list; the rest is counted."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from wrist_stiffness.commands.explain import Explanation
-from wrist_stiffness.commands.predict import PosePrediction
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.explain import Explanation
+    from wrist_stiffness.commands.predict import PosePrediction
 
 
 def prediction_lines(found: PosePrediction, loaded: bool) -> list[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.compensation.load_history import Zero
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.block import Load
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,8 @@ from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 
-from wrist_stiffness.compensation.monitor_stream import (
-    NOT_MEASURED,
-    MonitoredPose,
-    MonitorStream,
-)
+from wrist_stiffness.compensation.measured_pose import NOT_MEASURED
+from wrist_stiffness.compensation.monitor_stream import MonitoredPose, MonitorStream
 from wrist_stiffness.compensation.parameters import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.ros.conversions import nanoseconds, pose_numbers, three

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.intake import Frames
-from wrist_stiffness.compensation.measured_pose import UNIT_TOLERANCE
-from wrist_stiffness.compensation.monitor_stream import NOT_MEASURED
+from wrist_stiffness.compensation.measured_pose import NOT_MEASURED, UNIT_TOLERANCE
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
