@@ -121,7 +121,7 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert size.value * soft.value > 0.0
     (line,) = (line for line in extension_lines(found) if "sag_mdeg  " in line)
     assert "usual size" not in line
-    before, after = found.errors.rows.values()
+    before, after = found.before, found.after
     assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
     assert before["phi_mdeg"] > 1.5 * after["phi_mdeg"]
     again = {effect.name: effect for effect in load_model(output).effects}["sag@link_2"]
@@ -257,7 +257,7 @@ def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_b
     found, output = extend_by(backlash, replace(session, notes=notes))
     (width,) = found.extension.parameters
     assert abs(width.value - 60.0) < 3.0 * width.sigma < 0.25 * width.value
-    before, after = found.errors.rows.values()
+    before, after = found.before, found.after
     assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
     assert before["phi_mdeg"] > 2.0 * after["phi_mdeg"]
     assert [effect.name for effect in load_model(output).effects] == ["backlash@motor_1"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.report.parts import TITLES
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from wrist_stiffness.commands.fleet import FleetRow
 
 Values = dict[str, Any]
-Rows = Sequence[FleetRow[Values]]
+Rows: TypeAlias = "Sequence[FleetRow[Values]]"
 
 
 def compared_lines(rows: Rows) -> list[str]:
