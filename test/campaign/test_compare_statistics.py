@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import rankdata
 
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.comparing.curve import ranks
 from wrist_stiffness.comparing.explained import explain
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.comparing.set_up import without_set_up
@@ -262,3 +264,9 @@ def test_worst_poses_are_apart_and_in_order(dwells):
     same = {name: np.zeros(N) for name in ("theta_1", "theta_2", "fx", "fy", "fz")}
     once = replace(bad, covariates={**bad.covariates, **same})
     assert len(worst_poses(once, floor, ("day",), most=3)) == 1
+
+
+@pytest.mark.parametrize("levels", [1, 4, 1000])
+def test_ranks_are_those_of_scipy_also_of_ties(levels):
+    values = np.random.default_rng(levels).integers(levels, size=200).astype(float)
+    np.testing.assert_array_equal(ranks(values), rankdata(values))

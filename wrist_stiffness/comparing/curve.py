@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import rankdata
 
 from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.inference.observations import Labels
@@ -237,10 +236,19 @@ def _classes(values: Array, most: int = CLASSES) -> Labels:
     if len(np.unique(rounded)) <= most:
         labels = np.unique(rounded, return_inverse=True)[1]
     else:
-        labels = np.floor((rankdata(rounded) - 0.5) * most / len(values))
+        labels = np.floor((ranks(rounded) - 0.5) * most / len(values))
     return np.unique(labels, return_inverse=True)[1]
 
 
 def _cells(values: Array) -> Labels:
     """Return the cell of a map of each pair of angles [deg]."""
     return np.unique(np.floor(values / CELL_DEG), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def ranks(values: Array) -> Array:
+    """Return the rank of each value (n,) from 1 on, ties at their mean rank.
+
+    That of scipy.stats, whose import costs a command a second.
+    """
+    _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1.0))[place])

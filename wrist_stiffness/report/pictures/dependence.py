@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata
 
-from wrist_stiffness.comparing.curve import CELL_DEG
+from wrist_stiffness.comparing.curve import CELL_DEG, ranks
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.report.pictures.figure import new_figure
 from wrist_stiffness.report.pictures.palette import FLOOR, colour
@@ -100,7 +99,7 @@ def _means(values: Array, residual: Array) -> tuple[list[float], list[float], li
     """Return means over classes of equal numbers of units, with standard errors."""
     rounded = np.round(values, 9)
     # Equal values share a rank, so what is the same condition is one class.
-    classes = np.floor((rankdata(rounded) - 0.5) * CLASSES / len(values))
+    classes = np.floor((ranks(rounded) - 0.5) * CLASSES / len(values))
     at, means, errors = [], [], []
     for place in np.unique(classes):
         own = residual[classes == place]
