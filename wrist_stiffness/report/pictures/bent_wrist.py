@@ -171,7 +171,8 @@ def draw_mode_shapes(
 def _draw_shapes(
     plot: Any, shapes: list[Shape], factor: float, colours: Any, colour_per_metre: float
 ) -> None:
-    for shape in shapes:
+    label = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+    for name, shape in zip((*LINKS, *JOINTS, "platform"), shapes, strict=True):
         # The displacement decides the colour, millimetres the place.
         size = colour_per_metre * np.linalg.norm(shape.shift, axis=-1)
         faces = colours.to_rgba(0.25 * _corner_sum(size))
@@ -183,6 +184,8 @@ def _draw_shapes(
         plot.plot_wireframe(
             *np.moveaxis(rigid, -1, 0), color="grey", linewidth=0.3, rstride=2, cstride=3, alpha=0.5
         )
+        middle = bent[len(bent) // 2].mean(axis=0)
+        plot.text(*middle, name, fontsize=8, ha="center", va="center", bbox=label, zorder=1000)
     plot.set_aspect("equal")
     plot.set_xlabel("x [mm]")
     plot.set_ylabel("y [mm]")
