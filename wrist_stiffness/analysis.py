@@ -27,6 +27,8 @@ from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.proposal import Proposals
+from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.result import Fit
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.identification.wrist_problem import WristProblem
@@ -232,6 +234,22 @@ class Analysis:
         """
         tell = self._watched_words()
         return diagnose_sessions(self._known(), self.sessions, naming, seconds, tell)
+
+    def propose(self, naming: float = NAMING) -> Proposals:
+        """Ask for a law where no effect of the catalogue explains what the newest model leaves.
+
+        Parameters
+        ----------
+        naming : float
+            Probability from which there is a law at all.
+
+        Returns
+        -------
+        Proposals
+            Each of its `terms` has a `sentence`, a `formula`, and an `effect()` for `add`.
+        """
+        problem = self._problem()
+        return propose(problem, problem.begin(), naming, self._watched_words())
 
     def preview(self, candidate: str | Effect) -> Preview:
         """Return what a candidate would explain, without adding it.

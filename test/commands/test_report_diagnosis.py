@@ -105,6 +105,7 @@ def page_of(result, observations, notes=(), mistake=""):
         remarks=notes,
         provenance=PROVENANCE,
         depends=lambda: left,
+        proposed=lambda: [],
     )
     return unescape(html_of(report_of_diagnosis(found)))
 
@@ -139,7 +140,7 @@ def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
     """No effect is as large, and whatever is named stands in for it."""
     page = page_of(RESULT, observations, mistake=MISTAKE)
     assert 0 < page.index("Look at the set-up first") < page.index("Missing in the model")
-    answer = SimpleNamespace(diagnosis=RESULT, absorbed=())
+    answer = SimpleNamespace(diagnosis=RESULT, absorbed=(), proposals=None, strain=None)
     told = Diagnosed(answer, ("monday",), MISTAKE, (), PROVENANCE)
     lines = diagnosis_lines(told)
     assert lines[:2] == [MISTAKE, ""]
@@ -152,7 +153,7 @@ def test_a_mistake_is_looked_for_where_much_is_left(monkeypatch, left, asked):
     """It takes seconds of a long recording, and what effects explain was no mistake."""
     noise = {"s_um": 1.0, "phi_mdeg": 5.0}
     result = replace(RESULT, noise=noise, after={"s_um": 1.0, "phi_mdeg": 5.0 * left})
-    found = SimpleNamespace(diagnosis=result, absorbed=())
+    found = SimpleNamespace(diagnosis=result, absorbed=(), proposals=None, strain=None)
     done = []
     monkeypatch.setattr(diagnose, "diagnose_sessions", lambda *_, **__: found)
     monkeypatch.setattr(diagnose, "suspicion_in", lambda *_: done.append(1))

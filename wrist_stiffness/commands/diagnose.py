@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,10 @@ class Diagnosed:
         What could not be used of the recordings.
     provenance : Provenance
         Files and versions.
+    model : str
+        File of the model.
+    paths : tuple of str
+        Recordings as they were named.
     """
 
     answer: WristDiagnosis
@@ -59,6 +63,8 @@ class Diagnosed:
     mistake: str
     remarks: tuple[str, ...]
     provenance: Provenance
+    model: str = "MODEL"
+    paths: tuple[str, ...] = ("RECORDING",)
 
     @property
     def result(self) -> Diagnosis:
@@ -79,6 +85,12 @@ class Diagnosed:
             problem.weights,
         )
 
+    def proposed(self) -> list[str]:
+        """Return whether tolerances are strained, and the laws for what no effect explains."""
+        found, strain = self.answer.proposals, self.answer.strain
+        told = [strain.sentence] if strain and strain.sentence else []
+        return told + (found.lines(self.model, self.paths) if found else [])
+
     def as_values(self, ranking: bool = False) -> dict[str, Any]:
         """Return what programs read, with units in the names.
 
@@ -90,6 +102,8 @@ class Diagnosed:
         found = {
             **self.result.as_json(ranking),
             "set_up_mistake": self.mistake,
+            "strain": asdict(self.answer.strain) if self.answer.strain else None,
+            "proposals": self.answer.proposals.as_values() if self.answer.proposals else None,
             "notes": [*self.result.notes, *self.remarks],
             "provenance": self.provenance.as_values(),
         }
@@ -151,6 +165,8 @@ def diagnose_recordings(
         mistake,
         remarks_of(sessions.values()),
         Provenance(run.command, run.date, {Path(model).stem: file_sha256(model)}, hashes),
+        str(model),
+        tuple(map(str, recordings.paths)),
     )
 
 

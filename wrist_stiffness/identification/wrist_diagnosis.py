@@ -12,6 +12,9 @@ from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_clean
 from wrist_stiffness.identification.candidates import compensable, turns_normal
 from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.problem import require_units
+from wrist_stiffness.identification.proposal import Proposals
+from wrist_stiffness.identification.proposing import propose
+from wrist_stiffness.identification.strained import Strain, strain
 from wrist_stiffness.identification.taken_up import TakenUp, taken_up
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
@@ -64,6 +67,10 @@ class WristDiagnosis:
         With every set that was fitted, for what each rival would explain.
     classes : tuple of Class
         Of the most probable set.
+    proposals : Proposals, optional
+        Laws for what no effect of the catalogue explains; asked where the verdict is `unknown`.
+    strain : Strain, optional
+        How far all tolerances together are from the drawing.
     """
 
     diagnosis: Diagnosis
@@ -73,6 +80,8 @@ class WristDiagnosis:
     absorbed: tuple[TakenUp, ...]
     search: Search
     classes: tuple[Class, ...]
+    proposals: Proposals | None = None
+    strain: Strain | None = None
 
     @property
     def observations(self) -> Observations:
@@ -180,6 +189,8 @@ def diagnose_sessions(
         absorbed,
         search,
         reading.classes,
+        propose(problem, state.fit, naming, tell) if reading.verdict == "unknown" else None,
+        strain(state.fit),
     )
 
 

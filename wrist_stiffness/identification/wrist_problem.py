@@ -96,7 +96,7 @@ class WristProblem:
         InputError
             If its law finds no equilibrium anywhere near these data.
         """
-        point = self._point(fit)
+        point = self.about(fit)
         if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
             start = Beyond(fit.base, point).best_multiple(effect)
             return WristFit(
@@ -145,14 +145,14 @@ class WristProblem:
     def _catalogue(self, fit: WristFit) -> tuple[WristPoint, dict[str, WristCandidate]]:
         known = self._asked.get(id(fit.base))
         if known is None or known[0] is not fit.base:
-            point = self._point(fit)
+            point = self.about(fit)
             absent = {each.name for each in self._model.effects} | set(fit.names)
             found = {each.name: each for each in wrist_candidates(point, searched(absent))}
             self._asked = {id(fit.base): (fit.base, point, found)}
             known = self._asked[id(fit.base)]
         return known[1], known[2]
 
-    def _point(self, fit: WristFit) -> WristPoint:
+    def about(self, fit: WristFit) -> WristPoint:
         """Return where candidates are asked: beside all but play, of which the whole fit knows.
 
         Play would be solved again for each of them.

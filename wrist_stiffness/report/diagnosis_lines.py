@@ -21,8 +21,8 @@ USUAL = 1.0
 def diagnosis_lines(found: Diagnosed) -> list[str]:
     """Return the answer for a terminal, the verdict first."""
     result = found.result
-    out = [*([found.mistake, ""] if found.mistake else []), *verdict_lines(result), ""]
-    out += _table(result)
+    out = [*([found.mistake, ""] if found.mistake else []), *verdict_lines(result)]
+    out += [*found.proposed(), "", *_table(result)]
     for place, finding in enumerate(result.findings, 1):
         out += ["", *_finding_lines(f"{place}. ", finding)]
     if result.suspects:

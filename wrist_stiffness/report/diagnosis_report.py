@@ -67,7 +67,7 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
         Section("How much it brings", _fall(result, quantities)),
         Section("Every candidate", _ranking(result)),
         Section("Where it shows", _depends(found, left)),
-        Section("What remains", _remains(result)),
+        Section("What remains", _remains(result, found.proposed())),
         Section("What these recordings cannot show", _not_excited(result)),
         Section("Absorbed by calibration", _absorbed(result, found.remarks)),
         Section("How it was computed", (Bullets(HOW),)),
@@ -175,8 +175,8 @@ def _depends(found: Diagnosed, left: Explained) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-def _remains(result: Diagnosis) -> tuple[Part, ...]:
-    lines = rest_lines(result) or ["Nothing beyond the noise."]
+def _remains(result: Diagnosis, proposed: Sequence[str]) -> tuple[Part, ...]:
+    lines = [*(rest_lines(result) or ["Nothing beyond the noise."]), *proposed]
     return tuple(Text(typeset(line)) for line in lines)
 
 

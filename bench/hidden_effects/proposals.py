@@ -1,0 +1,194 @@
+"""Judge the laws that are proposed for effects outside the catalogue and for sound wrists.
+
+    python bench/hidden_effects/proposals.py [--sound 20] [--sizes 3 10] [--output lines.jsonl]
+
+Four of twelve stretches of a session are held out.  The law that is proposed in the others predicts
+them, and so does the discrepancy, a Gaussian process over the conditions of either side.  What each
+removes there of the error beyond set-up and tolerances is compared.  Two minutes, ten samples a
+second, wrong wrists, an interferometer of stated noise; wrists and noise of seeds that nothing else
+uses.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from bench_wrist import Array, wrist
+from cases import Case, one_each
+from observe import as_read, hidden_effects, measured_session, run_cell
+from score import wilson
+
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.proposal import Proposal, twins
+from wrist_stiffness.identification.proposing import propose
+from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.inference.evidence import evidence
+from wrist_stiffness.inference.point import Background
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+from wrist_stiffness.simulation.catalogue import STRANGERS
+
+FIRST_SEED = 7001
+"""Seeds of wrists and noise from here on are used by nothing else."""
+
+STRETCHES = 12
+
+SENSOR = ("frame", "platform")
+"""Where a law of the instrument shows, as its stand or its target."""
+
+
+def cases(sizes: Sequence[float], sound: int) -> list[Case]:
+    """Return strangers at one place each, and sound wrists."""
+    found = [Case((place,), size) for place in one_each(STRANGERS) for size in sizes]
+    found += [Case((), 0.0)] * sound
+    return [replace(case, seed=FIRST_SEED + n) for n, case in enumerate(found)]
+
+
+def without(session: UnitSession, held: Array) -> UnitSession:
+    """Return a session of which some units were not measured; their path stays."""
+    gone = np.where(held[:, None], np.nan, 0.0)
+    return replace(session, shift=session.shift + gone, turn=session.turn + gone)
+
+
+def answer(case: Case) -> dict[str, Any]:
+    """Return the line of one case."""
+    model = ErrorModel("benchmark", wrist(), "closed_form")
+    line: dict[str, Any] = {"seed": case.seed, "size": case.size}
+    line["truth"] = list(case.effects[0][:2]) if case.effects else []
+    try:
+        sample = run_cell(case, hidden_effects(case) if case.effects else (), 0)
+    except InputError as error:
+        return line | {"out_of_reach": str(error)}
+    whole = as_units(model, as_read(measured_session(case, 0, sample)))
+    held = np.isin(time_blocks(np.zeros(len(whole), dtype=np.int64), STRETCHES) % 3, (1,))
+    problem = WristProblem(model, (without(whole, held),))
+    fit = problem.begin()
+    fit.evidence  # noqa: B018  known from the diagnosis, so its time does not count
+    begun = time.process_time()
+    found = propose(problem, fit)
+    line |= {"cpu_s": time.process_time() - begun, "probability": found.probability}
+    line["laws"] = [each.sentence for each in found.terms]
+    line["forms"] = [each.form.name for each in found.terms]
+    line["components"] = [each.component for each in found.terms]
+    if case.effects:
+        place = case.effects[0][1]
+        right = SENSOR if place == "pose_sensor" else (place, *twins(place))
+        line["right_component"] = any(each.component in right for each in found.terms)
+        line["among_components"] = any(name in right for name in found.places)
+        both = WristProblem(model, (whole,))
+        line |= judged(both, held[whole.measured], found.terms)
+    return line
+
+
+def judged(problem: WristProblem, held: Array, laws: Sequence[Proposal]) -> dict[str, float]:
+    """Return the squares left in the held-out units: of nothing, the process and the law."""
+    fit = problem.begin()
+    table, point = problem.table, fit.point
+    rows = held[table.unit]
+    effects = [each.effect(f"law_{n}") for n, each in enumerate(laws)]
+    trials = [(e.law, e.component, {k: v.value for k, v in e.estimates.items()}) for e in effects]
+    change = problem.about(fit).changes(trials).sum(axis=0) if trials else 0.0 * fit.base.residual
+    left = {
+        "nothing": point.left,
+        "process": point.left + process(fit, problem.background, rows),
+        "law": point.left - table.whiten(change),
+    }
+    # Set-up and tolerances may follow on the held-out units, whatever was taken away.
+    prior = np.diag(point.weight)
+    columns = np.vstack([point.columns[rows], prior])
+    found = {}
+    for name, own in left.items():
+        target = np.concatenate([own[rows], np.zeros(len(prior))])
+        step = np.linalg.lstsq(columns, target, rcond=None)[0]
+        found[name] = float(np.sum((target - columns @ step) ** 2))
+    return found | {"numbers": float(rows.sum())}
+
+
+def process(fit: WristFit, ground: Background, rows: Array) -> Array:
+    """Return what the discrepancy, fitted to the other rows, takes away of each row, (N,)."""
+    seen = ~rows
+    groups = tuple(replace(each, columns=each.columns[seen]) for each in ground.groups)
+    point = replace(
+        fit.point,
+        left=fit.point.left[seen],
+        columns=fit.point.columns[seen],
+        inexact=fit.point.inexact[seen],
+        _beside={},
+    )
+    found = evidence(point, replace(ground, groups=groups))
+    law = ground.optional[ground.group]
+    return np.asarray(ground.columns[:, law] @ found.unnamed[law])
+
+
+def table(lines: Sequence[dict[str, Any]]) -> str:
+    """Return the table of the figures."""
+    strange = [each for each in lines if each["truth"] and "nothing" in each]
+    sound = [each for each in lines if not each["truth"]]
+    rows = ["| effect, size | removed of what the process removes | component | law |", "|-|-|-|-|"]
+    kept = []
+    for each in strange:
+        gains = [each["nothing"] - each[name] for name in ("law", "process")]
+        visible = gains[1] > 3.0 * np.sqrt(2.0 * each["numbers"])
+        share = gains[0] / max(gains[1], 1e-9)
+        if visible:
+            kept.append((share >= 0.5, each["right_component"], bool(each["laws"])))
+        told = f"{100.0 * share:.0f} %" if visible else "not visible"
+        where = "right" if each["right_component"] else "among" if each["among_components"] else "-"
+        laws = "; ".join(each["laws"]) or "none"
+        rows.append(f"| {'@'.join(each['truth'])}, {each['size']:g} | {told} | {where} | {laws} |")
+    for number, what in enumerate(("half of the error removed", "right component", "any law")):
+        hits = sum(each[number] for each in kept)
+        rows.append(_rate(f"visible strangers: {what}", hits, len(kept)))
+    rows.append(_rate("sound wrists: no law", sum(not x["laws"] for x in sound), len(sound)))
+    times = [each["cpu_s"] for each in lines if "cpu_s" in each]
+    rows.append(f"processor time of one search: median {np.median(times):.1f} s")
+    return "\n".join(rows)
+
+
+def _rate(what: str, hits: int, count: int) -> str:
+    low, high = wilson(hits, count) if count else (0.0, 1.0)
+    return f"{what}: {hits} of {count} (95 %: {100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def main() -> None:
+    """Ask every case, print each line and the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sound", type=int, default=20)
+    parser.add_argument("--sizes", type=float, nargs="+", default=[3.0, 10.0])
+    parser.add_argument("--output", type=Path)
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no more after")
+    arguments = parser.parse_args()
+    asked = cases(arguments.sizes, arguments.sound)
+    lines, end = [], time.monotonic() + 60.0 * arguments.minutes
+    for case in np.random.default_rng(0).permutation(np.array(asked, dtype=object)):
+        if time.monotonic() > end:
+            break
+        lines.append(answer(case))
+        print(json.dumps(lines[-1]), flush=True)
+        if arguments.output:
+            with arguments.output.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(lines[-1]) + "\n")
+    print(table(lines))
+    print(f"{len(lines)} of {len(asked)} cases were asked")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""All tolerances together: a wrist that is off its drawing says so, and where to look first."""
+
+from dataclasses import replace
+
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.identification.strained import strain
+from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.model.effect import effect_at
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.simulation.cell import CellSettings
+
+
+@pytest.fixture(scope="module")
+def day(model, in_the_cell):
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=120.0, program_seed=41, base="wrong", base_seed=3
+    )
+    return in_the_cell(model.table, settings, 5)
+
+
+def moved_by(model, session, effects):
+    """The session of a wrist with these effects more."""
+    bare, grown = model.with_effects().batch_with(session.block, [(), effects])
+    change = grown.measured - bare.measured
+    turned = Rotation.from_rotvec(change[:, 3:]).as_matrix() @ session.rotation
+    return replace(session, shift=session.shift + change[:, :3], rotation=turned)
+
+
+def strained(model, session):
+    return strain(WristProblem(model, (as_units(model, session),)).begin())
+
+
+def test_a_wrist_within_its_tolerances_is_not_strained(model, day):
+    found = strained(model, day)
+    assert found.sentence == ""
+    assert found.chance > 0.01
+    assert found.freedom > 5
+    assert found.square < 2.0 * found.freedom
+
+
+def test_parts_that_are_each_a_little_soft_are_too_much_together(model, day):
+    """Each within two and a half standard deviations, which alarms nobody."""
+    laws = [find_law(f"{kind}_stiffness") for kind in ("link", "bushing")]
+    off = tuple(
+        effect_at(law, place, {p.key: 2.5 * p.scale for p in law.parameters(place)})
+        for law in laws
+        for place in law.places
+    )
+    found = strained(model, moved_by(model, day, off))
+    assert found.chance < 1e-3
+    assert found.sentence.startswith("The wrist is outside its tolerances (chi-square")
+
+
+def test_a_load_sensor_far_off_is_to_be_measured_first(model, day):
+    """It says a third too little."""
+    wrong = replace(day, block=replace(day.block, load=day.block.load / 1.5))
+    found = strained(model, wrong)
+    assert found.first == "load_scale@load_sensor scale_percent"
+    assert found.times < -4.0
+    assert "times its tolerance; with that all others are within theirs" in found.sentence

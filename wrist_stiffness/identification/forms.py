@@ -1,0 +1,289 @@
+"""A small library of physical forms over the recorded signals, for a law that nobody wrote yet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.formula import Formula, Past
+from wrist_stiffness.model.formula_law import TEMPERATURE
+
+Shape = tuple[float, ...]
+
+WAVES = tuple(0.5 * n for n in range(1, 21))
+"""Waves over the range of an angle that are tried: from a bow to a tenth of it."""
+
+PHASES = tuple(np.pi * n / 4.0 for n in range(4))
+
+MOMENTS = 24
+"""Moments at which a step is tried, in all recordings together."""
+
+CENTRES, WIDTHS = 5, (0.15, 0.3)
+"""Centres of zones along each angle, and widths of zones in the range of the angles."""
+
+SLACKS = (0.05, 0.2, 0.5)
+"""Slacks of play that are tried, in half ranges of the signal."""
+
+LATE = 6
+"""Time constants that are tried, from a second to half of the longest recording."""
+
+EVERYWHERE = "poses all over the workspace"
+
+
+@dataclass(frozen=True)
+class Span:
+    """A number inside a form, with the values to try first.
+
+    Parameters
+    ----------
+    grid : tuple of float
+        Increasing.
+    positive : bool
+        Whether its logarithm is what is evenly spread.
+    fixed : bool
+        Whether only values of the grid are tried.
+    """
+
+    grid: Shape
+    positive: bool = False
+    fixed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """How the size of an error may follow from signals.
+
+    Parameters
+    ----------
+    kind : str
+        Sort of law.
+    of : tuple of str
+        Signals.
+    spans : tuple of Span
+        Numbers inside it.
+    write : callable
+        shape -> formula for a size of 1, in the grammar of `model.formula`.
+    tell : callable
+        shape -> the same in words, after a size.
+    needs : str
+        What a recording must have to show it.
+    """
+
+    kind: str
+    of: tuple[str, ...]
+    spans: tuple[Span, ...]
+    write: Callable[[Shape], str]
+    tell: Callable[[Shape], str]
+    needs: str
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """All points of the grid."""
+        return list(product(*(each.grid for each in self.spans)))
+
+    @property
+    def name(self) -> str:
+        """Sort and signals, as a person reads them."""
+        return f"{self.kind} of {' and '.join(self.of)}"
+
+
+def evaluated(text: str, signals: Sequence[Mapping[str, Array]]) -> list[Array]:
+    """Return the values of a formula at the kept moments of each session."""
+    found = []
+    for own in signals:
+        value = Formula(text, tuple(own))(own, Past(own["time"]))
+        found.append(np.broadcast_to(value, own["time"].shape))
+    return found
+
+
+def number(value: float) -> str:
+    """Return a number as it stands in a formula."""
+    return f"{value:.4g}"
+
+
+def _beyond(name: str, value: float, digits: Callable[[float], str] = number) -> str:
+    return f"({name} {'-' if value >= 0.0 else '+'} {digits(abs(value))})"
+
+
+def _moment(value: float) -> str:
+    return f"{value:.2f}"
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a signal, `1` where its name does not say."""
+    if name in ("theta_dot_1", "theta_dot_2"):
+        return "rad/s"
+    if name.startswith("theta") or "theta" in name:
+        return "rad"
+    if name.startswith("W_"):
+        return "N" if name[2] == "f" else "N m"
+    if name.startswith(TEMPERATURE):
+        return "K"
+    return name.rpartition("_")[2] if "_" in name else "unit"
+
+
+def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
+    """Return the forms that recordings may show.
+
+    Parameters
+    ----------
+    signals : sequence of dict of str to (k,) float
+        Values at the kept moments of each session, `time` [s] among them.
+    """
+    pooled = {name: np.concatenate([own[name] for own in signals]) for name in signals[0]}
+    length = max(float(np.ptp(own["time"])) for own in signals)
+    late = Span(tuple(np.geomspace(1.0, max(0.5 * length, 4.0), LATE)), positive=True)
+    moving = [name for name, own in pooled.items() if name != "time" and _moves(own)]
+    others = [name for name in moving if not name.startswith("theta_") or "dot" in name]
+    angles = [name for name in moving if name not in others]
+    found = [each for name in others for each in _of_signal(name, pooled[name], late)]
+    found += [each for name in angles for each in _of_angle(name, pooled[name], late)]
+    if len(angles) == 2:
+        one, two = (pooled[name] for name in angles)
+        found += [_wave("(theta_1 - theta_2)", one - two), _wave("(theta_1 + theta_2)", one + two)]
+        found.append(_zone(one, two))
+    found += _of_time(pooled["time"], length)
+    slow = [name for name in moving if "dot" not in name]
+    found += [_together(*pair, pooled) for pair in combinations(slow, 2)]
+    return found
+
+
+def _moves(values: Array) -> bool:
+    return bool(np.std(values) > 1e-6 * (np.abs(values).max() + 1e-300))
+
+
+def _half_range(values: Array) -> float:
+    low, high = np.percentile(values, (1.0, 99.0))
+    return float(max(high - low, 1e-3 * np.ptp(values))) / 2.0
+
+
+def _of_signal(name: str, values: Array, late: Span) -> list[Form]:
+    unit, half = unit_of(name), _half_range(values)
+    x, of = _zeroed(name, values), (name,)
+    every = f"for every {unit} of {name}"
+    slack = Span(tuple(half * each for each in SLACKS), positive=True)
+    needs = f"{name} over its whole range, at one pose and load"
+    sizes = Span(tuple(half * each for each in (0.1, 0.3, 1.0)), positive=True)
+    low, high = np.percentile(values, (5.0, 95.0))
+    ends = Span(tuple(np.linspace(low, high, 7)[1:-1]))
+    slowly = f"{name} changed and then held for minutes"
+    found = [
+        Form("a share", of, (), lambda s: x, lambda s: every, needs),
+        Form("a square", of, (), lambda s: f"{x} ** 2", lambda s: f"{every} squared", needs),
+        Form("a saturating function", of, (sizes,), lambda s: f"tanh({x} / {number(s[0])})",
+             lambda s: f"as {name} leaves 0, saturating from {number(s[0])} {unit} on", needs),
+        Form("what lies beyond a limit", of, (ends,), lambda s: f"max({_beyond(name, s[0])}, 0)",
+             lambda s: f"{every} above {number(s[0])}", needs),
+        Form("a late follower", of, (late,), lambda s: f"lag({x}, {number(s[0])})",
+             lambda s: f"{every}, {number(s[0])} s late", slowly),
+    ]  # fmt: skip
+    if not (name.startswith(TEMPERATURE) or "dot" in name):
+        # Digits of a thermometer are no events, and nothing plays against a speed.
+        found += [
+            Form("play", of, (slack,), lambda s: f"play({x}, {number(s[0])})",
+                 lambda s: f"{every}, with a slack of {number(s[0])} {unit} to both sides",
+                 f"{name} raised and lowered in turn at one pose"),
+            Form("hysteresis", of, (slack,), lambda s: f"({x} - play({x}, {number(s[0])}))",
+                 lambda s: f"{every} since it turned, {number(s[0])} {unit} at most",
+                 f"{name} raised and lowered in turn at one pose"),
+            Form("a passing answer", of, (late,), lambda s: f"({x} - lag({x}, {number(s[0])}))",
+                 lambda s: f"{every} when it changes, dying away in {number(s[0])} s", slowly),
+        ]  # fmt: skip
+    if values.min() < 0.0 < values.max():
+        found.append(
+            Form("the size", of, (), lambda s: f"abs({x})", lambda s: f"{every} of either sign",
+                 needs)
+        )  # fmt: skip
+    if "dot" in name:
+        found.append(
+            Form("warmth by motion", of, (late,), lambda s: f"lag({x} ** 2, {number(s[0])})",
+                 lambda s: f"{every} squared, {number(s[0])} s late",
+                 f"minutes of fast motion of motor {name[-1]}, then minutes of rest")
+        )  # fmt: skip
+    return found
+
+
+def _zeroed(name: str, values: Array) -> str:
+    """Return a signal as a formula has it; temperatures count from where they began."""
+    return _beyond(name, float(values[0])) if name.startswith(TEMPERATURE) else name
+
+
+def _of_angle(name: str, values: Array, late: Span) -> list[Form]:
+    half, motor = _half_range(values), f"motor {name[-1]}"
+    slack = Span(tuple(half * each for each in (0.01, 0.05, 0.2)), positive=True)
+    return [
+        _wave(name, values),
+        Form("hysteresis", (name,), (slack,), lambda s: f"({name} - play({name}, {number(s[0])}))",
+             lambda s: f"for every rad since {motor} turned back, {number(s[0])} rad at most",
+             f"every pose from both sides of {motor}"),
+        Form("a passing answer", (name,), (late,),
+             lambda s: f"({name} - lag({name}, {number(s[0])}))",
+             lambda s: f"for every rad that {motor} moved, dying away in {number(s[0])} s",
+             f"dwells of minutes after moves of {motor}"),
+    ]  # fmt: skip
+
+
+def _wave(x: str, values: Array) -> Form:
+    whole = 2.0 * _half_range(values)
+    rates = Span(tuple(2.0 * np.pi * waves / whole for waves in WAVES))
+    names = {"(theta_1 - theta_2)": "the difference of the motor angles"}
+    names["(theta_1 + theta_2)"] = "the sum of the motor angles"
+    told = names.get(x, f"the angle of motor {x[-1]}")
+    return Form(
+        "a wave",
+        (x.strip("()"),),
+        (rates, Span(PHASES)),
+        lambda s: f"sin({number(s[0])} * {x} + {number(s[1])})",
+        lambda s: f"as a wave of {number(360.0 / s[0])} deg in {told}",
+        f"{told} in steps far below the wave",
+    )
+
+
+def _zone(one: Array, two: Array) -> Form:
+    spans = []
+    for values in (one, two):
+        low, high = np.percentile(values, (5.0, 95.0))
+        spans.append(Span(tuple(np.linspace(low, high, CENTRES))))
+    wide = 2.0 * max(_half_range(one), _half_range(two))
+    spans.append(Span(tuple(wide * each for each in WIDTHS), positive=True))
+
+    def write(s: Shape) -> str:
+        square = f"{_beyond('theta_1', s[0])} ** 2 + {_beyond('theta_2', s[1])} ** 2"
+        return f"exp(-({square}) / {number(2.0 * s[2] ** 2)})"
+
+    def tell(s: Shape) -> str:
+        at = ", ".join(f"{np.rad2deg(each):.1f}" for each in s[:2])
+        return f"in a zone of poses about motor angles ({at}) deg, {np.rad2deg(s[2]):.2g} deg wide"
+
+    return Form("a zone", ("theta_1", "theta_2"), tuple(spans), write, tell, EVERYWHERE)
+
+
+def _of_time(time: Array, length: float) -> list[Form]:
+    first, of = float(time.min()), ("time",)
+    since = _beyond("time", first, _moment)
+    moments = Span(tuple(np.quantile(time, np.linspace(0.0, 1.0, MOMENTS + 2)[1:-1])), fixed=True)
+    rates = Span(tuple(2.0 * np.pi * 0.5 * n / length for n in range(2, 41)))
+    late = Span(tuple(np.geomspace(max(2.0, 0.02 * length), length, LATE)), positive=True)
+    again = "the same poses over and over, for as long as possible"
+    return [
+        Form("a drift", of, (), lambda s: f"{since} / 3600", lambda s: "for every hour", again),
+        Form("a step", of, (moments,),
+             lambda s: f"0.5 * (1 + sign{_beyond('time', s[0], _moment)})",
+             lambda s: f"since {s[0] - first:.0f} s after the start", again),
+        Form("a wave", of, (rates, Span(PHASES)),
+             lambda s: f"sin({number(s[0])} * {since} + {number(s[1])})",
+             lambda s: f"as a wave of {number(2.0 * np.pi / s[0])} s in time", again),
+        Form("a passing answer", of, (late,), lambda s: f"exp(-{since} / {number(s[0])})",
+             lambda s: f"dying away in {number(s[0])} s from the start", again),
+    ]  # fmt: skip
+
+
+def _together(one: str, two: str, pooled: Mapping[str, Array]) -> Form:
+    x, y = (_zeroed(name, pooled[name]) for name in (one, two))
+    every = f"for every {unit_of(one)} of {one} and {unit_of(two)} of {two} together"
+    needs = f"{one} and {two} changed one without the other"
+    return Form("a product", (one, two), (), lambda s: f"{x} * {y}", lambda s: every, needs)

@@ -1,0 +1,195 @@
+"""What is proposed for an error that nothing on the list explains, in words and as a law."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.identification.forms import EVERYWHERE, Form, Shape
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula import names_in
+from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
+from wrist_stiffness.model.parameters import Estimate, si_factor
+from wrist_stiffness.model.places import BODY, LIMB
+
+SAME: dict[str, tuple[str, ...]] = {
+    "frame": ("the stand of the instrument",),
+    "platform": ("the target on it",),
+}
+"""What moves the reading exactly as a screw at a component does, and is none of the wrist."""
+
+
+def twins(component: str) -> tuple[str, ...]:
+    """Return where else the very same screw may sit: no recording can tell."""
+    seat = LIMB[component], BODY[component]
+    others = (name for name in LIMB if (LIMB[name], BODY[name]) == seat and name != component)
+    return (*others, *SAME.get(component, ()))
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A law: a form of signals as a screw at a component.
+
+    Parameters
+    ----------
+    form : Form
+        How its size follows from the signals.
+    shape : tuple of float
+        Numbers inside the form.
+    component : str
+        Where.
+    direction : (6,) float
+        Translation; rotation at O in the component's home frame, of length 1.
+    value, sigma : float
+        Size and its standard uncertainty, in the unit of `key`.
+    key : str
+        `size_um` or `size_mdeg`.
+    probability : float
+        That it is the one, among all that were asked and none of them.
+    log_gain : float
+        Natural logarithm of the evidence with it over that without it, its prior included.
+    explains : float
+        Share of the error above the noise that it explains.
+    change : (u, 6) float
+        What it does to the prediction of each unit [m, rad].
+    """
+
+    form: Form
+    shape: Shape
+    component: str
+    direction: Array
+    value: float
+    sigma: float
+    key: str
+    probability: float
+    log_gain: float
+    explains: float
+    change: Array
+
+    @property
+    def formula(self) -> str:
+        """In the grammar of `extend --formula`."""
+        return f"{self.key} * {self.form.write(self.shape)}"
+
+    @property
+    def way(self) -> str:
+        """Direction in the words of `extend --direction`: `along +z`."""
+        turns = bool(np.any(self.direction[3:]))
+        three = self.direction[3:] if turns else self.direction[:3]
+        axis = int(np.argmax(np.abs(three)))
+        if abs(three[axis]) == 1.0:
+            words = f"{'+' if three[axis] > 0.0 else '-'}{'xyz'[axis]}"
+        else:
+            words = f"({', '.join(f'{each:.2f}' for each in three)})"
+        return f"{'about' if turns else 'along'} {words}"
+
+    @property
+    def places(self) -> str:
+        """Component, and where else it may sit."""
+        return " or ".join((self.component, *twins(self.component)))
+
+    @property
+    def sentence(self) -> str:
+        """What it says of the wrist."""
+        size = f"{self.value:.3g} +- {self.sigma:.1g} {self.key.rpartition('_')[2]}"
+        return f"{size} {self.way} at {self.places} {self.form.tell(self.shape)}"
+
+    def effect(self, name: str = "proposed") -> Effect:
+        """Return it as an effect of a model."""
+        text = self.formula
+        used = sorted(names_in(text) - SIGNALS - {self.key})
+        law = FormulaLaw(name, self.component, self.direction, text, used, (self.key,))
+        return Effect(law, self.component, {self.key: Estimate(self.value, self.sigma)})
+
+    def command(self, model: str, recordings: Sequence[str], name: str = "proposed") -> str:
+        """Return the command that adds it to a model file."""
+        words = ["wrist-stiffness", "extend", model, "--formula", self.formula]
+        words += ["--component", self.component, "--direction", self.way, "--name", name]
+        words += ["--fit", *recordings, "-o", f"{name}.yaml"]
+        return shlex.join(words)
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read."""
+        return {
+            "formula": self.formula,
+            "component": self.component,
+            "or": list(twins(self.component)),
+            "direction": self.way,
+            self.key: [self.value, self.sigma],
+            "probability": self.probability,
+            "log_gain": self.log_gain,
+            "explains": self.explains,
+            "sentence": self.sentence,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Proposals:
+    """Laws for what a model leaves.
+
+    Parameters
+    ----------
+    terms : tuple of Proposal
+        One law or two together; none where no law is sure enough.
+    rivals : tuple of Proposal
+        Others in place of the first, the most probable first.
+    probability : float
+        That the error follows one of the laws that were asked.
+    places : dict of str to float
+        Probability of each component, where it is one of them.
+    asked : int
+        Forms times components times directions.
+    """
+
+    terms: tuple[Proposal, ...]
+    rivals: tuple[Proposal, ...]
+    probability: float
+    places: Mapping[str, float]
+    asked: int
+
+    @property
+    def tells_apart(self) -> str:
+        """What to record to tell the first from its closest rival; empty where there is none."""
+        if not (self.terms and self.rivals):
+            return ""
+        one, two = self.terms[0].form, self.rivals[0].form
+        if one.name != two.name:
+            needs = list(dict.fromkeys((one.needs, two.needs)))
+            return f"record {'; and '.join(needs)}"
+        return f"record {one.needs}, each at {EVERYWHERE}"
+
+    def lines(self, model: str = "MODEL", recordings: Sequence[str] = ("RECORDING",)) -> list[str]:
+        """Return them for a terminal."""
+        out = []
+        for number, each in enumerate(self.terms, 1):
+            name = f"proposed_{number}"
+            out.append(f"{'Proposed law' if number == 1 else 'And'}: {each.sentence}.")
+            out.append(f"   explains {100.0 * each.explains:.0f} % of the error above the noise")
+            out.append(f"   {each.command(model, recordings, name)}")
+        others = [f"   or ({100.0 * e.probability:.0f} %) {e.sentence}" for e in self.rivals]
+        if others:
+            sure = 100.0 * self.terms[0].probability
+            out += [f"   {sure:.0f} % sure that it is this one", *others]
+            out.append(f"   to tell the first two apart: {self.tells_apart}")
+        return out
+
+    def as_values(self) -> dict[str, Any]:
+        """Return what programs read."""
+        return {
+            "terms": [each.as_values() for each in self.terms],
+            "rivals": [each.as_values() for each in self.rivals],
+            "probability": self.probability,
+            "components": dict(self.places),
+            "tells_apart": self.tells_apart,
+            "asked": self.asked,
+        }
+
+
+def in_units(key: str, value: float) -> float:
+    """Return a value [m, rad] in the unit of a parameter's name."""
+    return value / si_factor(key)

@@ -1,0 +1,113 @@
+"""Whether a wrist is within its tolerances as a whole, and what to measure first where it is not.
+
+Each tolerance may lie within two standard deviations while all of them together cannot: a load
+scale that is far off pulls at every axis.  The most probable values of a sound wrist scatter about
+the drawing by the prior covariance less what the data leave unknown: one chi-square of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.sessions.refitted import TOLERATED
+
+KNOWN = 0.1
+"""Least share of a prior variance that data must take away of a combination for it to count."""
+
+RARE = 0.01
+"""Probability below which a sound wrist is so far off: one of a hundred is told in error."""
+
+
+@dataclass(frozen=True)
+class Strain:
+    """How far all tolerances together are from the drawing.
+
+    Parameters
+    ----------
+    square : float
+        Chi-square of what the data know of them.
+    freedom : int
+        Combinations of tolerances that they know.
+    chance : float
+        Probability that a wrist within its tolerances is as far off, in all or in any one of them.
+    first : str
+        `law@place parameter` whose tolerance, given up, explains most.
+    value, times : float
+        What that parameter is then, in the unit of its name, and in its tolerances.
+    rest : float
+        Chi-square that is left then.
+    """
+
+    square: float
+    freedom: int
+    chance: float
+    first: str
+    value: float
+    times: float
+    rest: float
+
+    @property
+    def sentence(self) -> str:
+        """What it says of the wrist; empty where it is within its tolerances."""
+        if self.chance > RARE:
+            return ""
+        how = f"chi-square {self.square:.0f} where {self.freedom} is usual"
+        text = (
+            f"The wrist is outside its tolerances ({how}). Measure {self.first} first: "
+            f"{self.value:.3g}, {abs(self.times):.1f} times its tolerance"
+        )
+        if chi2.sf(self.rest, max(self.freedom - 1, 1)) > RARE:
+            return f"{text}; with that all others are within theirs."
+        return f"{text}; that does not explain all of it (chi-square {self.rest:.0f} is left)."
+
+
+def strain(fit: WristFit) -> Strain | None:
+    """Return how far the tolerances of a fit are from the drawing; None where it has none.
+
+    Parameters
+    ----------
+    fit : WristFit
+        With set-up and tolerances.
+    """
+    base, found = fit.base, fit.evidence
+    problem, point = base.problem, found.point
+    names = [problem.free[each.free].effect for each in problem.unknowns]
+    at = np.array(
+        [
+            place
+            for place, effect in enumerate(names)
+            if base.of_base[place]
+            and effect.law.id in TOLERATED
+            and np.isfinite(base.prior_std[place])
+        ],
+        dtype=np.intp,
+    )
+    if not len(at):
+        return None
+    weight = point.weight[at]
+    z = weight * (point.z[at] + found.step[at])
+    left = found.covariance[np.ix_(at, at)] * np.outer(weight, weight)
+    sizes, vectors = np.linalg.eigh(np.eye(len(at)) - left)
+    known = sizes > KNOWN
+    square = float(np.sum((vectors[:, known].T @ z) ** 2 / sizes[known]))
+    freedom = int(np.count_nonzero(known))
+    # Without its prior a tolerance would go as far as the data ask for.
+    told = np.maximum(1.0 - np.diag(left), 1e-9)
+    gains = np.where(told > KNOWN, z**2 / told, 0.0)
+    far = int(np.argmax(gains))
+    unknown = problem.unknowns[at[far]]
+    times = float(z[far] / told[far])
+    alone = len(at) * chi2.sf(gains[far], 1)
+    return Strain(
+        square,
+        freedom,
+        float(min(2.0 * min(chi2.sf(square, freedom), alone), 1.0)),
+        f"{names[at[far]].name} {unknown.key}",
+        unknown.value(times / float(weight[far])),
+        times,
+        square - float(gains[far]),
+    )
