@@ -38,7 +38,7 @@ def _run(output: str, seconds: float) -> int:
     from picture import draw_before_after
     from run_demo import beyond, run_demo
 
-    from wrist_stiffness.commands.table import facts
+    from wrist_stiffness.report.table_lines import facts
     from wrist_stiffness.report.table_pictures import draw_maps
     from wrist_stiffness.shipped import shipped_file
 

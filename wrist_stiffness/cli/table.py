@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import Any
 
-from wrist_stiffness.cli.options import whole_load
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, OneLineParser
-
-if TYPE_CHECKING:
-    from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.cli.options import table_named, whole_load
+from wrist_stiffness.cli.output import say
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.shipped import shipped_file
 
 BUILD = """\
 Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
@@ -44,21 +43,17 @@ example, natural frequencies with a gripper of 0.2 kg, 30 mm below O:
   wrist-stiffness table show -o maps --modes --payload 0.2 0 0 -30"""
 
 
-def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
+def add_parser(commands: Commands) -> None:
     """Add the parsers of the three table commands."""
     parser = commands.add_parser("table", help="build, check or show a lookup table")
     actions = parser.add_subparsers(metavar="ACTION", required=True)
 
-    build = _add(actions, "build", "run the finite-element sweep", BUILD, BUILD_EPILOG)
+    what = "run the finite-element sweep"
+    build = add_command(actions, "build", what, (BUILD, BUILD_EPILOG), _build)
     build.add_argument("geometry", nargs="?", help="geometry file (default: the shipped wrist's)")
     build.add_argument("-o", "--output", required=True, metavar="TABLE", help="ends in .npz")
-    build.add_argument(
-        "--tolerance",
-        type=float,
-        default=0.005,
-        metavar="FRACTION",
-        help="largest relative error of the interpolated s and phi (default 0.005)",
-    )
+    error = "largest relative error of the interpolated s and phi"
+    build.option("--tolerance", 0.005, error, "FRACTION")
     build.add_argument(
         "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
     )
@@ -81,17 +76,14 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         default="closed_form",
         help="what the nodes use (default: closed_form)",
     )
-    _add_json(build)
-    build.set_defaults(run=_build)
 
-    check = _add(actions, "check", "verify a table", CHECK, CHECK_EPILOG)
+    check = add_command(actions, "check", "verify a table", (CHECK, CHECK_EPILOG), _check)
     check.add_argument("table", nargs="?", help="table file (default: the shipped one)")
     check.add_argument("--geometry", metavar="FILE", help="must be the geometry of the table")
-    check.add_argument("--rebuild", action="store_true", help="compute it again and compare")
-    _add_json(check)
-    check.set_defaults(run=_check)
+    check.flag("--rebuild", "compute it again and compare")
 
-    show = _add(actions, "show", "draw its maps and error budget", SHOW, SHOW_EPILOG)
+    what = "draw its maps and error budget"
+    show = add_command(actions, "show", what, (SHOW, SHOW_EPILOG), _show)
     show.add_argument("table", nargs="?", help="table file (default: the shipped one)")
     show.add_argument(
         "-o", "--output", default=".", metavar="FOLDER", help="for the PNG files (default: here)"
@@ -111,7 +103,7 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         metavar="MM",
         help="where --load acts, in wrist_platform [mm] (default: O)",
     )
-    show.add_argument("--modes", action="store_true", help="natural frequencies and mode shapes")
+    show.flag("--modes", "natural frequencies and mode shapes")
     show.add_argument(
         "--payload",
         nargs=4,
@@ -126,39 +118,15 @@ def add_parser(commands: argparse._SubParsersAction[OneLineParser]) -> None:
         metavar=("IXX", "IYY", "IZZ"),
         help="of the payload about its centre of gravity [kg mm^2] (default: a point)",
     )
-    _add_json(show)
-    show.set_defaults(run=_show)
-
-
-def _add(
-    actions: argparse._SubParsersAction[OneLineParser],
-    name: str,
-    what: str,
-    description: str,
-    epilog: str,
-) -> OneLineParser:
-    return actions.add_parser(
-        name,
-        help=what,
-        description=description,
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-
-
-def _add_json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", metavar="FILE", help="write the result here as well")
 
 
 def _build(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.commands import table
-    from wrist_stiffness.commands.json_file import write_json
-    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.report.table_lines import fact_lines
 
-    geometry = arguments.geometry or shipped_file("config/palmieri2015.yaml")
     built = table.build(
-        geometry,
+        arguments.geometry or shipped_file("config/palmieri2015.yaml"),
         arguments.output,
         evaluation=arguments.evaluation,
         interface=arguments.interface,
@@ -167,99 +135,45 @@ def _build(arguments: argparse.Namespace) -> int:
         kernel=arguments.kernel,
         progress=Progress("sweep"),
     )
-    _print_facts(built)
-    print(f"written: {arguments.output} (checksum {built.checksum[:12]})")
-    if arguments.json:
-        write_json(arguments.json, asdict(built.header) | {"checksum": built.checksum})
-    return EXIT_DONE
+    written = f"written: {arguments.output} (checksum {built.checksum[:12]})"
+    values = asdict(built.header) | {"checksum": built.checksum}
+    return say(arguments, [*fact_lines(built), written], values)
 
 
 def _check(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.commands.json_file import write_json
     from wrist_stiffness.commands.table_check import check
-    from wrist_stiffness.shipped import shipped_file
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
     findings = check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
-    for finding in findings:
-        print(f"{'good' if finding.passed else 'BAD ':4} {finding.name}: {finding.text}")
     passed = all(finding.passed for finding in findings)
-    print(f"{path}: {'good' if passed else 'NOT good'}")
-    if arguments.json:
-        write_json(
-            arguments.json,
-            {"passed": passed, "findings": [asdict(finding) for finding in findings]},
-        )
+    lines = [f"{'good' if each.passed else 'BAD ':4} {each.name}: {each.text}" for each in findings]
+    lines.append(f"{path}: {'good' if passed else 'NOT good'}")
+    values = {"passed": passed, "findings": [asdict(finding) for finding in findings]}
+    say(arguments, lines, values)
     return EXIT_DONE if passed else EXIT_NO
 
 
 def _show(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.commands import table
+    from wrist_stiffness.commands import modes, table
     from wrist_stiffness.commands.budget import Push
-    from wrist_stiffness.commands.json_file import write_json
-    from wrist_stiffness.lookup.table_file import load_table
-    from wrist_stiffness.report.table_pictures import draw_maps
-    from wrist_stiffness.shipped import shipped_file
+    from wrist_stiffness.report.table_lines import fact_lines, load_lines, mode_lines
+    from wrist_stiffness.report.table_pictures import draw_maps, draw_modes
 
-    path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
-    shown, push = load_table(path), None
+    shown = table_named(arguments)
+    values: Any
     if arguments.modes:
-        return _show_modes(shown, arguments)
-    if arguments.load is not None:
-        push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
-    pictures = draw_maps(shown, arguments.output, push)
-    _print_facts(shown)
-    summary = table.summarise(shown)
-    print("rated load (1 N downward, own weight left out), operative workspace:")
-    for name, row in summary.operative.items():
-        print(
-            f"  {name:12} mean {row['mean']:7.2f}   min {row['min']:7.2f}   max {row['max']:7.2f}"
-        )
-    print(
-        f"whole map: s up to {summary.domain_max['s_um']:.3g} um, "
-        f"phi up to {summary.domain_max['phi_mdeg']:.3g} mdeg"
-    )
-    for picture in pictures:
-        print(f"written: {picture}")
-    if arguments.json:
-        write_json(arguments.json, asdict(summary))
-    return EXIT_DONE
-
-
-def _show_modes(shown: Table, arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.commands import modes
-    from wrist_stiffness.commands.json_file import write_json
-    from wrist_stiffness.report.table_pictures import draw_modes
-
-    payload = modes.payload_of(arguments.payload, arguments.payload_inertia)
-    found = modes.mode_map(shown, payload)
-    pictures = draw_modes(shown, found, arguments.output, payload)
-    print("natural frequencies [Hz], motors locked, no damping, operative workspace:")
-    summary = {}
-    for state in modes.STATES:
-        values = found.operative(shown, state)
-        summary[state] = {
-            name: getattr(values, name)(axis=0).tolist() for name in ("min", "mean", "max")
-        }
-        for number in range(3):
-            lowest, mean, highest = (row[number] for row in summary[state].values())
-            label = f"flanges {state}, mode {number + 1}"
-            print(f"  {label:26} mean {mean:7.1f}   min {lowest:7.1f}   max {highest:7.1f}")
-    slowest = summary["at rest"]["min"][0]
-    print(
-        f"static corrections are right to 1 % for loads that change below {slowest / 10:.0f} Hz, "
-        "a tenth of the lowest frequency at rest"
-    )
-    for picture in pictures:
-        print(f"written: {picture}")
-    if arguments.json:
-        write_json(arguments.json, summary)
-    return EXIT_DONE
-
-
-def _print_facts(shown: Table) -> None:
-    from wrist_stiffness.commands import table
-
-    for name, text in table.facts(shown):
-        print(f"{name + ':':26} {text}")
+        payload = modes.payload_of(arguments.payload, arguments.payload_inertia)
+        found = modes.mode_map(shown, payload)
+        pictures = draw_modes(shown, found, arguments.output, payload)
+        values = modes.summarise(shown, found)
+        lines = mode_lines(values)
+    else:
+        push = None
+        if arguments.load is not None:
+            push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
+        pictures = draw_maps(shown, arguments.output, push)
+        summary = table.summarise(shown)
+        lines, values = [*fact_lines(shown), *load_lines(summary)], asdict(summary)
+    lines += [f"written: {picture}" for picture in pictures]
+    return say(arguments, lines, values)

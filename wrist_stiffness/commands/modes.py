@@ -22,6 +22,9 @@ PER_AXIS = 31
 STATES = ("open", "at rest", "closed")
 """No flange touches; those touch that do under own weight and payload; all do."""
 
+ModeSummary = dict[str, dict[str, list[float]]]
+"""Lowest, mean and highest of each mode, by state of the flanges [Hz]."""
+
 
 def payload_of(
     mass_and_place: Sequence[float] | None, inertia_kg_mm2: Sequence[float] | None
@@ -104,6 +107,17 @@ def mode_map(table: Table, payload: RigidBody | None = None, per_axis: int = PER
         values[inside] = modes_at(table, configuration, payload, state).frequency
         found[state] = values
     return ModeMap(poses, found)
+
+
+def summarise(table: Table, found: ModeMap) -> ModeSummary:
+    """Return frequencies [Hz] in the operative workspace by state of the flanges."""
+    return {
+        state: {
+            name: getattr(found.operative(table, state), name)(axis=0).tolist()
+            for name in ("min", "mean", "max")
+        }
+        for state in STATES
+    }
 
 
 def modes_at(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -141,41 +140,3 @@ def summarise(table: Table) -> MapSummary:
     }
     domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
     return MapSummary(operative, domain)
-
-
-def facts(table: Table) -> Iterable[tuple[str, str]]:
-    """Return what a person wants to know of a table, as (name, text)."""
-    header, limits = table.header, table.geometry.limits
-    lower, upper = (np.degrees(edge) for edge in table.workspace.rectangle)
-    errors = header.errors
-    yield "geometry", f"{table.geometry.name} ({table.geometry.status})"
-    yield (
-        "angles",
-        f"motor 1 {lower[0]:.1f} to {upper[0]:.1f}, motor 2 {lower[1]:.1f} to {upper[1]:.1f} deg",
-    )
-    yield "loads", f"up to {limits.force:g} N and {limits.moment:g} N m at O"
-    yield (
-        "parts",
-        f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces",
-    )
-    yield "contact", f"{len(table.components.sectors.gap)} flange sectors"
-    yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
-    yield "evaluation", header.evaluation
-    yield (
-        "mesh error",
-        f"s {100 * errors['mesh']['s']:.2f} %, phi {100 * errors['mesh']['phi']:.2f} % "
-        "(extrapolated from three meshes)",
-    )
-    if errors.get("walls"):
-        walls = errors["walls"]
-        yield (
-            "wall error",
-            f"s {100 * walls['s']:.0f} %, phi {100 * walls['phi']:.0f} % "
-            "(walls that lift off against two-sided ones)",
-        )
-    for region in ("operative", "domain"):
-        worst = errors["predicted"][region]
-        yield (
-            f"spline error, {region}",
-            f"s {100 * worst['s']:.3f} %, phi {100 * worst['phi']:.3f} % at 99 of 100 unseen poses",
-        )
