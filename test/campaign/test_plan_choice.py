@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.planning.aims import NEAREST, nearest
 from wrist_stiffness.planning.choice import choose
-from wrist_stiffness.planning.goals import NEAREST, nearest
 from wrist_stiffness.planning.information import Goal
 
 GRAMS = np.array([1.0, 4.0, 2.0])[:, None, None]

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands import plan as workflow
-from wrist_stiffness.commands.plan import Options, plan_between_rivals, plan_commissioning
+from wrist_stiffness.commands.plan import Options, plan_experiment
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import Diagnosis, Finding
@@ -65,11 +65,11 @@ def files(tmp_path_factory):
 
 
 def between(files, recordings=None, **options):
-    return plan_between_rivals(
+    return plan_experiment(
         shipped_file(MODEL),
-        files / "found.json",
         files / "loads.yaml",
         Options(None, in_motion=False, **options),
+        files / "found.json",
         recordings,
     )
 
@@ -141,7 +141,7 @@ def test_options_reach_the_plan_in_si(files, monkeypatch):
         seed=4,
     )
     with pytest.raises(InputError, match="far enough"):
-        plan_commissioning(shipped_file(MODEL), files / "loads.yaml", options)
+        plan_experiment(shipped_file(MODEL), files / "loads.yaml", options)
     (found,) = seen
     assert found.seconds == 720.0
     assert found.pace.speed == pytest.approx(np.radians(10.0))

@@ -73,7 +73,7 @@ def add_parser(commands: Commands) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.commands.plan import Options, plan_between_rivals, plan_commissioning
+    from wrist_stiffness.commands.plan import Options, plan_experiment
     from wrist_stiffness.report.plan_folder import require_new_folder, write_plan
     from wrist_stiffness.report.plan_summary import plan_summary
 
@@ -87,18 +87,19 @@ def _run(arguments: argparse.Namespace) -> int:
         noise_mdeg=arguments.noise[1],
         seed=arguments.seed,
     )
-    model, loads, progress = model_named(arguments), arguments.loads, Progress("plan")
-    if arguments.commissioning:
-        if arguments.recording:
+    recordings = None
+    if arguments.recording:
+        if arguments.commissioning:
             raise InputError("--recording belongs to --diagnosis: a commissioning is the first one")
-        planned = plan_commissioning(model, loads, options, progress)
-    else:
-        recordings = None
-        if arguments.recording:
-            recordings = recordings_named(arguments.recording, arguments)
-        planned = plan_between_rivals(
-            model, arguments.diagnosis, loads, options, recordings, progress
-        )
+        recordings = recordings_named(arguments.recording, arguments)
+    planned = plan_experiment(
+        model_named(arguments),
+        arguments.loads,
+        options,
+        arguments.diagnosis,
+        recordings,
+        Progress("plan"),
+    )
     text = plan_summary(planned)
     say(arguments, [text], planned.as_values())
     timeline = planned.plan.timeline

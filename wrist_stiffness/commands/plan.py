@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.planning.question import Question, between, commissioning
 from wrist_stiffness.planning.rivals import read_rivals
-from wrist_stiffness.planning.timeline import Experiment, Pace, Timeline
+from wrist_stiffness.planning.timeline import Pace, Timeline
 from wrist_stiffness.progress import Progress, silent
 
 MDEG = float(np.radians(1e-3))
@@ -129,55 +128,24 @@ class Planned:
         }
 
 
-def plan_commissioning(
-    model_file: str | Path, loads: str | Path, options: Options, progress: Progress | None = None
+def plan_experiment(
+    model_file: str | Path,
+    loads: str | Path,
+    options: Options,
+    diagnosis: str | Path | None = None,
+    recordings: Recordings | None = None,
+    progress: Progress | None = None,
 ) -> Planned:
-    """Plan the first experiment on a wrist.
+    """Plan the first experiment on a wrist, or the next one between rivals.
 
     Parameters
     ----------
     model_file, loads : path
         Model, and the loads that the user can apply.
     options : Options
-        With a duration.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    Planned
-        The plan.
-
-    Raises
-    ------
-    WristError
-        If a file is wrong, or nothing fits into the duration.
-    """
-    if options.minutes is None:
-        raise InputError("plan: --minutes says how long a commissioning may take")
-    model = load_model(model_file)
-    white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
-    noise = MeasurementNoise(white, model.table.geometry.limits.encoder_step)
-    question = commissioning(np.random.default_rng(options.seed))
-    return _planned(model, question, loads, noise, options, (), progress)
-
-
-def plan_between_rivals(
-    model_file: str | Path,
-    diagnosis: str | Path,
-    loads: str | Path,
-    options: Options,
-    recordings: Recordings | None = None,
-    progress: Progress | None = None,
-) -> Planned:
-    """Plan the next experiment, between the effects that a diagnosis could not tell apart.
-
-    Parameters
-    ----------
-    model_file, diagnosis, loads : path
-        Model, result of `diagnose --json`, and the loads that the user can apply.
-    options : Options
-        Without a duration it takes what it needs.
+        The first experiment needs a duration; the next one takes what it needs without.
+    diagnosis : path, optional
+        Result of `diagnose --json`: what it could not tell apart is asked.
     recordings : Recordings, optional
         Those of the diagnosis: its rivals are fitted to them, and what it left open counts as open.
     progress : callable, optional
@@ -193,25 +161,20 @@ def plan_between_rivals(
     WristError
         If a file is wrong, nothing is left to separate, or nothing fits into the duration.
     """
-    model, rivals = load_model(model_file), read_rivals(diagnosis)
-    question = between(rivals.classes, rivals.silent, np.random.default_rng(options.seed))
-    noise = rivals.noise(model.table)
-    earlier = []
-    if recordings is not None:
-        sessions = read_sessions(recordings, [model], silent)
-        earlier = [as_experiment(model, session) for session in sessions.values()]
-    return _planned(model, question, loads, noise, options, earlier, progress)
-
-
-def _planned(
-    model: ErrorModel,
-    question: Question,
-    loads: str | Path,
-    noise: MeasurementNoise,
-    options: Options,
-    earlier: Sequence[Experiment],
-    progress: Progress | None,
-) -> Planned:
+    model, rng, earlier = load_model(model_file), np.random.default_rng(options.seed), []
+    if diagnosis is None:
+        if options.minutes is None:
+            raise InputError("plan: --minutes says how long a commissioning may take")
+        question = commissioning(rng)
+        white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
+        noise = MeasurementNoise(white, model.table.geometry.limits.encoder_step)
+    else:
+        rivals = read_rivals(diagnosis)
+        question = between(rivals.classes, rivals.silent, rng)
+        noise = rivals.noise(model.table)
+        if recordings is not None:
+            sessions = read_sessions(recordings, [model], silent)
+            earlier = [as_experiment(model, session) for session in sessions.values()]
     geometry = model.table.geometry
     conditions = Conditions(
         read_loads(loads, geometry.gravity, geometry.limits.force),
