@@ -17,7 +17,7 @@ times; and 1.0 to 2.0 times to encode (`bench/recording_speed.py`).
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from functools import cache, partial
 from itertools import groupby
 from typing import Any, Literal, TypeVar
@@ -108,6 +108,52 @@ def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
         raise RecordingError(
             f"{message_type.ros_type}: payload of {len(payload)} bytes cannot be decoded: {error}"
         ) from error
+
+
+def decode_in_steps(
+    message_type: type[AnyMessage], payload: bytes
+) -> Generator[None, None, AnyMessage]:
+    """Do as `decode` for a type of parts and sequences of parts, one of the latter at a step."""
+    order = byte_order_of(message_type, payload)
+    body, at = payload[ENCAPSULATION_SIZE:], 0
+    unsigned = struct.Struct(order + "I").unpack_from
+    found = []
+    try:
+        for field in fields_of(message_type.ros_type):
+            is_text = field.element == "string"
+            element = partial(_read_string, unsigned) if is_text else _reader(field.element, order)
+            count, items = 1, []
+            if field.is_sequence:
+                at += -at % 4
+                (count,) = unsigned(body, at)
+                at += 4
+            for _ in range(count):
+                item, at = element(body, at)
+                items.append(item)
+                yield
+            found.append(tuple(items) if field.is_sequence else items[0])
+    except (struct.error, UnicodeDecodeError) as error:
+        raise RecordingError(
+            f"{message_type.ros_type}: payload of {len(payload)} bytes cannot be decoded: {error}"
+        ) from error
+    return message_type(*found)
+
+
+def encode_in_steps(message: Message) -> Generator[None, None, bytes]:
+    """Do as `encode` for a type of parts and sequences of parts, one of the latter at a step."""
+    out = bytearray()
+    try:
+        for field in fields_of(message.ros_type):
+            value = getattr(message, field.attribute)
+            write: Writer = _write_string if field.element == "string" else _writer(field.element)
+            if field.is_sequence:
+                out += bytes(-len(out) % 4) + _UNSIGNED(len(value))
+            for item in value if field.is_sequence else (value,):
+                write(out, item)
+                yield
+    except (struct.error, AttributeError, TypeError, ValueError) as error:
+        raise RecordingError(f"{message.ros_type} cannot be encoded: {error}") from error
+    return LITTLE_ENDIAN + b"\x00\x00" + bytes(out)
 
 
 def byte_order_of(message_type: type[Message], payload: bytes) -> ByteOrder:

@@ -21,6 +21,8 @@ from wrist_stiffness.compensation.payload import Payload
 from wrist_stiffness.compensation.perishable import require_fresh
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.recording.cdr import decode
+from wrist_stiffness.recording.messages import Header
 from wrist_stiffness.ros.changes import Change, all_or_none
 from wrist_stiffness.ros.conversions import three
 from wrist_stiffness.ros.guarded_node import ACTIVE, ALL_STATES, CONFIGURED
@@ -34,7 +36,7 @@ from wrist_stiffness.ros.stream_messages import (
     joint_payload,
     joint_reader,
 )
-from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan, stamp_of
+from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan
 from wrist_stiffness.ros.wrist_node import WristNode
 from wrist_stiffness.topics import (
     MOTOR_COMMANDS,
@@ -132,15 +134,15 @@ class AngleCorrector(WristNode):
         self.health.good()
 
     def _on_trajectory(self, payload: bytes) -> None:
-        self._require_forwarding("trajectory", stamp_of(payload), may_come=True)
+        self._require_forwarding("trajectory", decode(Header, payload).stamp_ns, may_come=True)
         self._plans.add(self._correct_plan(payload))
 
     def _correct_plan(self, payload: bytes) -> Generator[None, None, None]:
-        plan = yield from read_plan(payload)
+        plan, points = yield from read_plan(payload)
         # A zero stamp says "at once".
-        stamp_ns = plan.stamp_ns or self.get_clock().now().nanoseconds
+        stamp_ns = plan.header.stamp_ns or self.get_clock().now().nanoseconds
         done = yield from self.stream.trajectory_work(
-            stamp_ns, plan.frame_id, plan.names, plan.points
+            stamp_ns, plan.header.frame_id, plan.joint_names, points
         )
         answer = yield from plan_payload(plan, done.frame_id, done.points)
         self._trajectory.publish(answer)
