@@ -10,7 +10,7 @@ import pytest
 import wrist_stiffness
 from wrist_stiffness.cli.main import COMMANDS, EPILOG, build_parser, main
 from wrist_stiffness.errors import GeometryError
-from wrist_stiffness.simulation.blind import ToldScale
+from wrist_stiffness.simulation.size import Scale
 
 
 def command(run):
@@ -264,7 +264,7 @@ def test_an_effect_where_it_cannot_be_names_the_places(effect, named, tmp_path, 
 def test_an_existing_recording_is_named_before_the_work(secret, refused, tmp_path, monkeypatch):
     path = tmp_path / "riddle.mcap"
     path.write_bytes(b"")
-    monkeypatch.setattr(ToldScale, "__init__", lambda *given: pytest.fail("worked before it asked"))
+    monkeypatch.setattr(Scale, "__init__", lambda *given: pytest.fail("worked before it asked"))
     assert "choose another name or remove it" in refused("simulate", "-o", str(path), *secret)
 
 
@@ -338,11 +338,3 @@ def test_a_secret_tells_in_which_recordings_it_is(capsys):
     assert last.startswith("in recordings of: simulate --blind 3 --seconds 20.0 ")
     assert last.endswith("--base wrong")
     assert "--instrument interferometer" in last
-
-
-@pytest.mark.parametrize(("seed", "lines"), [("8", 3), ("3", 2)])
-def test_what_every_session_sets_up_anew_is_nothing_to_find(seed, lines, capsys):
-    assert main(["simulate", "--reveal", seed, "--seconds", "20"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert len(told) == lines
-    assert ("nothing is missing" in told[1]) == (seed == "8")

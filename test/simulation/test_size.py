@@ -9,7 +9,7 @@ import pytest
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.blind import draw
-from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect
+from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, is_plausible
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
 from wrist_stiffness.simulation.residual import residual
@@ -112,6 +112,15 @@ def test_seed_draws_the_same_secret_and_seeds_differ(wrist):
     assert len(others | {one.hidden.effect}) > 1
     with pytest.raises(InputError, match="-1"):
         draw(-1, wrist(), short, 20.0)
+
+
+def test_a_riddle_is_a_wrist_that_works_and_has_something_to_find(wrist):
+    """Seed 2 drew a link five times as soft; seed 8 a target, which every session mounts anew."""
+    short = replace(SETTINGS, rate_hz=10.0)
+    for seed in (2, 8):
+        hidden = draw(seed, wrist(), short, 20.0, without={"target_mounting"}).hidden
+        assert is_plausible(hidden)
+        assert hidden.effect != "target_mounting"
 
 
 def test_wrong_base_is_wrong_by_what_it_says_and_shimmed_at_home(wrist):

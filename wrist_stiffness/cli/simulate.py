@@ -153,26 +153,21 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
     from dataclasses import asdict
 
     from wrist_stiffness.cli.progress import Status
-    from wrist_stiffness.sessions.refitted import SET_UP
-    from wrist_stiffness.simulation.blind import draw
+    from wrist_stiffness.commands.simulate import secret
     from wrist_stiffness.simulation.catalogue import ALL
 
     with Status() as status:
-        secret = draw(arguments.reveal, table, settings, arguments.seconds, status)
-    hidden = secret.hidden
+        drawn = secret(arguments.reveal, table, settings, arguments.seconds, status)
+    hidden = drawn.hidden
     lines = [
         f"{hidden.effect}@{hidden.component} ({hidden.form}): "
-        f"{in_usual_units(hidden.magnitude, ALL[hidden.effect].unit)}, size {secret.size:.3g} "
+        f"{in_usual_units(hidden.magnitude, ALL[hidden.effect].unit)}, size {drawn.size:.3g} "
         "times the noise of one sample"
     ]
-    if hidden.effect in {law for law, _ in SET_UP}:
-        lines.append(
-            "every session sets this up anew: the right diagnosis is that nothing is missing"
-        )
     values = {name: getattr(arguments, name) for name in DRAWN_FOR}
     told = (f"--{n.replace('_', '-')} {value}" for n, value in values.items() if value is not None)
     lines.append(f"in recordings of: simulate --blind {arguments.reveal} {' '.join(told)}")
-    return say(arguments, lines, {"size": secret.size, **asdict(hidden)})
+    return say(arguments, lines, {"size": drawn.size, **asdict(hidden)})
 
 
 def in_usual_units(magnitude: float, si: str) -> str:

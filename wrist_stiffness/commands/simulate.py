@@ -16,9 +16,11 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.progress import Progress
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import String
-from wrist_stiffness.simulation.blind import ToldScale, draw
+from wrist_stiffness.sessions.refitted import SET_UP
+from wrist_stiffness.simulation.blind import Secret, draw
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.size import Scale
 
 START_NS = 1_700_000_000_000_000_000
 """Stamp of a recording's first sample: a fixed date, so that a seed gives the same bytes."""
@@ -191,7 +193,7 @@ def hide(
     start = HiddenEffect(
         effect, component, form or entry.forms[0], entry.plausible, settings.program_seed
     )
-    hidden = ToldScale(tell, table, settings, seconds).sized(start, size)
+    hidden = Scale(table, settings, seconds, tell).sized(start, size)
     return replace(settings, hidden=(*settings.hidden, hidden))
 
 
@@ -202,8 +204,22 @@ def hide_blind(
     seconds: float,
     tell: Callable[[str], None] = lambda text: None,
 ) -> CellSettings:
-    """Return the settings with the effect that a seed draws (see `blind.draw`)."""
-    return replace(settings, hidden=(draw(seed, table, settings, seconds, tell).hidden,))
+    """Return the settings with the effect that a seed draws."""
+    return replace(settings, hidden=(secret(seed, table, settings, seconds, tell).hidden,))
+
+
+def secret(
+    seed: int,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
+) -> Secret:
+    """Return what a seed draws (see `blind.draw`) of what a diagnosis could find.
+
+    What every session sets up anew is no riddle: nothing would be missing.
+    """
+    return draw(seed, table, settings, seconds, tell, without={law for law, _ in SET_UP})
 
 
 def on_day(day: int, settings: CellSettings) -> CellSettings:

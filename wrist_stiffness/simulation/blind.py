@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,41 +35,18 @@ class Secret:
     size: float
 
 
-class ToldScale(Scale):
-    """A scale that tells before every run of the experiment, of which a size takes several.
-
-    Parameters
-    ----------
-    tell : callable
-        Is told what begins; not of which effect.
-    table, settings, seconds
-        As of `Scale`.
-    """
-
-    def __init__(
-        self, tell: Callable[[str], None], table: Table, settings: CellSettings, seconds: float
-    ) -> None:
-        self._tell, self._runs = tell, 0
-        super().__init__(table, settings, seconds)
-
-    def size(self, hidden: HiddenEffect) -> float:
-        """Return the size of an effect in units of one sample's noise."""
-        self._runs += 1
-        self._tell(f"finding how much of the effect has the wanted size, run {self._runs}")
-        return super().size(hidden)
-
-
 def draw(
     seed: int,
     table: Table,
     settings: CellSettings,
     seconds: float,
     tell: Callable[[str], None] = lambda text: None,
+    without: Collection[str] = (),
 ) -> Secret:
     """Draw effect, place, form and size.
 
     Every effect of the catalogue is as likely as any other, then every place of it.  A drawn size
-    that its effect cannot have within the catalogue's limit is drawn again with all the rest.
+    that its effect cannot have on a wrist that still works is drawn again with all the rest.
 
     Parameters
     ----------
@@ -83,6 +60,8 @@ def draw(
         Duration of the experiment [s].
     tell : callable
         Is told before every run of the experiment; not what is tried.
+    without : collection of str
+        Effects that are not drawn, such as those that every session sets up anew.
 
     Returns
     -------
@@ -98,17 +77,17 @@ def draw(
         raise InputError(f"blind seed {seed} is negative")
     # Apart from the noise, which a user may seed with the same number.
     rng = np.random.default_rng([seed, 0x5EC2E7])
-    scale = ToldScale(tell, table, replace(settings, hidden=()), seconds)
+    scale = Scale(table, replace(settings, hidden=()), seconds, tell)
+    names = [name for name in CATALOGUE if name not in without]
     for _ in range(ATTEMPTS):
-        effect = str(rng.choice(list(CATALOGUE)))
-        _, component, form = places({effect: CATALOGUE[effect]})[
-            rng.integers(len(places({effect: CATALOGUE[effect]})))
-        ]
+        entry = CATALOGUE[effect := str(rng.choice(names))]
+        found = places({effect: entry})
+        _, component, form = found[rng.integers(len(found))]
         size = float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
-        start = CATALOGUE[effect].plausible
-        hidden = HiddenEffect(effect, component, form, start, int(rng.integers(2**31)))
+        shape = int(rng.integers(2**31))
+        hidden = HiddenEffect(effect, component, form, entry.plausible, shape)
         try:
-            return Secret(scale.sized(hidden, size), size)
+            return Secret(scale.sized(hidden, size, entry.largest), size)
         except InputError:
             continue
     raise InputError(f"blind seed {seed}: no effect fits this experiment after {ATTEMPTS} draws")

@@ -69,6 +69,9 @@ class Scale:
         Experiment, rate and instrument; other hidden effects in it act in both runs.
     seconds : float
         Duration of the experiment [s].
+    tell : callable
+        Is told before every run of the experiment, of which a size takes several; not of which
+        effect.
 
     Raises
     ------
@@ -76,13 +79,19 @@ class Scale:
         If the instrument has no noise to measure in.
     """
 
-    def __init__(self, table: Table, settings: CellSettings, seconds: float) -> None:
+    def __init__(
+        self,
+        table: Table,
+        settings: CellSettings,
+        seconds: float,
+        tell: Callable[[str], None] = lambda text: None,
+    ) -> None:
         if settings.instrument == "ideal":
             raise InputError(
                 "a hidden effect is as large as so many times the noise, and the instrument "
                 "'ideal' has none: take another one"
             )
-        self._table, self._settings = table, settings
+        self._table, self._settings, self._tell, self._runs = table, settings, tell, 0
         quiet = LoadSensor(Noise(0.0, 0.0), Noise(0.0, 0.0))
         # The size is that of the whole motion, whatever part of it the sensor sees.
         self._quiet = replace(
@@ -127,12 +136,16 @@ class Scale:
 
     def size(self, hidden: HiddenEffect) -> float:
         """Return the size of an effect in units of one sample's noise."""
+        self._runs += 1
+        self._tell(f"finding how much of the effect has the wanted size, run {self._runs}")
         change = self.signature(hidden)[self.counted]
         change = change - change.mean(axis=0)
         white = (self._whiten[self.counted] @ change[..., None])[..., 0]
         return float(np.sqrt(np.mean(white * white)))
 
-    def sized(self, hidden: HiddenEffect, size: float) -> HiddenEffect:
+    def sized(
+        self, hidden: HiddenEffect, size: float, largest: float | None = None
+    ) -> HiddenEffect:
         """Return the effect with the magnitude that has a size.
 
         Parameters
@@ -141,6 +154,8 @@ class Scale:
             Its magnitude is where the search begins.
         size : float
             Wanted.
+        largest : float, optional
+            Magnitude to stay below; that which can be simulated if None.
 
         Returns
         -------
@@ -150,9 +165,10 @@ class Scale:
         Raises
         ------
         InputError
-            If no magnitude up to the catalogue's limit has this size.
+            If no magnitude up to the largest has this size.
         """
         entry = ALL[hidden.effect]
+        limit = entry.limit if largest is None else largest
 
         def measure(magnitude: float) -> float:
             try:
@@ -161,11 +177,11 @@ class Scale:
                 # So large that the wrist has no equilibrium any more.
                 return np.inf
 
-        magnitude = magnitude_for(measure, hidden.magnitude, size, entry.limit)
+        magnitude = magnitude_for(measure, hidden.magnitude, size, limit)
         if magnitude is None:
             raise InputError(
                 f"{hidden.effect}@{hidden.component}: size {size:g} is out of reach, at the limit "
-                f"of {entry.limit:g} {entry.unit} it is {measure(entry.limit):.3g}"
+                f"of {limit:g} {entry.unit} it is {measure(limit):.3g}"
             )
         return replace(hidden, magnitude=magnitude)
 
