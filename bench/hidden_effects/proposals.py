@@ -42,6 +42,7 @@ from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.blocks import time_blocks
 from wrist_stiffness.inference.evidence import evidence
 from wrist_stiffness.inference.point import Background
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.unit_session import UnitSession, as_units
 from wrist_stiffness.simulation.catalogue import STRANGERS
@@ -94,16 +95,23 @@ def answer(case: Case) -> dict[str, Any]:
         line["right_component"] = any(each.component in right for each in found.terms)
         line["among_components"] = any(name in right for name in found.places)
         both = WristProblem(model, (whole,))
-        line |= judged(both, held[whole.measured], found.terms)
+        line |= judged(both, held[whole.measured], added(problem, found.terms))
     return line
 
 
-def judged(problem: WristProblem, held: Array, laws: Sequence[Proposal]) -> dict[str, float]:
+def added(problem: WristProblem, laws: Sequence[Proposal]) -> list[Effect]:
+    """Return laws fitted together with set-up and tolerances, as `extend` does."""
+    fit = problem.begin()
+    for number, each in enumerate(laws):
+        fit = problem.extended(fit, each.effect(f"law_{number}"))
+    return list(fit.base.beyond().values())
+
+
+def judged(problem: WristProblem, held: Array, effects: Sequence[Effect]) -> dict[str, float]:
     """Return the squares left in the held-out units: of nothing, the process and the law."""
     fit = problem.begin()
     table, point = problem.table, fit.point
     rows = held[table.unit]
-    effects = [each.effect(f"law_{n}") for n, each in enumerate(laws)]
     trials = [(e.law, e.component, {k: v.value for k, v in e.estimates.items()}) for e in effects]
     change = problem.about(fit).changes(trials).sum(axis=0) if trials else 0.0 * fit.base.residual
     left = {

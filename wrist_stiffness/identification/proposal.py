@@ -169,7 +169,8 @@ class Proposals:
         for number, each in enumerate(self.terms, 1):
             name = f"proposed_{number}"
             out.append(f"{'Proposed law' if number == 1 else 'And'}: {each.sentence}.")
-            out.append(f"   explains {100.0 * each.explains:.0f} % of the error above the noise")
+            of = "the error above the noise" if number == 1 else "what the first leaves above it"
+            out.append(f"   explains {100.0 * each.explains:.0f} % of {of}")
             out.append(f"   {each.command(model, recordings, name)}")
         others = [f"   or ({100.0 * e.probability:.0f} %) {e.sentence}" for e in self.rivals]
         if others:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import gammaln, logsumexp
 
+from wrist_stiffness.errors import WristError
 from wrist_stiffness.identification.forms import Form, Shape, Span, evaluated, forms
 from wrist_stiffness.identification.proposal import Proposal, Proposals, in_units
 from wrist_stiffness.identification.wrist_fit import WristFit
@@ -98,28 +99,32 @@ def propose(
     Proposals
         At most two laws together, and what else may stand in place of the first.
     """
-    library = _Library(problem, fit)
-    base = library.start()
     terms: list[Proposal] = []
-    first: tuple[list[_Judged], Array] | None = None
-    sure, state = 0.0, base
+    first: tuple[list[_Judged], Array, Evidence] | None = None
+    sure, asked = 0.0, 0
     for number in range(MOST_TERMS):
         tell("asking for a law" if number == 0 else "asking for a second law beside it")
-        found = library.judged(state, f"proposed_{number + 1}")
+        library = _Library(problem, fit)
+        base = library.start()
+        found = library.judged(base, "proposed")
         if not found:
             break
-        logs = np.array([each.log - state.log for each in found])
-        whole = float(np.logaddexp(0.0, logsumexp(logs)))
-        chances = np.exp(logs - whole)
+        logs = np.array([each.log - base.log for each in found])
+        chances = np.exp(logs - np.logaddexp(0.0, logsumexp(logs)))
         if first is None:
-            first, sure = (found, chances), float(chances.sum())
+            first, sure, asked = (found, chances, base), float(chances.sum()), library.count
         if chances.sum() < naming:
             break
-        terms.append(_proposal(found[0], float(chances[0]), state))
-        state = found[0].state
+        terms.append(_proposal(found[0], float(chances[0]), base))
+        if len(terms) < MOST_TERMS:
+            # Tolerances that had given way to the first law find back.
+            try:
+                fit = problem.extended(fit, terms[-1].effect("first_law"))
+            except WristError:
+                break
     if first is None or not terms:
-        return Proposals((), (), sure, {}, library.count)
-    judged, chances = first
+        return Proposals((), (), sure, {}, asked)
+    judged, chances, base = first
     rivals = [
         _proposal(each, float(chance), base)
         for each, chance in zip(judged[1:], chances[1:], strict=True)
@@ -131,7 +136,7 @@ def propose(
         places[name] = places.get(name, 0.0) + chance
     kept = {name: p for name, p in places.items() if p >= MEMBER}
     ordered = dict(sorted(kept.items(), key=lambda pair: -pair[1]))
-    return Proposals(tuple(terms), tuple(rivals[:RIVALS]), sure, ordered, library.count)
+    return Proposals(tuple(terms), tuple(rivals[:RIVALS]), sure, ordered, asked)
 
 
 def _distinct(found: Sequence[_Judged]) -> list[_Judged]:

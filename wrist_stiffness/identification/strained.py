@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.sessions.refitted import TOLERATED
@@ -60,7 +60,7 @@ class Strain:
             f"The wrist is outside its tolerances ({how}). Measure {self.first} first: "
             f"{self.value:.3g}, {abs(self.times):.1f} times its tolerance"
         )
-        if chi2.sf(self.rest, max(self.freedom - 1, 1)) > RARE:
+        if chdtrc(max(self.freedom - 1, 1), self.rest) > RARE:
             return f"{text}; with that all others are within theirs."
         return f"{text}; that does not explain all of it (chi-square {self.rest:.0f} is left)."
 
@@ -101,11 +101,11 @@ def strain(fit: WristFit) -> Strain | None:
     far = int(np.argmax(gains))
     unknown = problem.unknowns[at[far]]
     times = float(z[far] / told[far])
-    alone = len(at) * chi2.sf(gains[far], 1)
+    alone = len(at) * chdtrc(1, gains[far])
     return Strain(
         square,
         freedom,
-        float(min(2.0 * min(chi2.sf(square, freedom), alone), 1.0)),
+        float(min(2.0 * min(chdtrc(freedom, square), alone), 1.0)),
         f"{names[at[far]].name} {unknown.key}",
         unknown.value(times / float(weight[far])),
         times,

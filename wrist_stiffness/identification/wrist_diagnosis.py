@@ -70,7 +70,7 @@ class WristDiagnosis:
     proposals : Proposals, optional
         Laws for what no effect of the catalogue explains; asked where the verdict is `unknown`.
     strain : Strain, optional
-        How far all tolerances together are from the drawing.
+        How far all tolerances together are from the drawing; None beside a proposed law.
     """
 
     diagnosis: Diagnosis
@@ -179,6 +179,9 @@ def diagnose_sessions(
         judge.scope,
         () if search.in_time else ("the time was over before every candidate was fitted",),
     )
+    proposals = propose(problem, state.fit, naming, tell) if reading.verdict == "unknown" else None
+    # Tolerances that give way to an unknown law say nothing of the drawing.
+    tense = None if proposals and proposals.terms else strain(state.fit)
     beyond = state.fit.base.beyond()
     effects = tuple(beyond[each.name] for each in reading.named)
     return WristDiagnosis(
@@ -189,8 +192,8 @@ def diagnose_sessions(
         absorbed,
         search,
         reading.classes,
-        propose(problem, state.fit, naming, tell) if reading.verdict == "unknown" else None,
-        strain(state.fit),
+        proposals,
+        tense,
     )
 
 
