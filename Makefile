@@ -16,7 +16,7 @@ export ROS_DOMAIN_ID
 .PHONY: help demo test lint docs bench tables clean
 
 help:
-	@echo "make demo    start the nodes with a virtual cell, record, replay, compare; see demo/"
+	@echo "make demo    correct a virtual wrist live, then find a hidden fault; see demo/demo.png"
 	@echo "make test    run all tests"
 	@echo "make lint    ruff and mypy"
 	@echo "make docs    the documents as a site; open site/index.html"

@@ -1,4 +1,4 @@
-"""`make demo`: the main job from end to end, said in words."""
+"""`make demo`: correct a wrist live, then find and add a hidden fault; said in words."""
 
 from __future__ import annotations
 
@@ -35,11 +35,9 @@ def main() -> int:
 def _run(output: str, seconds: float) -> int:
     import numpy as np
     from before_after import rms
-    from picture import draw_before_after
-    from run_demo import beyond, run_demo
+    from picture import draw_demo
+    from run_demo import FAULT, run_demo
 
-    from wrist_stiffness.report.table_lines import facts
-    from wrist_stiffness.report.table_pictures import draw_maps
     from wrist_stiffness.shipped import shipped_file
 
     model = shipped_file("config/palmieri2015_model.yaml")
@@ -47,37 +45,45 @@ def _run(output: str, seconds: float) -> int:
     result = run_demo(
         output, model, seconds, Progress, lambda line: print(f"{PROG}: {line}", file=sys.stderr)
     )
+    millidegrees = 1e3 * 180.0 / np.pi
+    before, after = result.before, result.after
+    shift = [1e6 * rms(values) for values in (before.shift, after.shift, after.shift_handed_on)]
+    print("\n1. Correction under 3 N: true error of the virtual wrist at rest, RMS")
+    print(f"  pointing without correction:       {millidegrees * rms(before.pointing):7.2f} mdeg")
+    print(f"  pointing with correction:          {millidegrees * rms(after.pointing):7.2f} mdeg")
+    print(f"  the encoder step alone:            {millidegrees * before.floor:7.2f} mdeg")
+    print(f"  shift s without / with:            {shift[0]:7.2f} / {shift[1]:.2f} um")
+    print("  (two motors rotate the platform about O, they cannot shift it)")
+    print(f"  shift s if a manipulator takes it: {shift[2]:7.2f} um")
 
-    print("\nThe table")
-    for name, text in facts(result.table):
-        print(f"  {name + ':':26} {text}")
+    fault = result.fault
+    hidden = f"{FAULT.effect}@{FAULT.component}, {millidegrees * FAULT.magnitude:.0f} mdeg"
+    print(f"\n2. A fault was hidden in the wrist ({hidden}). The model does not know it.")
+    for finding in fault.diagnosis.findings:
+        sure = min(100.0 * finding.probability, 99.9)
+        print(f"  missing: {' or '.join(finding.names)}, at least {sure:.1f} % sure")
+    if fault.after is None or fault.after.added is None:
+        print(f"  verdict: {fault.diagnosis.verdict}")
+    else:
+        for name, value in fault.after.added.estimates.items():
+            print(f"  fitted: {name} = {value.value:.1f} +- {value.sigma:.1f}")
+        print("\n3. Added to the model: error phi on another day, RMS")
+        print(f"  without the fault in the model:    {fault.before.held_out['phi_mdeg']:7.2f} mdeg")
+        print(f"  with it:                           {fault.after.held_out['phi_mdeg']:7.2f} mdeg")
+        print(f"  noise of the instrument:           {fault.noise['phi_mdeg']:7.2f} mdeg")
 
     live = result.comparison
-    print("\nLive against replayed")
-    print(f"  equal to the bit:          {live.equal} predictions")
+    print("\nLive against replayed predictions")
+    print(f"  equal to the bit:          {live.equal}")
     print(f"  load had not arrived:      {live.late} (live used the load before)")
     print(f"  other differences:         {live.unexplained}")
     print(f"  only live / only replayed: {live.only_live} / {live.only_replay}")
-
-    before, after = result.before, result.after
-    millidegrees = 1e3 * 180.0 / np.pi
-    pointing = [millidegrees * value for value in (rms(before.pointing), rms(after.pointing))]
-    floor = millidegrees * before.floor
-    elastic = [beyond(value, floor) for value in pointing]
-    shift = [1e6 * rms(values) for values in (before.shift, after.shift, after.shift_handed_on)]
-    print("\nTrue error of the virtual wrist at rest, RMS (it shares the model's elastic table)")
-    print(f"  pointing, without correction:      {pointing[0]:7.2f} mdeg")
-    print(f"  pointing, with correction:         {pointing[1]:7.2f} mdeg")
-    print(f"  the encoder step alone makes:      {floor:7.2f} mdeg")
-    print(f"  beyond the step, without / with:   {elastic[0]:7.2f} / {elastic[1]:.2f} mdeg")
-    print(f"  shift s, without / with:           {shift[0]:7.2f} / {shift[1]:.2f} um")
-    print("  (two motors turn the platform about O, they cannot shift it)")
-    print(f"  shift s, if a manipulator takes it:{shift[2]:7.2f} um")
-    print(f"\nwritten: {output}/live, {output}/replayed")
-    motion = Path(output) / "before_after.png"
-    draw_before_after(before, after, motion)
-    for picture in (*draw_maps(result.table, output), motion):
-        print(f"written: {picture}")
+    print(
+        f"\nwritten: {output}/live, {output}/replayed, {output}/fault_day_1, {output}/fault_day_2"
+    )
+    picture = Path(output) / "demo.png"
+    draw_demo(result, picture)
+    print(f"written: {picture}")
     agreed = live.unexplained == 0 and live.equal > 0
     return EXIT_DONE if agreed else EXIT_NO
 

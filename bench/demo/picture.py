@@ -1,48 +1,81 @@
-"""True errors of a motion without and with correction."""
+"""The demo in one picture: corrected under load, a hidden fault named, the error down to noise."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from before_after import Pass
+from before_after import Pass, rms
+from run_demo import DemoResult, Fault
 
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
+from wrist_stiffness.report.pictures.palette import FLOOR, colour
+
+CANDIDATES = 5
+"""The most probable ones are drawn."""
+
+ROOM = 1.3
+"""Axes over the largest value: the legend lies above."""
 
 
-def draw_before_after(before: Pass, after: Pass, path: Path) -> None:
-    """Draw the true errors of both passes of a motion, one above the other.
+def draw_demo(result: DemoResult, path: Path) -> None:
+    """Draw what the demo showed, from left to right in the order of its steps.
 
     Parameters
     ----------
-    before, after : Pass
-        Settled samples without and with correction.
+    result : DemoResult
+        Of `run_demo.run_demo`.
     path : Path
         PNG to write.
     """
-    figure = new_figure(8.0, 6.0)
-    pointing, shift = figure.subplots(2, 1, sharex=True)
-    for run, name, color in (
-        (before, "without correction", "tab:red"),
-        (after, "with correction", "tab:blue"),
-    ):
+    figure = new_figure(13.0, 4.2)
+    corrected, found, added = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 0.8))
+    _draw_correction(corrected, result.before, result.after)
+    _draw_finding(found, result.fault)
+    _draw_fall(added, result.fault)
+    save_figure(figure, path)
+
+
+def _draw_correction(plot: Any, before: Pass, after: Pass) -> None:
+    sizes = [1e3 * np.degrees(rms(each.pointing)) for each in (before, after)]
+    for number, (run, name) in enumerate(((before, "without"), (after, "with"))):
         time_s = run.time_s - run.time_s[0]
         mdeg = 1e3 * np.degrees(run.pointing)
-        pointing.plot(time_s, mdeg, ".", markersize=2, color=color, label=name)
-        shift.plot(time_s, 1e6 * run.shift, ".", markersize=2, color=color, label=f"|s| {name}")
-    handed_on = 1e6 * after.shift_handed_on
-    time_s = after.time_s - after.time_s[0]
-    shift.plot(
-        time_s, handed_on, ".", markersize=2, color="tab:green", label="after the manipulator"
-    )
+        label = f"{name} correction"
+        plot.plot(time_s, mdeg, ".", markersize=3, color=colour(1 - number), label=label)
     floor = 1e3 * np.degrees(before.floor)
-    pointing.axhline(floor, color="black", linewidth=0.8, label="encoder step alone (RMS)")
-    pointing.set_ylabel("pointing error [mdeg]")
-    pointing.set_title("True error at rest: what two motors cancel, and what they cannot")
-    shift.set_ylabel("shift of the centre [µm]")
-    shift.set_xlabel("time in the motion [s]")
-    for plot in (pointing, shift):
-        plot.set_ylim(bottom=0.0)
-        plot.legend(fontsize=7, markerscale=4, loc="upper right")
-        plot.grid(alpha=0.3)
-    save_figure(figure, path)
+    plot.axhline(floor, color=FLOOR, linewidth=1.0, label="encoder step alone (RMS)")
+    plot.set_title(f"1. Correction under 3 N: {sizes[0]:.0f} to {sizes[1]:.0f} mdeg (RMS)")
+    plot.set_xlabel("time in the motion [s]")
+    plot.set_ylabel("true pointing error at rest [mdeg]")
+    plot.set_ylim(0.0, ROOM * 1e3 * np.degrees(before.pointing.max()))
+    plot.legend(fontsize=8, loc="upper right")
+
+
+def _draw_finding(plot: Any, fault: Fault) -> None:
+    best = fault.diagnosis.standings[:CANDIDATES]
+    names = [each.name.replace("@", "\n") for each in best]
+    shares = [100.0 * each.probability for each in best]
+    bars = plot.barh(names, shares, color=colour(2))
+    plot.bar_label(bars, [f"{share:.1f} %" if share < 99.95 else "> 99.9 %" for share in shares])
+    plot.invert_yaxis()
+    plot.set_xlim(0.0, 130.0)
+    plot.set_xticks([0, 50, 100])
+    plot.set_xlabel("probability that it is missing [%]")
+    plot.set_title("2. A fault was hidden: what is it?")
+    plot.tick_params(axis="y", labelsize=8)
+
+
+def _draw_fall(plot: Any, fault: Fault) -> None:
+    errors = {"model\nas given": fault.before.held_out["phi_mdeg"]}
+    if fault.after is not None:
+        errors["fault\nadded"] = fault.after.held_out["phi_mdeg"]
+    bars = plot.bar(errors.keys(), errors.values(), color=(colour(1), colour(0)), width=0.6)
+    plot.bar_label(bars, fmt="%.1f")
+    noise = fault.noise["phi_mdeg"]
+    plot.axhline(noise, color=FLOOR, linewidth=1.0, label="noise of the instrument")
+    plot.set_ylabel("error phi on another day, RMS [mdeg]")
+    plot.set_title("3. The error falls")
+    plot.set_ylim(0.0, ROOM * max(errors.values()))
+    plot.legend(fontsize=8, loc="upper right")

@@ -59,7 +59,7 @@ def add_parser(commands: Commands) -> None:
     parser.option("--seed", 0, "of program and noise")
     anew = "instrument set up anew, other poses, loads and noise"
     parser.option("--day", 1, f"another day of the same wrist and effect: {anew}")
-    parser.option("--experiment", "rich", "rich, paper, dead_weights or production")
+    parser.option("--experiment", "rich", "rich, paper, dead_weights, production or heavy")
     sensors = "interferometer, tracker, cmm, ideal; a cmm measures once in each rest"
     parser.option("--instrument", "interferometer", f"pose sensor: {sensors}")
     seen = "pose, points (position alone) or pointing (rotation alone)"

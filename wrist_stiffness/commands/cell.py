@@ -68,6 +68,7 @@ def run_cell(
     seed: int = 0,
     progress: Progress = silent,
     tell: Tell = lambda line: None,
+    experiment: str = "rich",
 ) -> bool:
     """Run predictor, corrector and virtual cell until the motion is over; in the main thread.
 
@@ -91,6 +92,8 @@ def run_cell(
         Called with seconds done and in all.
     tell : callable
         Called with a line for every node that had to be killed in the end.
+    experiment : str
+        What the motion is, one of `simulation.experiment.EXPERIMENTS`.
 
     Returns
     -------
@@ -116,7 +119,11 @@ def run_cell(
         RecordingWriter(record, keep_partial=True).check_target()
         output = {"output": str(Path(record).resolve()), "begin_with": " ".join(SPOKEN)}
         nodes.append(RECORDER_NODE.having(output))
-    moves: dict[str, ParameterValue] = {"rate_hz": float(rate_hz), "seed": seed}
+    moves: dict[str, ParameterValue] = {
+        "rate_hz": float(rate_hz),
+        "seed": seed,
+        "experiment": experiment,
+    }
     # Predictor and monitor listen to the joint states, and so does the recorder.
     moves["listeners"] = 2 if record is None else 3
     if seconds is not None:

@@ -15,7 +15,7 @@ from wrist_stiffness.identification.calibration import CALIBRATED
 from wrist_stiffness.model.contribution import LEFT_OUT
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.folder import recordings_in
 from wrist_stiffness.sessions.reading.session import read_session
@@ -42,7 +42,7 @@ class Recordings:
 
 
 def read_sessions(
-    recordings: Recordings, models: Sequence[ErrorModel], progress: Progress
+    recordings: Recordings, models: Sequence[ErrorModel], progress: Progress = silent
 ) -> dict[Path, MeasuredSession]:
     """Read recordings with measured poses, each a session with a name of its own.
 
@@ -53,7 +53,7 @@ def read_sessions(
     models : sequence of ErrorModel
         What the command works with.  The table is that of the first; what a recording has no signal
         for is said of all.
-    progress : callable
+    progress : callable, optional
         Told recordings done and in all.
 
     Returns

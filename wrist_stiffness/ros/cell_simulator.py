@@ -37,6 +37,7 @@ from wrist_stiffness.ros.parameters import declare, model_path
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import run, tell
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.experiment import EXPERIMENTS
 from wrist_stiffness.topics import (
     BASE_FRAME,
     JOINT_STATES,
@@ -53,6 +54,7 @@ from wrist_stiffness.topics import (
 PARAMETERS = (
     ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),
     ParameterEntry("rate_hz", 100.0, "samples per second", lower=RATES_HZ[0], upper=RATES_HZ[1]),
+    ParameterEntry("experiment", "rich", "what the motion is", choices=tuple(EXPERIMENTS)),
     ParameterEntry("program_s", 60.0, "length of the motion [s]", lower=1.0, upper=86400.0),
     ParameterEntry(
         "programs",
@@ -119,6 +121,7 @@ class CellSimulator(Node):
             rate_hz=self.get_parameter("rate_hz").value,
             program_seconds=self.get_parameter("program_s").value,
             program_seed=seed,
+            experiment=self.get_parameter("experiment").value,
         )
         model = load_model(model_path(self.get_parameter("model_file").value))
         self.cell = VirtualCell(model.table, settings, np.random.default_rng(seed))

@@ -169,11 +169,26 @@ def production(workspace: Workspace, rng: np.random.Generator, seconds: float) -
     return schedule.program(LOADING_S)
 
 
+def heavy(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
+    """Return random poses, at each another direction of a force at O three times the rated one.
+
+    See `rich` for the parameters.
+    """
+    schedule = Schedule(random_pose(workspace, rng))
+    while schedule.time_s < seconds:
+        theta = random_pose(workspace, rng)
+        load = np.append(3.0 * FORCE * unit(rng.normal(size=3)), np.zeros(3))
+        schedule.move(theta, move_seconds(schedule.theta, theta), load)
+        schedule.rest(DWELL_S)
+    return schedule.program(LOADING_S)
+
+
 EXPERIMENTS: dict[str, Callable[[Workspace, np.random.Generator, float], Program]] = {
     "rich": rich,
     "paper": paper,
     "dead_weights": dead_weights,
     "production": production,
+    "heavy": heavy,
 }
 
 

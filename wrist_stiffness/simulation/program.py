@@ -112,9 +112,9 @@ class Schedule:
         """Load now, (6,) [N, N m]."""
         return self._loads[-1][1]
 
-    def move(self, theta: Array, seconds: float) -> None:
-        """Move the motors to `theta` (2,) [rad] with the load that is on."""
-        self._go_on(seconds, theta=theta)
+    def move(self, theta: Array, seconds: float, load: Array | None = None) -> None:
+        """Move the motors to `theta` (2,) [rad], with the load that is on or towards another."""
+        self._go_on(seconds, theta=theta, load=load)
 
     def put_on(self, load: Array, seconds: float) -> None:
         """Change the load to `load` (6,) [N, N m] at rest."""
