@@ -58,7 +58,7 @@ def test_the_tare_does_not_take_up_what_the_prior_holds_back(extension):
 
 
 def test_the_size_beyond_the_usual_is_said(extension):
-    (far,) = (text for text in extension.warnings if "x its usual size" in text)
+    (far,) = (text for text in extension.warnings if "x the typical magnitude" in text)
     assert far.count("_per_h is ") > 1
 
 
@@ -68,6 +68,6 @@ def test_of_many_sizes_beyond_the_usual_the_furthest_are_named(extension):
     many = [replace(one, key=f"a_{n}_um", value=100 * n * one.value) for n in range(1, 9)]
     told = replace(extension)
     vars(told)["parameters"] = (*extension.parameters, *many)
-    (far,) = (text for text in told.warnings if "x its usual size" in text)
+    (far,) = (text for text in told.warnings if "x the typical magnitude" in text)
     assert re.findall(r"a_\d", far) == ["a_8", "a_7", "a_6"]
-    assert re.search(r"its usual size \(\d+ more are far off\): ", far)
+    assert re.search(r"the typical magnitude \(\d+ more are far off\): ", far)

@@ -50,7 +50,7 @@ def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, ca
     assert [session["name"] for session in told["sessions"]] == ["day_0.mcap", "day_1.mcap"]
     text = capsys.readouterr().out
     assert "set up in day_0.mcap:" in text
-    assert "not told by these recordings:" in text
+    assert "not identifiable from these recordings:" in text
 
     model = load_model(output)
     (step,) = model.lineage

@@ -120,7 +120,7 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert abs(abs(soft.value) - 0.2) < 3.5 * soft.sigma
     assert size.value * soft.value > 0.0
     (line,) = (line for line in extension_lines(found) if "sag_mdeg  " in line)
-    assert "usual size" not in line
+    assert "typical magnitude" not in line
     before, after = found.before, found.after
     assert after["phi_mdeg"] < 1.3 * found.extension.fit.noise["phi_mdeg"]
     assert before["phi_mdeg"] > 1.5 * after["phi_mdeg"]
@@ -151,7 +151,7 @@ def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_p
     (bow,) = found.extension.own
     # Of any law a share is in doubt, 5 % where it does not say how much.
     assert abs(bow.value - 20.0) < 3.0 * bow.sigma < 0.2 * bow.value
-    assert [text for text in found.extension.warnings if "usual size" not in text] == []
+    assert [text for text in found.extension.warnings if "typical magnitude" not in text] == []
     with python_laws(True):
         again = load_model(output)
     assert again.effects[-1].name == "bow@platform"
@@ -170,7 +170,7 @@ def test_an_effect_that_is_not_there_is_added_with_a_word(model, extend_by):
     # Some of its compliances lie on their lower bound, nothing: that is what they are.
     assert any(each.at_bound for each in found.extension.own)
     assert "on its bound" not in words
-    assert words.count("not told by these recordings") < 2
+    assert words.count("not identifiable from these recordings") < 2
     assert "does not fall beyond chance" in words or "GROWS" in words
     assert any(line.startswith("WARNING") for line in extension_lines(found))
     assert "frame_compliance@frame" in {effect.name for effect in load_model(output).effects}
@@ -183,7 +183,7 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
     found, _ = extend_by(CatalogueEffect("encoder_eccentricity@motor_1"), session)
     moved = {before.effect for before, _ in found.extension.base_moved}
     assert moved == {"encoder_offset@motor_1"}
-    assert "what the effect moved in the rest of the model:" in extension_lines(found)
+    assert "other parameters that changed:" in extension_lines(found)
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     true_um = 1e6 * np.sqrt(3.0 * (shift.white**2 / 5.0 + shift.wander**2))
     assert told["after"]["rmse_s_um"] < 1.1 * true_um
     assert told["after"]["rmse_phi_mdeg"] < 1.2 * told["noise"]["phi_mdeg"]
-    assert "what is left is no more than the noise" in capsys.readouterr().out
+    assert "remaining error: no more than the noise" in capsys.readouterr().out
     summary = replay(RECORDING, output, tmp_path / "out.mcap")
     assert summary.predictions == summary.joint_states > 0
 

@@ -46,8 +46,8 @@ def test_what_is_not_told_stands_under_what_to_record():
     assert line.split()[:2] == ["encoder_offset@motor_1", "offset_mdeg"]
     # A gap is usual where shims follow the axes, and -36 um of it no more than that.
     shimmed = replace(found.parameters[-1], value=-36.0, prior=-35.0, usual=10.0)
-    assert tolerances(shimmed) == "0.1 x its usual size from -35"
-    assert tolerances(replace(shimmed, prior=0.0)) == "3.6 x its usual size"
+    assert tolerances(shimmed) == "0.1 x the typical magnitude from -35"
+    assert tolerances(replace(shimmed, prior=0.0)) == "3.6 x the typical magnitude"
 
 
 def test_rests_that_nothing_measured_are_not_counted():
@@ -60,4 +60,4 @@ def test_rests_that_nothing_measured_are_not_counted():
     session = MeasuredSession("s", block, shift, rotation, np.diag(np.repeat([1e-6, 1e-5], 3) ** 2))
     free = (free_all(Effect(find_law("encoder_offset"), "motor_1")),)
     found = fitted(*fit_cleaned(FitProblem(model, (as_units(model, session),), free)))
-    assert used_lines([session], found)[0].startswith("s: 15 rests and 0 half seconds in motion")
+    assert used_lines([session], found)[0].startswith("s: 15 dwells and 0 half seconds in motion")

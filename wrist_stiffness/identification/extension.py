@@ -128,12 +128,12 @@ class Extension:
             out.append(f"on its bound: {keys}; the data ask for what cannot be")
         if untold:
             keys = ", ".join(each.key for each in untold)
-            out.append(f"not told by these recordings: {keys}; needs {law.excited_by}")
+            out.append(f"not identifiable from these recordings: {keys}; needs {law.excited_by}")
         if far:
             sizes = ", ".join(f"{each.key} is {abs(each.moved):.1f} x" for each in far[:MOST_FAR])
             more = f" ({len(far) - MOST_FAR} more are far off)" if len(far) > MOST_FAR else ""
             check = law.check.replace("{place}", place)
-            out.append(f"{sizes} its usual size{more}: {check}")
+            out.append(f"{sizes} the typical magnitude{more}: {check}")
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")

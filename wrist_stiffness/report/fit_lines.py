@@ -39,12 +39,15 @@ def calibration_lines(found: Calibrated) -> list[str]:
     lines += [found.mistake] if found.mistake else []
     for session in found.sessions:
         own = told_lines(each for each in parameters if each.session == session.name)
-        lines += ["", f"set up in {session.name}:", *(own or ["  nothing that the data tell"])]
+        lines += ["", f"set up in {session.name}:", *(own or ["  nothing identifiable"])]
     wrist = told_lines(each for each in parameters if each.session is None)
-    lines += ["", "of this wrist:", *(wrist or ["  nothing that the data tell"])]
+    lines += ["", "of this wrist:", *(wrist or ["  nothing identifiable"])]
     for title, part in (
-        ("farther off than usual:", far_lines(result.fit, parameters)),
-        ("not told by these recordings:", untold_lines(result.fit, parameters)),
+        (
+            "farther off than typical, to be checked on the machine:",
+            far_lines(result.fit, parameters),
+        ),
+        ("not identifiable from these recordings:", untold_lines(result.fit, parameters)),
     ):
         lines += ["", title, *part] if part else []
     if result.calibrated:
@@ -69,8 +72,8 @@ def extension_lines(found: Extended) -> list[str]:
         for before, after in result.base_moved[:MOST_MOVED]
     ]
     if not moved:
-        return [*lines, "", "the rest of the model moved by no more than chance"]
-    return [*lines, "", "what the effect moved in the rest of the model:", *moved]
+        return [*lines, "", "no other parameter changed by more than its uncertainty"]
+    return [*lines, "", "other parameters that changed:", *moved]
 
 
 def _judged_lines(
@@ -99,13 +102,13 @@ def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
     dwells = sum(int((each.cut.dwell & each.measured).sum()) for each in found.problem.sessions)
     lost = found.lost + sum(each.lost for each in found.problem.sessions)
     lines = [
-        f"{', '.join(session.name for session in sessions)}: {dwells} rests and "
+        f"{', '.join(session.name for session in sessions)}: {dwells} dwells and "
         f"{table.n_units - dwells} half seconds in motion"
         + (f", {lost} lost beams left out" if lost else "")
     ]
     lines += [f"  {session.name}: {remark}" for session in sessions for remark in session.remarks]
     if not found.arrived:
-        lines.append("the fit did not settle: read its numbers with doubt")
+        lines.append("the fit did not converge: its numbers are uncertain")
     return lines
 
 
@@ -113,13 +116,13 @@ def left_lines(found: Fit, judged_by: str) -> list[str]:
     """Tell how an error was judged, and how much more than noise is left."""
     lines = [f"judged {JUDGED_BY[judged_by]}"]
     if not found.rough:
-        return [*lines, "what is left is no more than the noise"]
+        return [*lines, "remaining error: no more than the noise"]
     above = " and ".join(
         f"{found.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
         for q in found.problem.table.reported
         if found.discrepancy[q.key] > 0.0
     )
-    return [*lines, f"left above the noise: {above}: {NOT_AT_THE_FLOOR}"]
+    return [*lines, f"remaining error above the noise: {above}: {NOT_AT_THE_FLOOR}"]
 
 
 def told_lines(
@@ -166,7 +169,7 @@ def untold_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]
     untold: dict[str, dict[str, None]] = {}
     for each in parameters:
         if not each.excited:
-            twin = f" (only together with {each.together[0]})" if each.together else ""
+            twin = f" (only its combination with {each.together[0]} is)" if each.together else ""
             untold.setdefault(each.effect, {})[f"{each.key}{twin}"] = None
     alike: dict[str, dict[tuple[str, str], list[str]]] = {}
     for effect, keys in untold.items():
@@ -184,6 +187,6 @@ def untold_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]
 
 def tolerances(parameter: FittedParameter) -> str:
     """Return how far a parameter went, in the words of a fitter."""
-    text = f"{abs(parameter.moved):.1f} x its usual size"
+    text = f"{abs(parameter.moved):.1f} x the typical magnitude"
     # The usual gap is where shims follow the axes; 11.5 ppm/K is steel.
     return f"{text} from {parameter.prior:.3g}" if parameter.prior else text
