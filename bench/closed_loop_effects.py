@@ -69,7 +69,7 @@ HIDDEN = (
     *("load_misalignment@load_sensor:plain*10", "load_bias@load_sensor:constant*100"),
 )
 """One place of each effect; three of `time_delay`, which is a different thing at each; then some so
-large that a pointing error shows which five times the usual size does not make."""
+large that a pointing error shows which five times the typical magnitude does not make."""
 
 ON_WRONG_BASE = (
     *("backlash@motor_1:single", "drive_compliance@motor_1:linear"),

@@ -71,7 +71,7 @@ def test_a_fit_repeated_gives_the_same_answer(tmp_path, recorded):
     first = calibrate_model(SHIPPED, Recordings([day], {}), once, RUN).calibration
     second = calibrate_model(once, Recordings([day], {}), twice, RUN).calibration
     assert values(second.parameters) == pytest.approx(values(first.parameters))
-    # The tare went far for want of the mass: that is no usual size the second time either.
+    # The tare went far for want of the mass: that is no typical magnitude the second time either.
     for found in (first, second):
         assert max(abs(each.moved) for each in found.parameters) > 5.0
     # What it began with is told as it stands, though.

@@ -51,7 +51,7 @@ def shown(model, block, law, place, values):
 
 
 def matrix(model, block, law, place, shape):
-    """The columns of a law, (6n, k), with their factors' names and usual sizes."""
+    """The columns of a law, (6n, k), with their factors' names and typical magnitudes."""
     columns = law.linearised(place, frozenset(block.temperatures)).columns(shape)
     rows = []
     for each in columns:

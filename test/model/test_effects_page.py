@@ -1,6 +1,6 @@
 """The page on effects says what the code does: names, parameters, sizes, and its code runs.
 
-`python test/model/test_effects_page.py` writes the tables of usual sizes and of exactness.
+`python test/model/test_effects_page.py` writes the tables of typical magnitudes and of exactness.
 """
 
 import re
@@ -39,7 +39,7 @@ def named(keys):
 
 
 def sizes_of(law):
-    """Return names of parameters of a law, and the usual size that they share."""
+    """Return names of parameters of a law, and the typical magnitude that they share."""
     alike, at = {}, {}
     for place in law.places:
         for each in law.parameters(place):
@@ -55,11 +55,11 @@ def sizes_of(law):
 
 
 def usual_sizes():
-    """Return the table of usual sizes; laws with the same ones share their rows."""
+    """Return the table of typical magnitudes; laws with the same ones share their rows."""
     shared = {}
     for law in catalogue().values():
         shared.setdefault(sizes_of(law), []).append(f"`{law.id}`")
-    lines = ["| effect | parameters | usual size |", "|---|---|---|"]
+    lines = ["| effect | parameters | typical magnitude |", "|---|---|---|"]
     for rows, laws in shared.items():
         for number, (keys, size) in enumerate(rows):
             lines.append(f"| {', '.join(laws) if number == 0 else ''} | {keys} | {size} |")
@@ -76,7 +76,7 @@ def exactness():
     return "\n".join(lines) + "\n"
 
 
-TABLES = {"usual sizes": usual_sizes, "exactness": exactness}
+TABLES = {"typical magnitudes": usual_sizes, "exactness": exactness}
 
 
 def written(text, name):

@@ -170,8 +170,8 @@ def fit_base(
         In the order of time.
     extras : sequence of Effect, optional
         Effects fitted along, from the values that they have, with priors about zero as wide as
-        they are large, at least of the usual size: what the data do not show stays small.  One that
-        belongs to the base comes on top of what the wrist was built with.
+        they are large, at least of the typical magnitude: what the data do not show stays small.
+        One that belongs to the base comes on top of what the wrist was built with.
     start : BaseFit, optional
         Where the base begins.
     beside : bool

@@ -238,7 +238,7 @@ def _require_usual_sizes(law: Law, place: str) -> None:
         if not 0.0 < each.scale < np.inf:
             raise InputError(
                 f"{law.id}@{place}: {each.key} has the scale {each.scale:g}; a diagnosis needs its "
-                "usual size, finite and above 0"
+                "typical magnitude, finite and above 0"
             )
 
 

@@ -20,7 +20,7 @@ MOST_TRIALS = 7
 """Steps of the fit of one candidate."""
 
 FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
-"""Multiples of the typed values that are tried where a law knows no usual size."""
+"""Multiples of the typed values that are tried where a law knows no typical magnitude."""
 
 MOST_MULTIPLES = 512
 
@@ -56,7 +56,7 @@ class Beyond:
         return np.asarray(rows - self._basis @ (self._basis.T @ rows))
 
     def best_multiple(self, effect: Effect) -> Effect:
-        """Return an effect without a usual size at that multiple of its values that explains most.
+        """Return an effect without a typical magnitude at the best multiple of its values.
 
         Parameters
         ----------

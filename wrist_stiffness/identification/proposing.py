@@ -185,7 +185,7 @@ def _key(free: Sequence[int]) -> str:
 
 
 def _usual(free: Sequence[int]) -> float:
-    """Return the usual size of a screw [m] or [rad]."""
+    """Return the typical magnitude of a screw [m] or [rad]."""
     usual = USUAL_UM if free[0] < 3 else USUAL_MDEG
     return usual * si_factor(_key(free))
 
@@ -231,7 +231,7 @@ class _Library:
         return row if row.std() > 1e-6 * (np.abs(row).max() + 1e-300) else None
 
     def _carriers(self, problem: WristProblem) -> Array:
-        """Return what a screw of usual size does to each unit, by place and axis, (p, 6, u, 6)."""
+        """Return what a typical screw does to each unit, by place and axis, (p, 6, u, 6)."""
         trials = []
         for name in PLACES:
             for axis in range(6):

@@ -69,7 +69,7 @@ class WristFit:
 
     @cached_property
     def sized(self) -> dict[int, Parameter]:
-        """Parameters of effects by the place of their unknown, of those with a usual size."""
+        """Parameters by the place of their unknown, where they have a typical magnitude."""
         problem, found = self.base.problem, {}
         for places in self.places.values():
             for place in places.tolist():
@@ -91,7 +91,7 @@ class WristFit:
 
     @cached_property
     def point(self) -> Point:
-        """Where the fit ended, whitened; effects in usual sizes from the mean of their law."""
+        """Where the fit ended, whitened; effects in typical magnitudes from their law's mean."""
         base, table = self.base, self.table
         z = base.z.copy()
         inexact = [np.zeros((len(table.whiten(base.residual)), 0))]

@@ -14,7 +14,7 @@ from wrist_stiffness.model.situation import Situation
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 SAME, FORCE_FROM_MOMENT, MOMENT_FROM_FORCE = "percent", "N_per_Nm", "Nmm_per_N"
 PRIOR = {SAME: (100.0, 1.0), FORCE_FROM_MOMENT: (100.0, 1.0), MOMENT_FROM_FORCE: (100.0, 0.1)}
-"""Bound and usual size: a hundredth of full scale, moments being 10 mm times forces."""
+"""Bound and typical magnitude: a hundredth of full scale, moments being 10 mm times forces."""
 
 
 def unit(axis: str, source: str) -> str:
