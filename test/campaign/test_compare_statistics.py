@@ -89,7 +89,7 @@ def ripple(o):
     [
         (zone, "a zone of poses", "s_um"),
         (saw_tooth, "the time", "s_um"),
-        (both_angles, "a zone of poses", "phi_mdeg"),
+        (both_angles, "the difference of the motor angles", "phi_mdeg"),
         (ripple, "the angle of motor 1", "s_um"),
         (lambda o: along(o, 0, 1.5e-6 * o.covariate("approach_1")), "the side of approach", "s_um"),
         (lambda o: along(o, 2, 3e-6 * o.covariate("fz")), "the load", "s_um"),
@@ -170,6 +170,12 @@ def test_a_signal_is_told_with_the_direction_and_a_curve_that_is_right(dwells):
     assert np.sqrt(np.mean(pulls**2)) < 2.0
     assert "As humidity goes from 3" in sentences(found)[0]
     assert " um along +z." in sentences(found)[0]
+
+
+def test_two_signals_together_are_told_where_neither_alone_shows(dwells):
+    found = table(dwells, lambda c: shift(2, 0.2e-6 * (c["humidity"] - 50.0) * c["theta_1"]))
+    assert found.told[0].name == "humidity and the pose together"
+    assert found.told[0].probability > 0.99
 
 
 def test_lost_motion_is_told_as_what_the_other_side_changes(dwells):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -89,6 +89,16 @@ def _zone(conditions: Conditions) -> Array:
     return centred(bell(_columns(conditions, *ANGLES), ZONE))
 
 
+def _difference(conditions: Conditions) -> Array:
+    one, two = (conditions[name] for name in ANGLES)
+    return centred(bell(scaled((one - two)[:, None]), RIPPLE))
+
+
+def _with_pose(name: str) -> Callable[[Conditions], Array]:
+    """Two signals together: neither of them alone shows it."""
+    return lambda own: centred(straight(_columns(own, name)) * pose_kernel(own))
+
+
 def _pushed(conditions: Conditions) -> Array:
     """Play follows the direction of a load and not its size."""
     sides = []
@@ -122,6 +132,12 @@ def finer_questions(conditions: Conditions) -> tuple[Question, ...]:
         Question("the direction of the load", _pushed, 10, LOAD),
         Question("a zone of poses", _zone, 30, ANGLES),
         *map(ripple, ANGLES),
+        Question("the difference of the motor angles", _difference, 25, ANGLES),
+        *(
+            Question(f"{name} and the pose together", _with_pose(name), 12, (name, *ANGLES))
+            for name in conditions
+            if name not in KNOWN and not name.startswith("T_")
+        ),
     )
 
 
