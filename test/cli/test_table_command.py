@@ -125,6 +125,7 @@ def test_pictures_show_something(small_table, tmp_path, capsys):
         "map_phi.png",
         "budget.png",
         "bent.png",
+        "uncertainty.png",
     }
     assert {line.strip() for line in written} == {str(path) for path in folder.iterdir()}
     seen = {path.name: image.imread(path)[..., :3] for path in folder.iterdir()}
@@ -254,6 +255,10 @@ def test_build_writes_a_table_that_is_good(tmp_path, monkeypatch, capsys):
     assert table.checksum[:12] in shown
     assert len(table.nodes) == len(table.workspace.grid(5))
     assert header["mesh"]["sizes_mm"]["link"] == pytest.approx(4.0)
+    errors = header["errors"]
+    second = errors["second_order_relative"]
+    assert errors["stated_relative"] > errors["mesh_relative"] + second > second > 0.0
+    assert f"stated error:              {100 * errors['stated_relative']:.2f} %" in shown
     geometry = shipped_file("config/palmieri2015.yaml")
     assert check("built.npz", tmp_path, "--geometry", geometry)[0] == 0
     # A coarse mesh is a little too stiff, not another wrist.

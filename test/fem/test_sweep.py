@@ -9,13 +9,21 @@ import yaml
 from wrist_stiffness.commands.table_check import check
 from wrist_stiffness.errors import TableError
 from wrist_stiffness.fem import sweep
+from wrist_stiffness.fem.components import elastic_components
 from wrist_stiffness.fem.condensed_store import CondensedStore, condense_solid
+from wrist_stiffness.fem.error_budget import FINE_RINGS
 from wrist_stiffness.fem.one_sided import PatchedWrist, patch_bushing, solve_patches
 from wrist_stiffness.fem.parts import assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.sweep import BuildSettings, build_table
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table_file import load_table, save_table
+from wrist_stiffness.lookup.verification import (
+    COVERED,
+    random_loads,
+    relative_misses,
+    unseen_poses,
+)
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
 
@@ -141,6 +149,30 @@ def test_a_table_that_is_interpolated_states_that_error_too(values, store, table
     worst = max(by_spline.header.errors["predicted"]["operative"].values())
     added = by_spline.header.errors["stated_relative"] - table.header.errors["stated_relative"]
     assert added == pytest.approx(worst, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_stated_error_covers_a_better_solution(table, store):
+    """Finer elements and flanges of more rings, at poses and loads drawn anew every time."""
+    geometry, rng = table.geometry, np.random.default_rng()
+    better, _ = elastic_components(
+        geometry, COARSE.sizes.times(0.64), condenser=store, rings=FINE_RINGS
+    )
+    assert len(better.sectors.gap) > len(table.components.sectors.gap)
+    poses = unseen_poses(table.workspace, rng)
+    loads = random_loads(geometry.limits, len(poses), rng)
+    configuration = table.mechanism.forward(poses)
+    found, exact = (
+        respond(contact_operators(configuration, parts, geometry.gravity), loads).twist
+        for parts in (table.components, better)
+    )
+    errors, misses = table.header.errors, relative_misses(found, exact)
+    covered = misses <= errors["stated_relative"]
+    for where in (covered, covered[table.workspace.operative(poses)]):
+        assert np.all(where.mean(axis=0) >= COVERED)
+    # Neither part of the budget would do alone, and it is no cover for everything.
+    assert errors["stated_relative"] > max(errors["mesh_relative"], errors["contact_relative"])
+    assert np.all(covered.mean(axis=0) - (misses <= 0.1 * errors["stated_relative"]).mean(0) > 0.2)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness.commands.uncertainty import with_second_order
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.lookup.biharmonic import Kernel
@@ -91,7 +92,8 @@ def build(
         kernel=kernel,
     )
     store = CondensedStore(output.with_name(f".{output.stem}.parts"))
-    table = save_table(build_table(root.plain, settings, progress, store), output)
+    table = with_second_order(build_table(root.plain, settings, progress, store))
+    table = save_table(table, output)
     store.remove()
     return table
 

@@ -12,7 +12,6 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.condensed_store import PACKAGES, CondensedSolid, condense_solid
 from wrist_stiffness.fem.parts import Part, Solid, wrist_parts
-from wrist_stiffness.fem.revolve import SECTORS
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
 from wrist_stiffness.mechanism.components import (
@@ -71,6 +70,7 @@ def elastic_components(
     interface: Interface = "rigid",
     progress: PartProgress | None = None,
     condenser: Condenser = condense_solid,
+    rings: int = 1,
 ) -> tuple[ElasticComponents, Provenance]:
     """Condense every elastic part of a wrist.
 
@@ -86,6 +86,8 @@ def elastic_components(
         See `PartProgress`.
     condenser : callable
         `condense_solid`, or a `CondensedStore` that remembers.
+    rings : int
+        Contact modes over the width of a flange.
 
     Returns
     -------
@@ -104,7 +106,7 @@ def elastic_components(
     if interface not in INTERFACES:
         raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
     start = time.perf_counter()
-    parts = wrist_parts(geometry)
+    parts = wrist_parts(geometry, rings)
     condensed: dict[Solid, CondensedSolid] = {}
     for done, part in enumerate(parts):
         if progress is not None:
@@ -174,7 +176,10 @@ def _flange_contact(part: Part, element: Superelement, bushing: BushingDimension
         screw=part.home.screw @ (element.flexibility @ wrench + screw),
         approach=on_hub + screw.T @ wrench + element.sector_approach,
         weight_approach=element.sector_weight @ part.home.rotation.T,
-        gap=np.repeat([gap_of[flange] for flange in part.solid.flanges], SECTORS).astype(float),
+        gap=np.repeat(
+            [gap_of[flange] for flange in part.solid.flanges],
+            len(wrench.T) // len(part.solid.flanges),
+        ).astype(float),
     )
 
 

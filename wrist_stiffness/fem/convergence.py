@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -103,9 +103,8 @@ def mesh_convergence(
     for done, factor in enumerate(factors):
         if progress is not None:
             progress(done, len(factors))
-        scaled = MeshSettings(**{name: factor * size for name, size in asdict(sizes).items()})
         components, provenance = elastic_components(
-            geometry, scaled, interface, condenser=condenser
+            geometry, sizes.times(factor), interface, condenser=condenser
         )
         operators = contact_operators(configuration, components, np.zeros(3))
         # Columns 3 and 4 of the map are |s| and phi.

@@ -21,7 +21,13 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.cyclic import factorise_cyclic
 from wrist_stiffness.fem.elasticity import cylindrical_axes, rigid_motion, surface_integrals
 from wrist_stiffness.fem.mesh import SolidMesh
-from wrist_stiffness.fem.parts import ElasticBody, Part, assemble_body, wrist_parts
+from wrist_stiffness.fem.parts import (
+    ElasticBody,
+    Part,
+    assemble_body,
+    split_into_rings,
+    wrist_parts,
+)
 from wrist_stiffness.fem.revolve import SECTORS
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.fem.wrist_model import DRIVEN, FRAMES, HUB
@@ -112,7 +118,7 @@ def patch_bushing(body: ElasticBody, wall_rings: int, flange_rings: int) -> Patc
     modes, names, places = [], [], []
     for k in range(mesh.slices):
         for name, facets, rings, way, sign in surfaces:
-            for patch in _rings_of_slice(mesh, facets, k, rings, along_radius=way == 2):
+            for patch in split_into_rings(mesh, _slice(mesh, facets, k), rings, way == 2):
                 integrals = surface_integrals(replace(mesh, surfaces={"patch": patch}), "patch")
                 area, *moment = integrals.sum(axis=0)
                 mode = np.zeros((len(mesh.nodes), 3))
@@ -372,18 +378,8 @@ def _free_ways(geometry: Geometry) -> Array:
     return np.asarray(block_diag(*blocks))
 
 
-def _rings_of_slice(
-    mesh: SolidMesh, facets: NDArray[np.int64], number: int, rings: int, along_radius: bool
-) -> list[NDArray[np.int64]]:
-    """Facets of one slice of a swept surface, ring by ring."""
-    corners = mesh.tets.p[:, mesh.tets.facets[:, facets]]
-    centre = corners.mean(axis=1)
+def _slice(mesh: SolidMesh, facets: NDArray[np.int64], number: int) -> NDArray[np.int64]:
+    """Facets of one slice of a swept surface."""
+    centre = mesh.tets.p[:, mesh.tets.facets[:, facets]].mean(axis=1)
     angle = np.arctan2(centre[1], centre[0]) % (2.0 * np.pi)
-    place = np.hypot(corners[0], corners[1]) if along_radius else corners[2]
-    # Both triangles of a mesh line's quadrilateral reach from one of its ends to the other.
-    line = np.round(place.min(axis=0) + place.max(axis=0), 9)
-    lines, of_facet = np.unique(line, return_inverse=True)
-    rings = min(rings, len(lines))
-    ring = of_facet * rings // len(lines)
-    here = (angle * mesh.slices / (2.0 * np.pi)).astype(int) == number
-    return [facets[here & (ring == k)] for k in range(rings)]
+    return facets[(angle * mesh.slices / (2.0 * np.pi)).astype(int) == number]

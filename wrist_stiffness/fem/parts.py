@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from wrist_stiffness.fem.elasticity import (
@@ -86,6 +87,8 @@ class Solid:
         turns, and at a passive joint slides, against what is on the platform side.
     flanges : tuple of str
         Flanges that take part in contact.
+    rings : int
+        Contact modes over the width of each sector, of equal numbers of mesh lines.
     """
 
     dimensions: LinkDimensions | BushingDimensions
@@ -93,6 +96,7 @@ class Solid:
     motor_wall: str
     platform_wall: str
     flanges: tuple[str, ...]
+    rings: int = 1
 
     @property
     def material(self) -> Material:
@@ -106,7 +110,7 @@ class Solid:
 
     @property
     def sectors(self) -> list[str]:
-        """Names of the surfaces that are contact modes, in order."""
+        """Names of the surfaces that carry contact modes, in order."""
         return [f"{flange}_{k}" for flange in self.flanges for k in range(SECTORS)]
 
 
@@ -148,13 +152,15 @@ class ElasticBody:
     pressure: Array
 
 
-def wrist_parts(geometry: Geometry) -> list[Part]:
+def wrist_parts(geometry: Geometry, rings: int = 1) -> list[Part]:
     """List the elastic parts of a wrist in the order of `ELASTIC`.
 
     Parameters
     ----------
     geometry : Geometry
         The wrist.
+    rings : int
+        Contact modes over the width of a flange.
 
     Returns
     -------
@@ -162,7 +168,7 @@ def wrist_parts(geometry: Geometry) -> list[Part]:
         Equal solids compare equal.
     """
     return [
-        _link_part(geometry, name) if name in LINKS else _bushing_part(geometry, name)
+        _link_part(geometry, name) if name in LINKS else _bushing_part(geometry, name, rings)
         for name in ELASTIC
     ]
 
@@ -186,11 +192,15 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
         mesh = mesh_solid(link_shape(solid.dimensions, solid.angle, sizes))
     else:
         mesh = _bushing_mesh(solid.dimensions, sizes)
-    pressure = np.zeros((len(mesh.nodes), 3, len(solid.sectors)))
-    for k, sector in enumerate(solid.sectors):
-        share = surface_integrals(mesh, sector)[:, 0]
+    modes = []
+    for sector in solid.sectors:
         away_from_hub = -1.0 if sector.startswith(FLANGES[0]) else 1.0
-        pressure[:, 2, k] = away_from_hub * share / share.sum()
+        for ring in split_into_rings(mesh, mesh.surfaces[sector], solid.rings):
+            share = surface_integrals(replace(mesh, surfaces={"ring": ring}), "ring")[:, 0]
+            modes.append(away_from_hub * share / share.sum())
+    pressure = np.zeros((len(mesh.nodes), 3, len(modes)))
+    for k, mode in enumerate(modes):
+        pressure[:, 2, k] = mode
     mass = mass_matrix(mesh, solid.material.density)
     return ElasticBody(
         solid=solid,
@@ -198,8 +208,39 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
         stiffness=stiffness_matrix(mesh, solid.material),
         mass=mass,
         weight=body_force(mass),
-        pressure=pressure.reshape(3 * len(mesh.nodes), len(solid.sectors)),
+        pressure=pressure.reshape(3 * len(mesh.nodes), len(modes)),
     )
+
+
+def split_into_rings(
+    mesh: SolidMesh, facets: NDArray[np.int64], rings: int, along_radius: bool = True
+) -> list[NDArray[np.int64]]:
+    """Split facets of a swept surface into rings of equal numbers of mesh lines.
+
+    Parameters
+    ----------
+    mesh : SolidMesh
+        A bushing's.
+    facets : (n,) int
+        Of a flange, or of a wall.
+    rings : int
+        At most so many; no more than there are lines.
+    along_radius : bool
+        From inside out, as on a flange; else along z.
+
+    Returns
+    -------
+    list of (m,) int
+        Facets ring by ring.
+    """
+    corners = mesh.tets.p[:, mesh.tets.facets[:, facets]]
+    place = np.hypot(corners[0], corners[1]) if along_radius else corners[2]
+    # Both triangles of a mesh line's quadrilateral reach from one of its ends to the other.
+    lines, of_facet = np.unique(
+        np.round(place.min(axis=0) + place.max(axis=0), 9), return_inverse=True
+    )
+    rings = min(rings, len(lines))
+    return [facets[of_facet * rings // len(lines) == k] for k in range(rings)]
 
 
 def _link_part(geometry: Geometry, name: str) -> Part:
@@ -220,7 +261,7 @@ def _bushing_mesh(bushing: BushingDimensions, sizes: MeshSettings) -> SolidMesh:
     return revolve(bushing_section(bushing, sizes), arcs)
 
 
-def _bushing_part(geometry: Geometry, name: str) -> Part:
+def _bushing_part(geometry: Geometry, name: str, rings: int) -> Part:
     bushing = geometry.bushings[name]
     outwards = geometry.joint_side(name)
     least = np.eye(3)[np.argmin(np.abs(outwards))]
@@ -236,7 +277,7 @@ def _bushing_part(geometry: Geometry, name: str) -> Part:
     )
     if name in PASSIVE_JOINTS:
         flanges = tuple(end for end in FLANGES if gaps[end] is not None)
-        solid = Solid(shape, 0.0, "pin_wall", "hub_wall", flanges)
+        solid = Solid(shape, 0.0, "pin_wall", "hub_wall", flanges, rings)
     else:
         solid = Solid(shape, 0.0, "hub_wall", "pin_wall", ())
     return Part(name, solid, Placement(axes, abs(bushing.radius) * outwards))

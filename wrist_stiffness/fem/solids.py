@@ -9,7 +9,7 @@ in millimetres because the CAD kernel's tolerance is 1e-7 units; the meshes are 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 from netgen.occ import (
     Axes,
@@ -63,6 +63,10 @@ class MeshSettings:
     bushing: float
     bushing_corner: float
     bushing_arc: float
+
+    def times(self, factor: float) -> MeshSettings:
+        """Return all sizes times a factor."""
+        return MeshSettings(*(factor * size for size in astuple(self)))
 
 
 def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGeometry:

@@ -18,21 +18,14 @@ from wrist_stiffness.errors import TableError
 from wrist_stiffness.fem.components import SHIPPED_SIZES, Condenser, elastic_components
 from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.convergence import QUANTITIES, mesh_convergence
-from wrist_stiffness.fem.one_sided import lifting_misses
+from wrist_stiffness.fem.error_budget import error_budget
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.operators import pack
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
-from wrist_stiffness.lookup.verification import (
-    HALVES,
-    STATED,
-    UNSEEN_SEED,
-    interpolation_errors,
-    random_loads,
-    unseen_poses,
-)
+from wrist_stiffness.lookup.verification import interpolation_errors, unseen_poses
 from wrist_stiffness.mechanism.components import ELASTIC, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -49,9 +42,6 @@ DOMAIN_FACTOR = 4.0
 
 MESH_FACTORS = (1.5625, 1.25, 1.0)
 """Element sizes of the mesh study over those of the table, which is the last."""
-
-LIFTING_DRAWS = 100
-"""Poses and loads from which the error of two-sided sliding walls is stated."""
 
 MESH_POSES = 12
 """Operative poses over which the mesh study averages."""
@@ -137,7 +127,6 @@ def build_table(
         lambda done, of: progress(len(ELASTIC) + done, steps),
     )
     by_mesh = np.abs(study.errors()[-1])
-    mesh_error = float(np.max(by_mesh))
 
     header = TableHeader(
         geometry=dict(values),
@@ -167,9 +156,11 @@ def build_table(
             f"and by {_worst(errors, 'domain'):.3g} in the domain "
             f"(at most {DOMAIN_FACTOR * settings.tolerance:g}); --evaluation closed_form needs none"
         )
-    walls = _lifting(geometry, components, settings)
-    wall_error = max(walls.values(), default=0.0)
-    stated = mesh_error + wall_error
+    budget = error_budget(
+        geometry, components, study, settings.sizes, settings.interface, condenser
+    )
+    worst = {name: max(halves.values(), default=0.0) for name, halves in budget.items()}
+    stated = worst["stated"]
     if settings.evaluation == "spline":
         stated += _worst(errors, "operative")
     progress(steps, steps)
@@ -179,10 +170,11 @@ def build_table(
             table.header,
             errors={
                 "stated_relative": stated,
-                "mesh_relative": mesh_error,
-                "mesh": dict(zip(QUANTITIES, by_mesh.tolist(), strict=True)),
-                "walls_relative": wall_error,
-                "walls": walls,
+                "mesh_relative": worst["mesh"],
+                "contact_relative": worst["contact"],
+                "walls_relative": worst["walls"],
+                **{name: budget[name] for name in ("mesh", "contact", "walls")},
+                "mesh_mean": dict(zip(QUANTITIES, by_mesh.tolist(), strict=True)),
                 **errors,
             },
         ),
@@ -202,21 +194,6 @@ def _on_grid(header: TableHeader, components: ElasticComponents, geometry: Geome
             configuration, contact_operators(configuration, components, np.zeros(3)), geometry
         ),
     )
-
-
-def _lifting(
-    geometry: Geometry, components: ElasticComponents, settings: BuildSettings
-) -> dict[str, float]:
-    """Error of s and phi where sliding walls lift off; glued ones do not by assumption."""
-    if settings.interface != "sliding":
-        return {}
-    workspace = Workspace(mechanism_of(geometry), geometry.limits)
-    poses = unseen_poses(workspace)[:LIFTING_DRAWS]
-    loads = random_loads(geometry.limits, len(poses), np.random.default_rng(UNSEEN_SEED))
-    sizes = asdict(settings.sizes)
-    coarser = MeshSettings(**{name: MESH_FACTORS[0] * size for name, size in sizes.items()})
-    misses = lifting_misses(geometry, components, coarser, poses, loads)
-    return dict(zip(HALVES, np.quantile(misses, STATED, axis=0).tolist(), strict=True))
 
 
 def _worst(errors: Mapping[str, Any], region: str) -> float:

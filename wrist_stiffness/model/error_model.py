@@ -159,7 +159,11 @@ class ErrorModel:
         errors = self.table.header.errors
         if self.evaluation == "closed_form":
             return float(errors["stated_relative"])
-        parts = errors["mesh_relative"] + errors.get("walls_relative", 0.0)
+        # Added up they are no less than what is stated for the parts together.
+        parts = sum(
+            errors.get(f"{part}_relative", 0.0)
+            for part in ("mesh", "contact", "walls", "second_order")
+        )
         return float(parts + max(errors["predicted"]["domain"].values()))
 
     @cached_property

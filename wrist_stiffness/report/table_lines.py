@@ -67,18 +67,16 @@ def facts(table: Table) -> Iterable[tuple[str, str]]:
     yield "contact", f"{len(table.components.sectors.gap)} flange sectors"
     yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
     yield "evaluation", header.evaluation
-    yield (
-        "mesh error",
-        f"s {100 * errors['mesh']['s']:.2f} %, phi {100 * errors['mesh']['phi']:.2f} % "
-        "(extrapolated from three meshes)",
-    )
-    if errors.get("walls"):
-        walls = errors["walls"]
-        yield (
-            "wall error",
-            f"s {100 * walls['s']:.0f} %, phi {100 * walls['phi']:.0f} % "
-            "(walls that lift off against two-sided ones)",
-        )
+    for part, what in (
+        ("mesh", "extrapolated from three meshes"),
+        ("contact", "one ring over a flange's width against four"),
+        ("walls", "walls that lift off against two-sided ones"),
+        ("second_order", "finite rotations"),
+    ):
+        if bound := errors.get(part):
+            s, phi = 100 * bound["s"], 100 * bound["phi"]
+            yield f"{part.replace('_', ' ')} error", f"s {s:.2f} %, phi {phi:.2f} % ({what})"
+    yield "stated error", f"{100 * errors['stated_relative']:.2f} %, in every covariance"
     for region in ("operative", "domain"):
         worst = errors["predicted"][region]
         yield (

@@ -8,12 +8,14 @@ import numpy as np
 
 from wrist_stiffness.commands.budget import PER_AXIS, Push, budget
 from wrist_stiffness.commands.modes import ModeMap, modes_at
+from wrist_stiffness.commands.uncertainty import contributions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.modes import RigidBody
 from wrist_stiffness.report.pictures.bent_wrist import draw_bent_wrist, draw_mode_shapes
 from wrist_stiffness.report.pictures.budget import draw_budget
 from wrist_stiffness.report.pictures.joint_map import draw_map
+from wrist_stiffness.report.pictures.uncertainty import draw_uncertainty
 
 FINE = 161
 
@@ -34,7 +36,7 @@ def picture_folder(folder: str | Path) -> Path:
 
 
 def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> list[Path]:
-    """Draw what a load does: two maps, the error budget, and the bent wrist.
+    """Draw what a load does (maps, shares, the bent wrist), and what its prediction errs by.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
     Returns
     -------
     list of Path
-        `map_s.png`, `map_phi.png`, `budget.png` and `bent.png`.
+        `map_s.png`, `map_phi.png`, `budget.png`, `bent.png` and `uncertainty.png`.
 
     Raises
     ------
@@ -69,7 +71,8 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
     else:
         halves = found.twist.reshape(-1, 2, 3)
         values[inside] = np.linalg.norm(halves, axis=-1)
-    pictures = [folder / name for name in ("map_s.png", "map_phi.png", "budget.png", "bent.png")]
+    names = ("map_s.png", "map_phi.png", "budget.png", "bent.png", "uncertainty.png")
+    pictures = [folder / name for name in names]
     s, phi = MICRO * values[..., 0], MDEG * values[..., 1]
     label = "shift s of the platform at O [µm]"
     draw_map(table, poses, s, label, load.text, pictures[0])
@@ -77,6 +80,7 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
     draw_map(table, poses, phi, label, load.text, pictures[1])
     draw_budget(table, found, load.text, pictures[2])
     draw_bent_wrist(table, PICTURED_POSE, load, pictures[3])
+    draw_uncertainty(table, contributions(table), pictures[4])
     return pictures
 
 
