@@ -55,7 +55,7 @@ $(READY): setup.py constraints.txt $(wildcard wrist_stiffness/*/native/*)
 	@echo "$(VERSION)" | grep -qx '3\.1[12]' || \
 	  { echo "error: $(PYTHON) is not Python 3.11 or 3.12; use make PYTHON=python3.11" >&2; exit 1; }
 	$(PYTHON) -m venv $(if $(OTHER),--clear) $(VENV)
-	$(RUN) pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt setuptools
-	$(RUN) pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt \
+	$(RUN) pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
+	$(RUN) pip install --quiet --disable-pip-version-check -c constraints.txt \
 	  --no-build-isolation -e '.[$(EXTRAS)]'
 	@touch $(READY)
