@@ -1,7 +1,7 @@
 """Many wrists at once: cost over how many, on one process and on two.
 
 Run as ``python bench/scale.py [--wrists N ...] [--recordings N ...] [--processes N ...]``.  Virtual
-wrists of a tolerance study, and recordings of half a minute in one folder, each a wrist of its own
+wrists of a tolerance study, and recordings of some seconds in one folder, each a wrist of its own
 for `compare --each`.  Time on the clock and of all processors, that of starting the processes
 included; the last line of a table is what a million would take at the rate of its two largest.
 """
@@ -74,6 +74,7 @@ def main() -> None:
     parser.add_argument("--wrists", type=int, nargs="*", default=[500, 2000])
     parser.add_argument("--recordings", type=int, nargs="*", default=[10, 40])
     parser.add_argument("--processes", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of a recording")
     options = parser.parse_args()
     if options.wrists:
         curve(
@@ -87,7 +88,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         table = load_model(MODEL).table
         first = Path(folder) / "0000.mcap"
-        simulate_recording(first, table, CellSettings(), SECONDS, seed=0)
+        simulate_recording(first, table, CellSettings(), options.seconds, seed=0)
         paths = [first]
         for number in range(1, max(options.recordings)):
             paths.append(first.with_name(f"{number:04d}.mcap"))

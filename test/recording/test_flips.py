@@ -201,7 +201,8 @@ def test_times_that_ros_cannot_count_are_told(tmp_path, timeline):
 
 
 def test_chunks_that_all_overlap_do_not_take_all_memory(tmp_path):
-    message = struct.pack("<BQHIQQ", Opcode.MESSAGE, 22, 1, 0, 0, 0)
+    # At its end, so that no chunk may be given before the last one is opened.
+    message = struct.pack("<BQHIQQ", Opcode.MESSAGE, 22, 1, 0, 1, 1)
     padding = (1 << 25) - 31
     filler = struct.pack("<BQ", 0x90, padding - 9) + bytes(padding - 9)
     packed = zstandard.ZstdCompressor().compress(message + filler)

@@ -237,6 +237,24 @@ def test_any_sequence_comes_back_in_stable_time_order(tmp_path_factory, written,
     )
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(0, 9).map(lambda each: each if each < 9 else 2**63 - 1), max_size=30))
+def test_chunks_that_overlap_are_merged_in_stable_time_order(tmp_path_factory, times):
+    path = tmp_path_factory.mktemp("overlapping") / "recording.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=150)  # some three messages
+        writer.start("ros2")
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data")
+        channel = writer.register_channel("/a", "cdr", schema)
+        for number, time_ns in enumerate(times):
+            writer.add_message(channel, time_ns, encode(Float64(float(number))), time_ns)
+        writer.finish()
+    numbered = sorted(enumerate(times), key=lambda each: each[1])
+    assert list(open_recording(path, strict=True).messages()) == [
+        ("/a", time_ns, Float64(float(number))) for number, time_ns in numbered
+    ]
+
+
 def test_memory_is_bounded_by_chunks(tmp_path):
     count, numbers = 1200, np.random.default_rng(3)
     path = tmp_path / "large.mcap"
@@ -256,3 +274,14 @@ def test_memory_is_bounded_by_chunks(tmp_path):
     # One chunk of 1 MiB in its raw, compressed and split forms.
     assert writing_peak < 6e6
     assert reading_peak < 6e6
+
+
+def test_a_block_of_large_messages_is_few_of_them(tmp_path, monkeypatch):
+    path, limit = tmp_path / "large.mcap", 1 << 20
+    monkeypatch.setattr("wrist_stiffness.recording.reader.MOST_BYTES_AT_A_TIME", limit)
+    with RecordingWriter(path) as writer:
+        for index in range(40):
+            writer.write("/picture", JointState(position=np.zeros(20_000)), index)
+    blocks = list(open_recording(path).blocks())
+    assert sum(map(len, blocks)) == 40
+    assert max(len(block.buffer) for block in blocks) < 3 * limit

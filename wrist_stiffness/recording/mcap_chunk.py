@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
@@ -100,14 +100,6 @@ Spans = dict[int, Span]
 """By channel id, of the channels that have messages."""
 
 
-class StoredMessage(NamedTuple):
-    """A message as stored."""
-
-    log_time_ns: int
-    channel_id: int
-    payload: bytes
-
-
 @dataclass(frozen=True, eq=False)
 class Contents:
     """A chunk, unpacked and checked.
@@ -132,53 +124,16 @@ class Contents:
     @cached_property
     def spans(self) -> Spans:
         """Messages of each channel."""
-        found = {}
-        for number in np.unique(self.heads["channel"]).tolist():
-            times = self.heads["log_time"][self.heads["channel"] == number]
-            found[number] = Span(times.size, int(times.min()), int(times.max()))
-        return found
-
-    def messages(self, left_out: Collection[int]) -> list[StoredMessage]:
-        """Return the messages by log time, ties in the order of the file.
-
-        Parameters
-        ----------
-        left_out : collection of int
-            Channels that are not wanted.
-        """
-        kept = ~np.isin(self.heads["channel"], list(left_out)) if left_out else slice(None)
-        heads, begins = self.heads[kept], self.begins[kept]
-        order = np.argsort(heads["log_time"], kind="stable")
-        heads, begins = heads[order], begins[order]
-        starts = begins + MESSAGE.itemsize
-        ends = begins + RECORD_HEAD.size + heads["length"].astype(np.int64)
-        columns = (heads["log_time"], heads["channel"], starts, ends)
-        buffer = self.buffer
-        return [
-            StoredMessage(time_ns, channel, buffer[start:end])
-            for time_ns, channel, start, end in zip(*(c.tolist() for c in columns), strict=True)
-        ]
-
-    def payloads(self, wanted: Collection[int]) -> dict[int, tuple[Times, Payloads]]:
-        """Return log times [ns] and payloads of some channels, in the order of the file.
-
-        Many times as fast as `messages`, for readers that need no order between channels.
-        """
-        found: dict[int, tuple[Times, Payloads]] = {}
-        for number in wanted:
-            own = self.heads["channel"] == number
-            sizes = self.heads["length"][own].astype(np.int64) - MESSAGE_HEAD_SIZE
-            times = self.heads["log_time"][own].astype(np.int64)
-            starts = self.begins[own] + MESSAGE.itemsize
-            if sizes.size and sizes[0] and (sizes == sizes[0]).all():
-                size = int(sizes[0])
-                rows = from_each_byte(self.buffer, np.dtype(f"V{size}"))[starts]
-                found[number] = times, rows.view(np.uint8).reshape(-1, size)
-            else:
-                ends = (starts + sizes).tolist()
-                parts = zip(starts.tolist(), ends, strict=True)
-                found[number] = times, [self.buffer[start:end] for start, end in parts]
-        return found
+        order = np.argsort(self.heads["channel"], kind="stable")
+        numbers, first, count = np.unique(
+            self.heads["channel"][order], return_index=True, return_counts=True
+        )
+        if not len(order):
+            return {}
+        times = self.heads["log_time"][order]
+        ends = np.minimum.reduceat(times, first), np.maximum.reduceat(times, first)
+        rows = zip(*(each.tolist() for each in (numbers, count, *ends)), strict=True)
+        return {number: Span(*span) for number, *span in rows}
 
 
 def contents_of(chunk: Chunk) -> Contents:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import heapq
 import os
 from collections import Counter
 from collections.abc import Collection, Iterator
-from itertools import islice, pairwise
 from os import PathLike
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.bag_folder import METADATA_FILE, Bag, bag_of
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.mcap_chunk import (
+    LAST_TIME_NS,
     Chunk,
     Contents,
     Payloads,
-    StoredMessage,
     Times,
     contents_of,
 )
@@ -38,8 +37,10 @@ MESSAGES_AT_A_TIME = 4096
 """A block of messages: enough that a step for all of them costs little for each one."""
 
 PAYLOADS_AT_A_TIME = 10_000
-"""So many of one topic are given together: a chunk has some hundred, and each step of decoding them
-costs as much for a hundred as for a thousand."""
+"""The same for what is only decoded: each step costs as much for a hundred as for a thousand."""
+
+MOST_BYTES_AT_A_TIME = 32 << 20
+"""Where messages are large, a block is fewer of them."""
 
 
 class Recording:
@@ -101,46 +102,8 @@ class Recording:
         RecordingError
             If the recording was opened as strict and a chunk is damaged.
         """
-        chunks = [
-            (chunk, index, position)
-            for index in self._indices
-            for position, chunk in enumerate(index.chunks)
-        ]
-        waiting = sorted(
-            ((chunk.start_ns, order) for order, (chunk, *_) in enumerate(chunks)), reverse=True
-        )
-        # Each entry: time and position in the recording of the next message of an opened chunk.
-        opened: list[tuple[int, int, int, list[StoredMessage]]] = []
-        while waiting or opened:
-            while waiting and (not opened or waiting[-1][0] <= opened[0][0]):
-                _, order = waiting.pop()
-                stored = self._load(*chunks[order][1:], topics)
-                if stored:
-                    overlapping = sum(chunks[other][0].uncompressed_size for _, other, *_ in opened)
-                    if overlapping > MOST_OPENED_BYTES:
-                        raise RecordingError(
-                            f"{self.path}: {len(opened)} chunks of {overlapping} bytes overlap at "
-                            f"{stored[0].log_time_ns} ns, more than {MOST_OPENED_BYTES}: sort it "
-                            "by time ('mcap sort')"
-                        )
-                    heapq.heappush(opened, (stored[0].log_time_ns, order, 0, stored))
-            if not opened:
-                return
-            time_ns, order, position, stored = opened[0]
-            channels = chunks[order][1].channels
-            if len(opened) == 1 and (not waiting or stored[-1].log_time_ns < waiting[-1][0]):
-                # No other chunk reaches into this one: the rest of it needs no comparing.
-                for log_time_ns, channel_id, payload in stored[position:]:
-                    yield RawMessage(channels[channel_id], log_time_ns, payload)
-                opened.clear()
-                continue
-            yield RawMessage(channels[stored[position].channel_id], time_ns, stored[position][2])
-            position += 1
-            if position < len(stored):
-                following = (stored[position].log_time_ns, order, position, stored)
-                heapq.heapreplace(opened, following)
-            else:
-                heapq.heappop(opened)
+        for part in self._parts(topics):
+            yield from part.messages()
 
     def blocks(
         self, topics: Collection[str] | None = None, least: int = MESSAGES_AT_A_TIME
@@ -152,7 +115,7 @@ class Recording:
         topics : Collection[str], optional
             Names to keep; None keeps all.
         least : int
-            So many messages at a time, or up to a chunk more.
+            So many messages at a time or up to a chunk more, or fewer that are large.
 
         Yields
         ------
@@ -165,15 +128,13 @@ class Recording:
             As `raw_messages`.
         """
         waiting: list[RawBlock] = []
-        for part in self._parts(least):
-            if topics is not None:
-                wanted = [channel.topic in topics for channel in part.channels]
-                part = part.take(np.flatnonzero(np.array(wanted)[part.channel]))
+        for part in self._parts(topics):
             waiting.append(part)
-            if sum(map(len, waiting)) >= least:
+            size = sum(len(block.buffer) for block in waiting)
+            if sum(map(len, waiting)) >= least or size >= MOST_BYTES_AT_A_TIME:
                 yield RawBlock.joined(waiting)
                 waiting = []
-        if sum(map(len, waiting)):
+        if waiting:
             yield RawBlock.joined(waiting)
 
     def decoded(self, block: RawBlock, rows: Integers) -> tuple[list[Message], Integers]:
@@ -207,19 +168,34 @@ class Recording:
         """Count payloads of a topic that somebody could not decode as damage."""
         self._undecodable[topic] += count
 
-    def _parts(self, size: int) -> Iterator[RawBlock]:
-        chunks = [chunk for index in self._indices for chunk in index.chunks]
-        if all(before.end_ns <= after.start_ns for before, after in pairwise(chunks)):
-            for index in self._indices:
-                for position in range(len(index.chunks)):
-                    contents = self._contents(index, position)
-                    if contents is not None:
-                        yield RawBlock.of_contents(contents, index.channels)
-            return
-        # Chunks that reach into each other are merged message by message.
-        messages = self.raw_messages()
-        while part := list(islice(messages, size)):
-            yield RawBlock.of(part)
+    def _parts(self, topics: Collection[str] | None) -> Iterator[RawBlock]:
+        """Yield messages by log time, ties in the order of the file, about a chunk at a time."""
+        chunks = [
+            (chunk, index, position)
+            for index in self._indices
+            for position, chunk in enumerate(index.chunks)
+        ]
+        # Chunks that were opened, by their place in the recording: what is left of them.
+        opened: dict[int, RawBlock] = {}
+        for order in sorted(range(len(chunks)), key=lambda order: chunks[order][0].start_ns):
+            chunk, index, position = chunks[order]
+            yield from _earlier(opened, chunk.start_ns, order)
+            contents = self._contents(index, position)
+            if contents is None:
+                continue
+            channels = {
+                number: channel
+                for number, channel in index.channels.items()
+                if topics is None or channel.topic in topics
+            }
+            opened[order] = RawBlock.of_contents(contents, channels)
+            if (size := sum(len(block.buffer) for block in opened.values())) > MOST_OPENED_BYTES:
+                raise RecordingError(
+                    f"{self.path}: {len(opened)} chunks of {size} bytes overlap at "
+                    f"{chunk.start_ns} ns, more than {MOST_OPENED_BYTES}: sort it "
+                    "by time ('mcap sort')"
+                )
+        yield from _earlier(opened, LAST_TIME_NS, len(chunks))
 
     def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
         """Iterate over the payloads of topics, many of one topic at a time.
@@ -232,32 +208,16 @@ class Recording:
         Yields
         ------
         tuple[str, array, Payloads]
-            Topic, log times [ns] and payloads, in the order of the file.
+            Topic, log times [ns] and payloads, in their order.
 
         Raises
         ------
         RecordingError
             If the recording was opened as strict and a chunk is damaged.
         """
-        for index in self._indices:
-            wanted = {
-                number: channel.topic
-                for number, channel in index.channels.items()
-                if channel.topic in topics
-            }
-            runs: dict[int, list[tuple[Times, Payloads]]] = {number: [] for number in wanted}
-            for position in range(len(index.chunks)):
-                contents = self._contents(index, position)
-                for number, part in contents.payloads(wanted).items() if contents else ():
-                    run = runs[number]
-                    if run and not _one_more(run, part):
-                        yield wanted[number], *_joined(run)
-                        run.clear()
-                    if len(part[1]):
-                        run.append(part)
-            for number, run in runs.items():
-                if run:
-                    yield wanted[number], *_joined(run)
+        for block in self.blocks(topics, PAYLOADS_AT_A_TIME):
+            for topic, rows in block.topics().items():
+                yield topic, block.time_ns[rows], block.payloads(rows)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:
         """Iterate over the decoded messages in log-time order.
@@ -291,21 +251,6 @@ class Recording:
                 self._undecodable[channel.topic] += 1
                 continue
             yield channel.topic, log_time_ns, message
-
-    def _load(
-        self, index: McapIndex, position: int, topics: Collection[str] | None
-    ) -> list[StoredMessage]:
-        contents = self._contents(index, position)
-        if contents is None:
-            return []
-        known = index.channels
-        orphans = [number for number in contents.spans if number not in known]
-        unwanted = [
-            number
-            for number, channel in known.items()
-            if topics is not None and channel.topic not in topics
-        ]
-        return contents.messages([*orphans, *unwanted])
 
     def _contents(self, index: McapIndex, position: int) -> Contents | None:
         """Unpack a chunk; report what is wrong with it, None where it cannot be read.
@@ -362,25 +307,20 @@ def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Record
     return Recording(path, [index_mcap(file) for file in bag.files], bag, strict)
 
 
-def _one_more(run: list[tuple[Times, Payloads]], part: tuple[Times, Payloads]) -> bool:
-    """Tell whether payloads go on with those of chunks before: of one form, and not too many."""
-    if sum(len(payloads) for _, payloads in run) >= PAYLOADS_AT_A_TIME:
-        return False
-    return _size(run[-1][1]) == _size(part[1])
-
-
-def _size(payloads: Payloads) -> int | None:
-    """Return the size of payloads that all have one, None of others."""
-    return payloads.shape[1] if isinstance(payloads, np.ndarray) else None
-
-
-def _joined(run: list[tuple[Times, Payloads]]) -> tuple[Times, Payloads]:
-    """Return the payloads of several chunks as those of one."""
-    times = np.concatenate([times for times, _ in run])
-    rows = [payloads for _, payloads in run if isinstance(payloads, np.ndarray)]
-    if rows:
-        return times, np.concatenate(rows)
-    return times, [payload for _, payloads in run for payload in payloads]
+def _earlier(opened: dict[int, RawBlock], start_ns: int, order: int) -> Iterator[RawBlock]:
+    """Take what comes before the first message of a chunk out of those that were opened."""
+    parts = []
+    for number in sorted(opened):
+        block = opened.pop(number)
+        side: Literal["left", "right"] = "right" if number < order else "left"
+        end = int(np.searchsorted(block.time_ns, start_ns, side=side))
+        if end:
+            parts.append(block.take(slice(0, end)))
+        if end < len(block):
+            opened[number] = block.take(slice(end, None))
+    if parts:
+        found = RawBlock.joined(parts)
+        yield found if len(parts) == 1 else found.take(np.argsort(found.time_ns, kind="stable"))
 
 
 def _check_counts(topics: tuple[TopicInfo, ...], stated: dict[str, int]) -> Iterator[str]:
