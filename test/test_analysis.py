@@ -83,6 +83,22 @@ def test_the_error_falls_with_what_is_found_and_added(model, sessions):
     assert analysis.model is calibrated.model
 
 
+def test_contents_say_what_a_recording_holds(model, sessions):
+    analysis = Analysis(model, sessions)
+    first, second = analysis.contents()
+    assert (first.name, second.name) == ("day_0", "day_1")
+    assert first.measured == 900
+    assert first.duration_s == pytest.approx(89.9)
+    assert first.rate_hz == pytest.approx(10.0, rel=0.01)
+    assert 5 < first.dwells < 100
+    lowest, highest = sessions[0].block.theta[:, 1].min(), sessions[0].block.theta[:, 1].max()
+    assert first.angles[1].tolist() == [lowest, highest]
+    assert 0.0 <= first.speed[0] < first.speed[1] < 5.0
+    assert first.force[1] > 0.5
+    # Before the instrument is registered the error is where it happens to stand.
+    assert second.registered["s_um"] < 0.1 * analysis.versions[0].held_out["s_um"]
+
+
 def test_what_is_cancelled_changes_nothing(model, sessions):
     def cancelling(done, total):
         analysis.cancel()

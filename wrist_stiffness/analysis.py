@@ -127,6 +127,42 @@ class View:
         return np.asarray(self.left.values + self.predicted)
 
 
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What one recording holds.
+
+    Parameters
+    ----------
+    name, instrument : str
+        Of the recording, and of its pose sensor.
+    duration_s, rate_hz : float
+        Duration [s], and measured poses in a second [Hz].
+    measured, dwells : int
+        Measured poses, and poses that were held.
+    angles : (2, 2) float
+        Lowest and highest angle of each motor [rad].
+    speed, force : (float, float)
+        Lowest and highest [rad/s], [N].
+    signals : tuple of str
+        What was recorded beside angles, load and pose.
+    registered : dict of str to float
+        Remaining error once it is known where instrument and target stand, RMS by the key of the
+        quantity.
+    """
+
+    name: str
+    instrument: str
+    duration_s: float
+    rate_hz: float
+    measured: int
+    dwells: int
+    angles: Array
+    speed: tuple[float, float]
+    force: tuple[float, float]
+    signals: tuple[str, ...]
+    registered: Mapping[str, float]
+
+
 class Analysis:
     """Models of one wrist against its recordings.
 
@@ -198,6 +234,36 @@ class Analysis:
             predicted.append(model.predicted([own])[0][session.measured])
         left = base.problem.table.with_values(base.residual)
         return View(left, np.concatenate(predicted), fit.table.noise_and_drift(fit.evidence))
+
+    def contents(self) -> tuple[Contents, ...]:
+        """Return what each recording holds, the instrument registered by the model as given."""
+        base = self._problem(0).begin().base
+        table, found = base.problem.table, []
+        squares = np.nan_to_num(base.residual) ** 2
+        for n, (session, units) in enumerate(
+            zip(self.sessions, base.problem.sessions, strict=True)
+        ):
+            block, cut, warm = session.block, units.cut, len(session.block.temperatures)
+            seconds, measured = float(np.ptp(block.time)), int(session.measured.any(axis=1).sum())
+            speed = np.abs(cut.mean_speed).max(axis=1)
+            force = np.linalg.norm(block.load[:, :3], axis=1)
+            own = table.sessions == n
+            found.append(
+                Contents(
+                    session.name,
+                    str(session.notes.get("pose_sensor", "not told")),
+                    seconds,
+                    measured / seconds if seconds > 0.0 else 0.0,
+                    measured,
+                    int(cut.dwell[units.measured].sum()),
+                    np.stack([block.theta.min(axis=0), block.theta.max(axis=0)], axis=1),
+                    (float(speed.min()), float(speed.max())),
+                    (float(force.min()), float(force.max())),
+                    (*block.covariates, *([f"{warm} temperatures"] if warm else ())),
+                    table.take(own).rms(squares[own]),
+                )
+            )
+        return tuple(found)
 
     def cancel(self) -> None:
         """Let what is being done end with `Cancelled` at its next step; call it from anywhere."""

@@ -3,6 +3,7 @@
 import pytest
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.web.workspace import Workspace
 
 
@@ -28,6 +29,28 @@ def test_a_link_that_leads_out_is_refused(workspace, tmp_path):
     with pytest.raises(InputError, match="no plain file name"):
         workspace.path("model.yaml")
     assert workspace.models() == []
+
+
+def model_file(workspace, table="mine.npz", effects="[]"):
+    text = f"schema: 1\nname: mine\ntable: {{path: {table}}}\neffects: {effects}\n"
+    workspace.save("wrist.yaml", text.encode())
+    return workspace.model("wrist.yaml")
+
+
+@pytest.mark.parametrize("table", ["../mine.npz", "/etc/passwd", "deeper/mine.npz"])
+def test_a_model_whose_table_lies_elsewhere_is_refused(workspace, table):
+    with pytest.raises(InputError, match="lies outside the workspace"):
+        model_file(workspace, table)
+    with pytest.raises(InputError, match=r"law.py lies outside the workspace"):
+        model_file(workspace, effects="[{effect: python, class: '../law.py:Law'}]")
+
+
+def test_a_table_of_the_workspace_or_of_the_package_is_taken(workspace):
+    shipped = shipped_file("precomputed/palmieri2015.npz")
+    assert model_file(workspace) == model_file(workspace, shipped)
+    (workspace.folder / "linked.npz").symlink_to("/etc/passwd")
+    with pytest.raises(InputError, match="lies outside the workspace"):
+        model_file(workspace, "linked.npz")
 
 
 def test_uploads_are_recordings_tables_and_models_only(workspace):

@@ -31,7 +31,6 @@ from wrist_stiffness.planning.plan import Conditions
 from wrist_stiffness.planning.rivals import Rivals
 from wrist_stiffness.planning.timeline import Pace
 from wrist_stiffness.report.plan_folder import write_plan
-from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.web.examples import EXAMPLES, recordings_of
 from wrist_stiffness.web.results import as_commands, told_plan, write_result
@@ -42,6 +41,9 @@ HANG_S = 10.0
 """That it takes to hang a weight on or off, as `plan` says where nobody does [s]."""
 
 HEAVIEST_G = 1000.0
+
+RIVALS = 2
+"""Other proposed laws that are shown."""
 
 SHIPPED = "config/palmieri2015_model.yaml"
 
@@ -95,6 +97,25 @@ class Seen:
     parameters: Mapping[str, float]
 
 
+@dataclass(frozen=True)
+class Offer:
+    """A law that is proposed where no effect of the catalogue explains the error.
+
+    Parameters
+    ----------
+    sentence, formula, component, way : str
+        What it does, and the same as `extend --formula` takes it.
+    probability : float
+        That it is the one.
+    """
+
+    sentence: str
+    formula: str
+    component: str
+    way: str
+    probability: float
+
+
 @dataclass(frozen=True, eq=False)
 class Depends:
     """On what the rest of a version depends.
@@ -105,10 +126,13 @@ class Depends:
         For a technician.
     curves : dict of str to Curve
         By condition.
+    not_varied : tuple of str
+        Conditions of which nothing can be said.
     """
 
     sentences: tuple[str, ...]
     curves: Mapping[str, Curve]
+    not_varied: tuple[str, ...]
 
 
 class Bench:
@@ -146,7 +170,7 @@ class Bench:
         if not names:
             raise InputError("choose at least one recording")
         paths = [self._recording(self._workspace.path(name)) for name in names]
-        return self._open(paths, self._workspace.path(model) if model else shipped_file(SHIPPED))
+        return self._open(paths, self._workspace.model(model) if model else shipped_file(SHIPPED))
 
     def _recording(self, path: Path) -> Path:
         if path.suffix != ".csv":
@@ -168,7 +192,7 @@ class Bench:
             "covariates": tuple(sorted(set.intersection(*shared))),
             "names": tuple(path.name for path in sessions),
             "model_path": model,
-            "glances": tuple(glance(each) for each in sessions.values()),
+            "contents": self._analysis.contents(),
             "remarks": tuple(line for each in sessions.values() for line in each.remarks),
             "views": {},
             "depends": (),
@@ -196,7 +220,11 @@ class Bench:
         """Ask what is missing."""
         self._tell("asking which effect is missing")
         self._answer = self._opened.rank()
-        return {"diagnosis": self._answer.diagnosis, "seen": None}
+        found, offers = self._answer.proposals, []
+        for law in (*found.terms, *found.rivals[:RIVALS]) if found else ():
+            told = law.sentence, law.formula, law.component, law.way, law.probability
+            offers.append(Offer(*told))
+        return {"diagnosis": self._answer.diagnosis, "offers": tuple(offers), "seen": None}
 
     def look_at(self, candidate: str | FormulaEffect) -> Changes:
         """Find what a candidate would explain: `law@component`, or a formula."""
@@ -281,6 +309,7 @@ class Bench:
             "view": (last, self._opened.view(last)),
             "seen": None,
             "diagnosis": None,
+            "offers": (),
         }
 
 
@@ -293,28 +322,7 @@ def _row(version: Version) -> Row:
 def _depends(model: ComparedModel) -> Depends:
     told = model.explained.told
     curves = {each.name: each.curve for each in told if len(each.curve.names) == 1}
-    return Depends(sentences(model.explained), curves)
-
-
-def glance(session: MeasuredSession) -> dict[str, str]:
-    """Return what a recording holds, in words."""
-    block = session.block
-    seconds = float(block.time[-1] - block.time[0])
-    measured = int(session.measured.any(axis=1).sum())
-    angles = np.degrees(block.theta)
-    low, high = angles.min(axis=0), angles.max(axis=0)
-    force = np.linalg.norm(block.load[:, :3], axis=1)
-    warm = f"{len(block.temperatures)} temperatures" if block.temperatures else ""
-    return {
-        "recording": session.name,
-        "duration": f"{seconds / 60.0:.1f} min",
-        "poses": f"{measured:,} measured, {measured / max(seconds, 1e-9):.3g} a second",
-        "motor 1": f"{low[0]:.0f} to {high[0]:.0f} deg",
-        "motor 2": f"{low[1]:.0f} to {high[1]:.0f} deg",
-        "loads": f"{force.min():.2f} to {force.max():.2f} N",
-        "instrument": str(session.notes.get("pose_sensor", "not told")),
-        "beside": ", ".join(filter(None, [warm, *block.covariates])) or "nothing",
-    }
+    return Depends(sentences(model.explained), curves, model.explained.not_varied)
 
 
 class Stopped(WristError):

@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.analysis import View
 from wrist_stiffness.comparing.curve import Curve, condition_label, condition_shown
-from wrist_stiffness.inference.observations import Mask, Observations, Quantity
+from wrist_stiffness.inference.observations import Labels, Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.report.pictures.palette import COLOURS, FLOOR
 from wrist_stiffness.web.bench import Row
@@ -20,11 +20,14 @@ Figure = dict[str, Any]
 BLUE, RED, GREEN = COLOURS[:3]
 AXES = ("x", "y", "z")
 DRAWN = 3000
-"""Points that a picture shows at most; the numbers beside it are of all."""
+"""Points from which a picture is drawn by the graphics card: an hour of motion at half a second."""
 
 SYMBOL = {"s": "s", "phi": "φ"}
 MAP = "Cividis"
 """Perceptually even, and the same to people of any colour vision."""
+
+UNITS = "units"
+"""Marks the traces that are selected by point."""
 
 UNNAMED = {"showlegend": False}
 
@@ -132,9 +135,10 @@ def error_map(shown: Shown, border: Array) -> Figure:
     edge = np.degrees(border)
     text = f"{SYMBOL[shown.quantity.name]} [{shown.unit}]"
     points = {
-        "type": "scatter",
+        "type": _kind(table.n_units),
         "mode": "markers",
-        "name": "measured units",
+        "meta": UNITS,
+        "name": "averaged poses",
         "x": angles[:, 0],
         "y": angles[:, 1],
         "marker": {
@@ -161,8 +165,10 @@ def error_map(shown: Shown, border: Array) -> Figure:
         "hoverinfo": "name",
     }
     ring = _ring(angles[shown.moment, 0], angles[shown.moment, 1])
-    figure = _figure([points, outline, ring], "motor angle 1 [deg]", "motor angle 2 [deg]")
-    figure["layout"] |= {"dragmode": "lasso", "showlegend": False}
+    figure = _figure([points, outline, ring], "motor angle 1 [deg]", "motor angle 2 [deg]", "map")
+    x, y = edge[np.argmax(edge[:, 1])]
+    word = {"x": x, "y": y, "text": "operative workspace", "showarrow": False, "yshift": 9}
+    figure["layout"] |= {"dragmode": "lasso", "showlegend": False, "annotations": [word]}
     figure["layout"]["yaxis"] |= {"scaleanchor": "x"}
     return figure
 
@@ -170,20 +176,21 @@ def error_map(shown: Shown, border: Array) -> Figure:
 def time_line(shown: Shown) -> Figure:
     """Return measured and predicted error over time, and what is left below."""
     view, table = shown.view, shown.view.left
-    time, rows = minutes(table), _drawn(table.n_units)
+    time, breaks = minutes(table), 1 + np.flatnonzero(np.diff(table.sessions))
     measured, predicted = shown.part(view.measured), shown.part(view.predicted)
     left = shown.part(table.values)
     traces = [
-        _dots(time, measured, "measured", FLOOR, rows, shown, size=4),
-        _line(time, predicted, "predicted", BLUE, rows),
-        _dots(time, left, "left", BLUE, rows, shown, yaxis="y2", size=4) | UNNAMED,
+        _dots(time, measured, "measured", FLOOR, shown, size=4),
+        _line(time, predicted, "predicted", BLUE, breaks),
+        _dots(time, left, "left", BLUE, shown, "y2", 4) | UNNAMED,
     ]
     if shown.after is not None:
         after = shown.part(shown.after)
         with_it = predicted + left - after
-        traces.insert(2, _line(time, with_it, f"with {shown.candidate}", RED, rows))
-        traces.append(_dots(time, after, "left", RED, rows, shown, "y2", 4) | UNNAMED)
-    figure = _figure(traces, "time [min]", f"{SYMBOL[shown.quantity.name]} [{shown.unit}]")
+        traces.insert(2, _line(time, with_it, f"with {shown.candidate}", RED, breaks))
+        traces.append(_dots(time, after, "left", RED, shown, "y2", 4) | UNNAMED)
+    label = f"{SYMBOL[shown.quantity.name]} [{shown.unit}]"
+    figure = _figure(traces, "time [min]", label, "time")
     at = float(time[shown.moment])
     cut = {"type": "line", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1}
     figure["layout"] |= {
@@ -194,7 +201,7 @@ def time_line(shown: Shown) -> Figure:
         "shapes": [{**cut, "line": {"color": FLOOR, "width": 1, "dash": "dot"}}],
     }
     figure["layout"]["yaxis"] |= {"domain": [0.5, 1.0]}
-    figure["layout"]["yaxis2"] = {**_axis(f"left [{shown.unit}]"), "domain": [0.0, 0.4]}
+    figure["layout"]["yaxis2"] = {**_axis(f"remaining [{shown.unit}]"), "domain": [0.0, 0.4]}
     figure["layout"]["xaxis"] |= {"anchor": "y2"}
     return figure
 
@@ -212,18 +219,19 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
         Of the comparison, where it is of this condition and version.
     """
     table = shown.view.left
-    values, rows = condition_shown(table, condition), _drawn(table.n_units)
+    values = condition_shown(table, condition)
     if told is not None and shown.after is None and len(told.measured) == table.n_units:
         values, label = told.values[:, 0], f"{SYMBOL[told.quantity.name]} {told.where}"
-        known = [_dots(values, told.measured, "what is left", BLUE, rows, shown, size=6)]
-        law = _line(told.places[:, 0], told.mean, "its law", RED, slice(None))
-        figure = _figure([*known, law], told.labels[0], f"{label} [{unit_of(told.quantity)}]")
+        known = [_dots(values, told.measured, "remaining error", BLUE, shown)]
+        law = _line(told.places[:, 0], told.mean, "its mean", RED, ())
+        label += f" [{unit_of(told.quantity)}]"
+        figure = _figure([*known, law], told.labels[0], label, condition)
     else:
-        traces = [_dots(values, shown.part(table.values), "left", BLUE, rows, shown, size=6)]
+        traces = [_dots(values, shown.part(table.values), "remaining error", BLUE, shown)]
         if shown.after is not None:
             after = shown.part(shown.after)
-            traces.append(_dots(values, after, f"with {shown.candidate}", RED, rows, shown, size=6))
-        figure = _figure(traces, condition_label(condition), shown.part_label)
+            traces.append(_dots(values, after, f"with {shown.candidate}", RED, shown))
+        figure = _figure(traces, condition_label(condition), shown.part_label, condition)
     figure["layout"] |= {
         "dragmode": "lasso",
         "showlegend": True,
@@ -237,26 +245,29 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     sizes = [each.held_out.get(quantity.key, np.nan) for each in versions]
     # The first one stands wherever instrument and target were put: it says nothing of the wrist.
     top = 1.25 * max(sizes[1:] or sizes)
+    unit = unit_of(quantity)
     bars = {
         "type": "bar",
+        "meta": UNITS,
         "orientation": "h",
         "x": sizes,
-        "y": [f"{number}  {each.name}" for number, each in enumerate(versions)],
-        "text": [f"<b>{number(size)}</b> {unit_of(quantity)}" for size in sizes],
-        "textposition": ["inside" if size > 0.4 * top else "outside" for size in sizes],
-        "insidetextanchor": "start",
-        "marker": {"color": [BLUE] * (len(sizes) - 1) + [GREEN]},
+        "y": [
+            f"{place} {each.name}<br><b>{number(size)} {unit}</b>"
+            for place, (each, size) in enumerate(zip(versions, sizes, strict=True))
+        ],
+        "marker": {"color": ["#9ca3af"] + [BLUE] * (len(sizes) - 2) + [GREEN]},
         "hoverinfo": "skip",
-        "cliponaxis": True,
     }
-    figure = _figure([bars], f"{SYMBOL[quantity.name]} on unseen data [{unit_of(quantity)}]", "")
+    label = f"held-out {SYMBOL[quantity.name]} [{unit}]"
+    figure = _figure([bars], label, "", f"versions {len(versions)}")
     floor = noise.get(quantity.key, 0.0)
     line = {"type": "line", "x0": floor, "x1": floor, "yref": "paper", "y0": 0, "y1": 1}
     word = {"x": floor, "y": 1.0, "yref": "paper", "yanchor": "bottom", "showarrow": False}
+    word |= {"xanchor": "left" if floor < 0.6 * top else "right"}
     figure["layout"] |= {
         "showlegend": False,
         "shapes": [{**line, "line": {"color": FLOOR, "width": 2, "dash": "dash"}}],
-        "annotations": [{**word, "text": f"noise {number(floor)}"}],
+        "annotations": [{**word, "text": f"goal: noise floor {number(floor)} {unit}"}],
     }
     figure["layout"]["xaxis"] |= {"range": [0.0, top]}
     figure["layout"]["yaxis"] |= {"autorange": "reversed", "automargin": True}
@@ -272,8 +283,8 @@ def number(value: float) -> str:
     return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
-def _drawn(count: int) -> slice:
-    return slice(None, None, max(1, -(-count // DRAWN)))
+def _kind(count: int) -> str:
+    return "scatter" if count <= DRAWN else "scattergl"
 
 
 def _selected(shown: Shown) -> Figure:
@@ -283,40 +294,30 @@ def _selected(shown: Shown) -> Figure:
 
 
 def _dots(
-    x: Array,
-    y: Array,
-    name: str,
-    colour: str,
-    rows: slice,
-    shown: Shown,
-    yaxis: str = "y",
-    size: int = 5,
+    x: Array, y: Array, name: str, colour: str, shown: Shown, yaxis: str = "y", size: int = 6
 ) -> Figure:
-    chosen = {}
-    if shown.chosen is not None:
-        chosen = {"selectedpoints": np.flatnonzero(shown.chosen[rows]).tolist()}
     return {
-        "type": "scatter",
+        "type": _kind(len(x)),
         "mode": "markers",
+        "meta": UNITS,
         "name": name,
-        "x": x[rows],
-        "y": y[rows],
+        "x": x,
+        "y": y,
         "yaxis": yaxis,
         "marker": {"color": colour, "size": size, "opacity": 0.75},
         "unselected": {"marker": {"opacity": 0.1}},
-        **chosen,
+        **_selected(shown),
     }
 
 
-def _line(x: Array, y: Array, name: str, colour: str, rows: slice) -> Figure:
-    line = {"color": colour, "width": 1.5}
+def _line(x: Array, y: Array, name: str, colour: str, breaks: Sequence[int] | Labels) -> Figure:
     return {
-        "type": "scatter",
+        "type": _kind(len(x)),
         "mode": "lines",
         "name": name,
-        "x": x[rows],
-        "y": y[rows],
-        "line": line,
+        "x": np.insert(x, breaks, np.nan),
+        "y": np.insert(y, breaks, np.nan),
+        "line": {"color": colour, "width": 1.5},
     }
 
 
@@ -345,12 +346,13 @@ def _axis(title: str) -> Figure:
     }
 
 
-def _figure(traces: Sequence[Figure], x: str, y: str) -> Figure:
+def _figure(traces: Sequence[Figure], x: str, y: str, kept: str) -> Figure:
+    """Return a picture that keeps its zoom while the same thing is shown."""
     layout = {
         "margin": {"l": 8, "r": 8, "t": 26, "b": 8},
         "font": {"size": 12, "color": "#1f2937"},
         "plot_bgcolor": "white",
-        "uirevision": "kept",
+        "uirevision": kept,
         "xaxis": _axis(x),
         "yaxis": _axis(y),
     }

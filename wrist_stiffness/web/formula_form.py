@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nicegui import ui
 
 from wrist_stiffness.commands.extend import FormulaEffect, direction_of
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.formula_law import SIGNALS
 from wrist_stiffness.model.places import LIMB
-
-if TYPE_CHECKING:
-    from wrist_stiffness.comparing.curve import Curve
-    from wrist_stiffness.web.page import Workbench
+from wrist_stiffness.web.bench import Offer
+from wrist_stiffness.web.tab import Tab
 
 
 class FormulaForm:
@@ -21,12 +17,12 @@ class FormulaForm:
 
     Parameters
     ----------
-    page : Workbench
+    tab : Tab
         Whose it is.
     """
 
-    def __init__(self, page: Workbench) -> None:
-        self._page = page
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
         props = "dense outlined stack-label"
         with ui.expansion("An effect of your own, by formula").classes("w-full") as self._form:
             self._name = ui.input("name", value="own_effect").props(props)
@@ -40,13 +36,14 @@ class FormulaForm:
             self._look.classes("w-full mt-1")
         self._check()
 
-    def propose(self, condition: str, curve: Curve) -> None:
-        """Fill the form with a straight line over a condition, in the direction that was seen."""
-        unit = "um" if curve.quantity.name == "s" else "mdeg"
-        self._formula.set_value(f"size_{unit} * {condition}")
-        self._way.set_value(curve.where)
-        self._name.set_value(f"by_{condition}".lower())
+    def propose(self, law: Offer) -> None:
+        """Fill the form with a law that was proposed."""
+        self._formula.set_value(law.formula)
+        self._place.set_value(law.component)
+        self._way.set_value(law.way)
+        self._name.set_value("proposed")
         self._form.set_value(True)
+        ui.run_javascript(f"getHtmlElement({self._look.id}).scrollIntoView({{block: 'nearest'}})")
 
     def _effect(self) -> FormulaEffect:
         """Return what is typed; it is read here and in no case run.
@@ -59,13 +56,13 @@ class FormulaForm:
         way = direction_of(str(self._way.value).split())
         own = str(self._name.value), str(self._place.value), way, str(self._formula.value)
         found = FormulaEffect(*own, {})
-        found.effect(self._page.tab.covariates)
+        found.effect(self._tab.covariates)
         return found
 
     def _check(self) -> None:
         try:
             if not str(self._formula.value or "").strip():
-                names = ", ".join([*self._page.tab.covariates, *sorted(SIGNALS)])
+                names = ", ".join([*self._tab.covariates, *sorted(SIGNALS)])
                 raise InputError(f"It may use: {names}; any other name is a number to be found")
             self._effect()
         except InputError as error:
@@ -76,6 +73,6 @@ class FormulaForm:
 
     def _looked(self) -> None:
         try:
-            self._page.work(("look_at", self._effect()))
+            self._tab.work(("look_at", self._effect()))
         except InputError as error:
             ui.notify(str(error), type="warning", multi_line=True)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from itertools import groupby
 
 from nicegui import ui
 
 from wrist_stiffness.comparing.sentences import percent
-from wrist_stiffness.model.formula_law import SIGNALS
+from wrist_stiffness.inference.answer import Diagnosis, Standing
 from wrist_stiffness.report.diagnosis_lines import verdict_lines
+from wrist_stiffness.web.bench import Seen
+from wrist_stiffness.web.figures import SYMBOL, number, unit_of
 from wrist_stiffness.web.formula_form import FormulaForm
-
-if TYPE_CHECKING:
-    from wrist_stiffness.inference.answer import Diagnosis, Standing
-    from wrist_stiffness.web.bench import Seen
-    from wrist_stiffness.web.page import Workbench
+from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab
 
 FIRST = 12
 """Candidates that are listed at once."""
@@ -25,104 +24,99 @@ class MissingPanel:
 
     Parameters
     ----------
-    page : Workbench
+    tab : Tab
         Whose it is.
     """
 
-    def __init__(self, page: Workbench) -> None:
-        self._page = page
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
         self._all = False
         self._last: Seen | None = None
         self._grams = 50.0
         self._body = ui.column().classes("w-full gap-2")
-        self.formula = FormulaForm(page)
-        self.refresh()
+        self._formula = FormulaForm(tab)
+        tab.listeners.append(self.draw)
+        self.draw()
 
-    def refresh(self) -> None:
+    def draw(self) -> None:
         """Say anew what is missing."""
         self._body.clear()
         with self._body:
             self._fill()
 
     def _fill(self) -> None:
-        page, tab = self._page, self._page.tab
+        tab, result = self._tab, self._tab.diagnosis
         if not tab.rows:
             ui.label("Open a recording first.")
             return
-        with ui.expansion("On what the error depends", value=tab.diagnosis is None).classes(
-            "w-full"
-        ):
-            for line in tab.sentences or ("Not asked yet.",):
-                ui.label(line).classes("text-sm")
-        ui.button("What is missing?", on_click=lambda: page.work(("rank",))).classes("w-full")
-        if tab.diagnosis is None:
-            return
-        result = tab.diagnosis
-        for line in verdict_lines(result):
-            ui.label(line).classes("font-bold")
-        if result.verdict == "unknown":
+        with ui.expansion("What the error depends on", value=result is None).classes("w-full"):
+            for line in tab.sentences or ("Not compared yet.",):
+                ui.label(line).classes("text-sm mb-1")
+        ask = ui.button("What is missing?", on_click=lambda: tab.work(("rank",)))
+        ask.classes("w-full").props("outline" if result else "")
+        if result is not None:
+            for line in verdict_lines(result):
+                ui.label(line).classes("font-bold")
             self._proposals()
         self._chosen()
-        ui.label(
-            "Candidates, most probable first; choose one to see what it would explain"
-        ).classes("text-sm text-gray-700")
-        listed = result.standings if self._all else result.standings[:FIRST]
-        for standing in listed:
-            self._candidate(standing, result)
-        if not self._all:
-            ui.button(f"all {len(result.standings)}", on_click=self._more).props("flat dense")
-        if result.not_excited:
-            with ui.expansion(f"{len(result.not_excited)} that these data cannot show").classes(
-                "w-full"
-            ):
-                for each in result.not_excited:
-                    ui.label(f"{each.effect}@{each.component}: {each.needs}").classes("text-xs")
+        if result is not None:
+            self._ranking(result)
 
     def _proposals(self) -> None:
-        """Offer a formula for every recorded signal on which the error surely depends."""
-        known = SIGNALS | set(self._page.tab.covariates)
-        for name, curve in self._page.tab.curves.items():
-            if (signal := curve.names[0]) in known:
-                text = f"Try a straight line over {name}"
-                offer = ui.button(
-                    text, on_click=lambda s=signal, c=curve: self.formula.propose(s, c)
-                )
-                offer.props("outline dense").classes("w-full")
+        """Offer the laws that are proposed where nothing on the list fits."""
+        for law in self._tab.offers:
+            text = f"Proposed ({percent(law.probability)}): {law.sentence}"
+            offer = ui.button(text, on_click=partial(self._formula.propose, law))
+            offer.props("outline dense align=left").classes("w-full text-left")
+
+    def _ranking(self, result: Diagnosis) -> None:
+        ui.label("Candidates, most probable first. Click one to see what it would explain.")
+        alike = {
+            name: ", ".join(other for other in finding.names if other != name)
+            for finding in (*result.findings, *result.suspects)
+            for name in finding.names
+        }
+        listed = result.standings if self._all else result.standings[:FIRST]
+        with ui.column().classes("w-full gap-1"):
+            for why, group in groupby(listed, key=lambda each: each.why_not):
+                ui.label((why or "named") + ":").classes("text-xs text-gray-600 mt-1")
+                for standing in group:
+                    self._candidate(standing, alike.get(standing.name, ""))
+        if len(listed) < len(result.standings):
+            more = ui.button(f"Show all {len(result.standings)}", on_click=self._more)
+            more.props("flat dense")
+        if result.not_excited:
+            title = f"{len(result.not_excited)} effects are not excited by these recordings"
+            with ui.expansion(title).classes("w-full"):
+                ui.label("They are neither found nor ruled out. What would show them:")
+                for each in result.not_excited:
+                    text = f"{each.effect}@{each.component}: {each.needs}"
+                    ui.label(text).classes("text-xs mt-1")
 
     def _more(self) -> None:
         self._all = True
-        self.refresh()
+        self.draw()
 
-    def _candidate(self, standing: Standing, result: Diagnosis) -> None:
-        page, tab = self._page, self._page.tab
-        name = standing.name
-        others = [
-            other
-            for finding in (*result.findings, *result.suspects)
-            if name in finding.names
-            for other in finding.names
-            if other != name
-        ]
+    def _candidate(self, standing: Standing, alike: str) -> None:
+        tab, name = self._tab, standing.name
         chosen = name == tab.candidate
-        button = ui.button(on_click=lambda: page.work(("look_at", name)))
-        button.props(f"no-caps align=left dense {'unelevated' if chosen else 'outline'}")
+        button = ui.button(on_click=lambda: tab.work(("look_at", name), then=("", DEPENDS)))
+        button.props(f"align=left dense {'unelevated' if chosen else 'outline'}")
         button.classes("w-full")
         with button, ui.column().classes("w-full gap-0 items-start text-left px-1"):
             with ui.row().classes("w-full justify-between no-wrap"):
                 ui.label(name).classes("font-bold")
                 ui.label(percent(standing.probability))
-            ui.linear_progress(standing.probability, show_value=False).props(
-                "color=orange-9 track-color=grey-4"
-            )
-            if standing.why_not:
-                ui.label(standing.why_not).classes("text-xs")
-            if others:
-                ui.label(f"cannot be told from {', '.join(others)}").classes("text-xs")
+            if standing.probability >= 0.01:
+                ui.linear_progress(standing.probability, show_value=False).props(
+                    "color=orange-9 track-color=grey-4"
+                )
+            if alike:
+                ui.label(f"not distinguishable from {alike}").classes("text-xs")
 
     def _chosen(self) -> None:
         """Say what the chosen candidate would explain, and how to be sure of it."""
-        page, tab = self._page, self._page.tab
-        seen = tab.seen
+        tab, seen = self._tab, self._tab.seen
         if seen is None:
             return
         box = ui.column().classes("w-full gap-1 p-2 rounded").style("background: #fff7ed")
@@ -131,39 +125,39 @@ class MissingPanel:
             ui.run_javascript(f"getHtmlElement({box.id}).scrollIntoView({{block: 'nearest'}})")
         with box:
             ui.label(f"If {seen.name} were added").classes("font-bold")
-            ui.label(seen.sentence).classes("text-sm")
-            for key, (before, after) in seen.explains.items():
-                quantity, _, unit = key.rpartition("_")
-                unit = "µm" if unit == "um" else unit
-                ui.label(f"{quantity}: {before:.3g} → {after:.3g} {unit} on these data")
+            ui.label(f"{seen.sentence}.").classes("text-sm")
+            for quantity in tab.quantities:
+                before, after = map(number, seen.explains[quantity.key])
+                text = f"{SYMBOL[quantity.name]}: {before} → {after} {unit_of(quantity)}"
+                ui.label(f"{text} on these data")
             for name, value in seen.parameters.items():
                 ui.label(f"{name} = {value:.3g}").classes("text-sm")
             if seen.check:
-                ui.label(f"To be sure: {seen.check}").classes("text-sm")
-            calls = ("add",), ("compare",)
-            add = ui.button("Add it", on_click=lambda: page.work(*calls, then="Models"))
+                ui.label(f"Check on the machine: {seen.check}.").classes("text-sm")
+            calls, then = (("add",), ("compare",)), ("Models", VERSIONS)
+            add = ui.button("Add it", on_click=lambda: tab.work(*calls, then=then))
             add.classes("w-full").props("color=deep-orange-9")
             self._deciding(seen)
 
     def _deciding(self, seen: Seen) -> None:
         """Offer the experiment that tells what is looked at from a rival."""
-        page, tab = self._page, self._page.tab
-        if tab.diagnosis is None:
+        tab = self._tab
+        names = [each.name for each in tab.diagnosis.standings] if tab.diagnosis else []
+        if seen.name not in names or len(names) < 2:
             return
-        names = [each.name for each in tab.diagnosis.standings if each.name != seen.name]
-        if seen.name not in {each.name for each in tab.diagnosis.standings} or not names:
-            return
-        with ui.expansion("Which experiment would decide?").classes("w-full"):
-            rival = ui.select(names, value=names[0], label="against").props("dense")
-            grams = ui.number("weight that you can hang on [g]", value=self._grams).props("dense")
+        names.remove(seen.name)
+        text, folder = tab.planned
+        with ui.expansion("Which experiment would decide?", value=bool(text)).classes("w-full"):
+            rival = ui.select(names, value=names[0], label="against").classes("w-full")
+            grams = ui.number("weight that you can hang on [g]", value=self._grams)
+            grams.classes("w-full").props("dense")
 
             def plan() -> None:
                 self._grams = float(grams.value or 0.0)
-                page.work(("plan", [seen.name, str(rival.value)], self._grams))
+                tab.work(("plan", [seen.name, str(rival.value)], self._grams))
 
-            ui.button("Plan it", on_click=plan).props("outline dense").classes("w-full")
-            text, folder = tab.planned
+            ui.button("Plan it", on_click=plan).props("outline dense").classes("w-full mt-2")
             if text:
                 ui.label(text).classes("text-sm whitespace-pre-line")
             if folder:
-                ui.label(f"written into the workspace: {folder}").classes("text-xs")
+                ui.label(f"Written into the workspace: {folder}").classes("text-xs")

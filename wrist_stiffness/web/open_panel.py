@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
 
+import numpy as np
 from nicegui import events, run, ui
 
+from wrist_stiffness.analysis import Contents
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.web.examples import EXAMPLES, Example
+from wrist_stiffness.web.examples import EXAMPLES
+from wrist_stiffness.web.figures import SYMBOL, number
+from wrist_stiffness.web.tab import Tab
 
-if TYPE_CHECKING:
-    from wrist_stiffness.web.page import Workbench
+SHIPPED = "shipped model"
 
 
 class OpenPanel:
@@ -18,83 +21,104 @@ class OpenPanel:
 
     Parameters
     ----------
-    page : Workbench
+    tab : Tab
         Whose it is.
     largest : int
         Of an upload [bytes].
     """
 
-    def __init__(self, page: Workbench, largest: int) -> None:
-        self._page = page
+    def __init__(self, tab: Tab, largest: int) -> None:
+        self._tab = tab
         self._glance = ui.column().classes("w-full gap-1")
-        ui.label("Examples").classes("font-bold")
-        for example in EXAMPLES:
-            self._card(example)
-        ui.label("Your own").classes("font-bold mt-2")
-        with ui.column().classes("w-full gap-1"):
-            own = page.workspace
-            self._names = ui.select(
-                own.recordings(), multiple=True, label="recordings in the workspace"
-            )
-            self._names.classes("w-full").props("dense outlined use-chips")
-            self._model = ui.select(["", *own.models()], value="", label="model (empty: shipped)")
-            self._model.classes("w-full").props("dense outlined")
-            ui.button("Open", on_click=self._open).props("dense").classes("w-full")
+        own = tab.workspace
+        with ui.expansion("Your own recordings", value=True).classes("w-full dense") as self._own:
             ui.upload(
-                label=f"or drop .mcap, .csv, .yaml, .npz here (up to {largest // 2**20} MB)",
+                label=f"Drop .mcap, .csv, .yaml, .npz here (up to {largest // 2**20} MB)",
                 multiple=True,
                 auto_upload=True,
                 max_file_size=largest,
                 on_upload=self._uploaded,
                 on_rejected=lambda: ui.notify("That file is too large", type="warning"),
-            ).classes("w-full").props("flat bordered")
-            ui.label(f"workspace: {own.folder}").classes("text-xs text-gray-600 break-all")
+            ).classes("w-full drop").props("flat bordered")
+            self._names = ui.select(own.recordings(), multiple=True, label="recordings")
+            self._names.classes("w-full").props("dense use-chips")
+            self._model = ui.select([SHIPPED, *own.models()], value=SHIPPED, label="model")
+            self._model.classes("w-full").props("dense")
+            ui.button("Open", on_click=self._open).classes("w-full mt-2")
+            ui.label(f"workspace: {own.folder}").classes("text-xs text-gray-600 break-all mt-1")
+        with ui.expansion("Examples", value=True).classes("w-full dense") as self._examples:
+            for example in EXAMPLES:
+                card = ui.button(on_click=partial(self._begin, "open_example", example.name))
+                card.props("outline align=left").classes("w-full flex-none mb-2")
+                with card, ui.column().classes("gap-0 items-start text-left"):
+                    ui.label(example.title).classes("font-bold")
+                    ui.label(example.story).classes("text-gray-700 text-xs")
+        tab.listeners.append(self.draw)
 
-    def _card(self, example: Example) -> None:
-        page = self._page
-
-        def chosen() -> None:
-            page.work(("open_example", example.name), ("calibrate",), ("compare",))
-
-        card = ui.button(on_click=chosen).props("outline no-caps align=left")
-        card.classes("w-full flex-none")
-        with card, ui.column().classes("gap-0 items-start text-left"):
-            ui.label(example.title).classes("font-bold")
-            ui.label(example.story).classes("text-gray-700 text-xs normal-case")
+    def _begin(self, *call: object) -> None:
+        self._tab.work(call, ("calibrate",), ("compare",))
 
     def _open(self) -> None:
-        page = self._page
-        names, model = list(self._names.value or []), str(self._model.value or "")
-        page.work(("open_named", names, model), ("calibrate",), ("compare",))
+        model = self._model.value
+        names = list(self._names.value or [])
+        self._begin("open_named", names, "" if model == SHIPPED else str(model))
 
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
-        workspace = self._page.workspace
+        workspace, name = self._tab.workspace, event.file.name
         try:
-            content = await event.file.read()
-            name = event.file.name
-            await run.io_bound(workspace.save, name, content)
+            await run.io_bound(workspace.save, name, await event.file.read())
         except InputError as error:
             ui.notify(str(error), type="warning", multi_line=True)
             return
         self._names.set_options(workspace.recordings())
-        self._model.set_options(["", *workspace.models()])
+        self._model.set_options([SHIPPED, *workspace.models()])
         if name in workspace.recordings():
             self._names.set_value([*(self._names.value or []), name])
         elif name in workspace.models():
             self._model.set_value(name)
 
-    def refresh(self) -> None:
+    def draw(self) -> None:
         """Say anew what is opened."""
-        tab = self._page.tab
+        tab = self._tab
+        if not self._glance.default_slot.children:
+            self._own.set_value(False)
+            self._examples.set_value(False)
         self._glance.clear()
         with self._glance:
-            if tab.glances:
-                ui.label("What is in it").classes("font-bold")
-            for rows in tab.glances:
-                with ui.grid(columns="auto 1fr").classes("w-full gap-x-3 gap-y-0 text-sm"):
-                    for name, value in rows.items():
-                        ui.label(name).classes("text-gray-600")
-                        ui.label(value)
-                ui.separator()
+            ui.label("What is in it").classes("font-bold")
+            rows = [_told(each) for each in tab.contents]
+            columns = f"auto repeat({len(rows)}, minmax(0, 1fr))"
+            with ui.grid(columns=columns).classes("w-full gap-x-3 gap-y-0 text-sm"):
+                for name in rows[0]:
+                    ui.label(name).classes("text-gray-600")
+                    for each in rows:
+                        ui.label(each[name]).classes("break-words")
+            if tab.depends:
+                idle = ", ".join(tab.not_varied)
+                text = f"Not varied, so nothing can be said of: {idle}."
+                ui.label(text if idle else "Every recorded condition was varied.")
             for remark in tab.remarks:
                 ui.label(remark).classes("text-xs text-orange-800")
+
+
+def _told(each: Contents) -> dict[str, str]:
+    """Return what a recording holds, in words."""
+    (low_1, high_1), (low_2, high_2) = np.degrees(each.angles)
+    left = [key.rpartition("_") for key in each.registered]
+    sizes = zip(left, each.registered.values(), strict=True)
+    return {
+        "recording": each.name,
+        "duration": f"{each.duration_s / 60.0:.1f} min",
+        "measured poses": f"{each.measured:,}, {each.rate_hz:.3g} Hz",
+        "poses held": f"{each.dwells:,}",
+        "motor 1": f"{low_1:.0f} to {high_1:.0f}°",
+        "motor 2": f"{low_2:.0f} to {high_2:.0f}°",
+        "speed": f"up to {np.degrees(each.speed[1]):.0f} deg/s",
+        "load": f"{each.force[0]:.2f} to {each.force[1]:.2f} N",
+        "instrument": each.instrument,
+        "registered to": ", ".join(
+            f"{SYMBOL[name]} {number(size)} {'µm' if unit == 'um' else unit}"
+            for (name, _, unit), size in sizes
+        ),
+        "other signals": ", ".join(each.signals) or "none",
+    }

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
-from nicegui import background_tasks, events, run, ui
+from nicegui import events, ui
 
 from wrist_stiffness.web.missing_panel import MissingPanel
 from wrist_stiffness.web.models_panel import ModelsPanel
@@ -20,12 +17,26 @@ body { background: #f3f4f6; }
 .nicegui-content { padding: 0; gap: 0; }
 .q-tab__label { text-transform: none; font-weight: 600; }
 .q-btn { text-transform: none; }
+.q-btn-toggle { flex: none; }
+.q-btn-toggle .q-btn__content { white-space: nowrap; flex-wrap: nowrap; }
+.q-expansion-item .q-item { padding: 4px; min-height: 32px; font-weight: 600; }
+.q-expansion-item__content .nicegui-expansion-content { padding: 4px; gap: 4px; }
+.drop .q-uploader__list { min-height: 48px; padding: 4px; }
 *:focus-visible { outline: 3px solid #d55e00 !important; outline-offset: 1px; }
 """
 
+START = (
+    "Open a recording of your wrist, or an example. The workbench registers the instrument, "
+    "calibrates the model and shows where its error remains.",
+    "Ask what is missing. Every known effect is ranked by its probability. Click one to see what "
+    "it would explain, and what to check on the machine.",
+    "Add it. The held-out error, on data that no fit has used, falls towards the noise floor. "
+    "Export the model, the report and the commands that do the same.",
+)
 
-class Workbench:
-    """The page of one tab.
+
+def build_page(workspace: Workspace, largest: int) -> None:
+    """Build the page of one tab.
 
     Parameters
     ----------
@@ -34,96 +45,51 @@ class Workbench:
     largest : int
         Of an upload [bytes].
     """
+    tab = Tab(workspace)
+    ui.add_css(STYLE)
+    ui.colors(primary="#0072b2")
+    with ui.row().classes("w-full items-center no-wrap px-3 py-1 gap-4 bg-white shadow-1"):
+        ui.label("Wrist workbench").classes("text-lg font-bold whitespace-nowrap")
+        title = ui.label("nothing opened").classes("text-gray-700 ellipsis")
+        ui.space()
+        with ui.row().classes("items-center no-wrap gap-2").props("id=busy") as status:
+            ui.spinner(size="sm")
+            ui.label().classes("whitespace-nowrap").bind_text_from(tab, "words")
+            bar = ui.linear_progress(0.0, show_value=False).classes("w-24")
+            cancel = ui.button("Cancel", on_click=tab.worker.cancel)
+            cancel.props("dense outline color=red")
+    status.bind_visibility_from(tab, "busy")
+    ui.timer(0.2, lambda: bar.set_value(tab.done / tab.total if tab.total else 0.0))
+    with ui.row().classes("w-full no-wrap gap-2 p-2 items-stretch"):
+        with ui.column().classes("panel gap-1").style("width: 380px; flex: none"):
+            with ui.tabs().props("dense align=justify").classes("w-full") as tabs:
+                for number, name in enumerate(("Open", "Missing", "Models"), 1):
+                    ui.tab(name, f"{number} {name}")
+            scroll = "height: calc(100vh - 110px); overflow-y: auto"
+            with ui.tab_panels(tabs).classes("w-full").style(scroll).bind_value(tab, "panel"):
+                with ui.tab_panel("Open").classes("p-1 gap-2"):
+                    OpenPanel(tab, largest)
+                with ui.tab_panel("Missing").classes("p-1 gap-2"):
+                    MissingPanel(tab)
+                with ui.tab_panel("Models").classes("p-1 gap-2"):
+                    ModelsPanel(tab)
+        with ui.column().classes("grow gap-2").style("min-width: 0") as pictures:
+            Views(tab)
+        pictures.bind_visibility_from(tab, "rows", backward=bool)
+        with ui.column().classes("grow items-center justify-center gap-6 p-8") as start:
+            for number, text in enumerate(START, 1):
+                with ui.row().classes("no-wrap items-center gap-4").style("max-width: 44rem"):
+                    ui.label(str(number)).classes("text-5xl font-bold text-primary")
+                    ui.label(text).classes("text-lg")
+        start.bind_visibility_from(tab, "rows", backward=lambda rows: not rows)
 
-    def __init__(self, workspace: Workspace, largest: int) -> None:
-        self.workspace = workspace
-        self.tab = Tab(workspace.folder)
-        self.busy = False
-        ui.add_css(STYLE)
-        ui.colors(primary="#0072b2")
-        with ui.row().classes("w-full items-center no-wrap px-3 py-1 gap-4 bg-white shadow-1"):
-            ui.label("Wrist workbench").classes("text-lg font-bold whitespace-nowrap")
-            self.title = ui.label("nothing opened").classes("text-gray-700 ellipsis")
-            ui.space()
-            with ui.row().classes("items-center no-wrap gap-2").props("id=busy") as self.status:
-                ui.spinner(size="sm")
-                self.words = ui.label("").classes("whitespace-nowrap")
-                self.bar = ui.linear_progress(0.0, show_value=False).classes("w-24")
-                ui.button("Cancel", on_click=self._cancel).props("dense outline color=red")
-        self.status.visible = False
-        with ui.row().classes("w-full no-wrap gap-2 p-2 items-stretch"):
-            with ui.column().classes("panel gap-1").style("width: 400px; flex: none"):
-                with ui.tabs().props("dense align=justify").classes("w-full") as self.tabs:
-                    for number, name in enumerate(("Open", "Missing", "Models"), 1):
-                        ui.tab(name, f"{number} {name}")
-                scroll = "height: calc(100vh - 110px); overflow-y: auto"
-                with ui.tab_panels(self.tabs, value="Open").classes("w-full").style(scroll):
-                    with ui.tab_panel("Open").classes("p-1 gap-2"):
-                        self.open = OpenPanel(self, largest)
-                    with ui.tab_panel("Missing").classes("p-1 gap-2"):
-                        self.missing = MissingPanel(self)
-                    with ui.tab_panel("Models").classes("p-1 gap-2"):
-                        self.models = ModelsPanel(self)
-            with ui.column().classes("grow gap-2").style("min-width: 0"):
-                self.views = Views(self)
-        self.timer = ui.timer(0.2, self._watch)
-        ui.context.client.on_delete(self.tab.worker.end)
-        ui.keyboard(on_key=self._key)
+    def name_it() -> None:
+        title.text = f"{', '.join(tab.names)}; model {tab.model_path.stem}"
 
-    def work(self, *calls: Sequence[Any], then: str = "") -> None:
-        """Do things that take long, one after the other, the page drawn anew after each.
+    def press(event: events.KeyEventArguments) -> None:
+        if event.action.keydown and event.key == "Escape" and tab.busy:
+            tab.worker.cancel()
 
-        Parameters
-        ----------
-        calls : tuples
-            Name of a method of `bench.Bench`, and its arguments.
-        then : str, optional
-            Panel to go to when all went well.
-        """
-        if self.busy:
-            ui.notify("Something is being done: wait, or cancel it first", type="warning")
-            return
-        self.busy = True
-        self._watch()
-        background_tasks.create(self._work(calls, then))
-
-    async def _work(self, calls: Sequence[Sequence[Any]], then: str) -> None:
-        why = ""
-        for method, *arguments in calls:
-            why = await run.io_bound(self.tab.work, method, *arguments) or ""
-            if why:
-                break
-            if method.startswith("open"):
-                self.views.begin()
-            self.refresh()
-        self.busy = False
-        self._watch()
-        with self.status:
-            if why == "cancelled":
-                ui.notify("Cancelled; everything is as it was")
-            elif why:
-                ui.notify(why, type="warning", multi_line=True, close_button="OK", timeout=0)
-            elif then:
-                self.tabs.set_value(then)
-
-    def refresh(self) -> None:
-        """Draw everything anew."""
-        tab = self.tab
-        if tab.rows:
-            self.title.text = f"{', '.join(tab.names)}; model {tab.model_path.stem}"
-        self.open.refresh()
-        self.missing.refresh()
-        self.models.refresh()
-        self.views.refresh()
-
-    def _watch(self) -> None:
-        self.status.visible = self.busy
-        self.words.text = self.tab.words
-        self.bar.value = self.tab.done / self.tab.total if self.tab.total else 0.0
-
-    def _cancel(self) -> None:
-        self.tab.worker.cancel()
-
-    def _key(self, event: events.KeyEventArguments) -> None:
-        if event.action.keydown and event.key == "Escape" and self.busy:
-            self._cancel()
+    tab.listeners.append(name_it)
+    ui.keyboard(on_key=press)
+    ui.context.client.on_delete(tab.worker.end)

@@ -49,8 +49,10 @@ def write_result(
     parent: Path,
     recordings: Sequence[Path],
     answer: WristDiagnosis | None,
-) -> tuple[str, ...]:
-    """Write a model, commands and, where something was asked, the report; return their names.
+) -> tuple[tuple[str, str], ...]:
+    """Write a model, commands and, where something was asked, the report.
+
+    Their names are returned with what each is.
 
     Parameters
     ----------
@@ -68,18 +70,18 @@ def write_result(
         What was found last.
     """
     name = workspace.free("wrist")
-    files = [f"{name}.yaml", f"{name}.txt"]
-    save_model(model, workspace.path(files[0]))
-    with replacing(workspace.path(files[1])) as path:
+    files = [(f"{name}.yaml", "model"), (f"{name}.txt", "commands that do the same")]
+    save_model(model, workspace.path(files[0][0]))
+    with replacing(workspace.path(files[1][0])) as path:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     if answer is not None:
-        files.append(f"{name}.html")
+        files.append((f"{name}.html", "report of the diagnosis"))
         hashes = {path.name: recording_sha256(path) for path in recordings}
         date = datetime.now(UTC).isoformat(timespec="seconds")
         made = {parent.stem: file_sha256(parent)}
         provenance = Provenance("wrist-stiffness workbench", date, made, hashes)
         answered = Diagnosed(answer, tuple(hashes), "", (), provenance)
-        write_page(workspace.path(files[2]), report_of_diagnosis(answered))
+        write_page(workspace.path(files[2][0]), report_of_diagnosis(answered))
     return tuple(files)
 
 

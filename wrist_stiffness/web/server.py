@@ -57,7 +57,7 @@ def serve(served: Served) -> None:
     _require_address(served)
     from nicegui import app, ui
 
-    from wrist_stiffness.web.page import Workbench
+    from wrist_stiffness.web.page import build_page
 
     workspace = Workspace(served.folder)
     token = "" if served.host in LOOPBACK else secrets.token_urlsafe(24)
@@ -67,7 +67,7 @@ def serve(served: Served) -> None:
 
     @ui.page("/", title=TITLE)
     def page() -> None:
-        Workbench(workspace, largest)
+        build_page(workspace, largest)
 
     address = f"http://{served.host}:{served.port}/" + (f"?token={token}" if token else "")
     print(f"{TITLE}: {address}\nworkspace {workspace.folder}; end it with Ctrl-C", flush=True)

@@ -1,4 +1,7 @@
-"""What one tab of the browser shows; the process that finds it is at its side."""
+"""What one tab of the browser shows; the process that finds it is at its side.
+
+Every panel knows the tab alone, and the tab knows none of them: it calls those that listen.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from nicegui import background_tasks, run, ui
 
-from wrist_stiffness.analysis import View
+from wrist_stiffness.analysis import Contents, View
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.inference.answer import Diagnosis
 from wrist_stiffness.inference.observations import Mask, Quantity
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.web.bench import Changes, Depends, Row, Seen, work
-from wrist_stiffness.web.figures import Shown, length, strongest
+from wrist_stiffness.web.bench import Changes, Depends, Offer, Row, Seen, work
+from wrist_stiffness.web.figures import Shown, length, rms, strongest
+from wrist_stiffness.web.workspace import Workspace
+
+DEPENDS, VERSIONS = "Depends on", "Versions"
 
 ASIDE = 99.0
 """Percentile of the errors at which the scale of colours ends: one wild unit greys no others."""
@@ -71,38 +79,74 @@ class Tab:
 
     Parameters
     ----------
-    folder : Path
-        Workspace.
+    workspace : Workspace
+        Where recordings and models lie.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.worker = Worker(folder)
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self.worker = Worker(workspace.folder)
+        self.listeners: list[Callable[[], None]] = []
+        self.busy, self._client = False, ui.context.client
         self.words, self.done, self.total = "", 0, 0
         self.names: tuple[str, ...] = ()
         self.model_path = Path()
-        self.glances: tuple[dict[str, str], ...] = ()
+        self.contents: tuple[Contents, ...] = ()
         self.remarks: tuple[str, ...] = ()
         self.rows: tuple[Row, ...] = ()
         self.views: dict[int, View] = {}
         self.depends: tuple[Depends, ...] = ()
         self.diagnosis: Diagnosis | None = None
+        self.offers: tuple[Offer, ...] = ()
         self.seen: Seen | None = None
         self.covariates: tuple[str, ...] = ()
         self.planned = "", ""
-        self.written: tuple[str, ...] = ()
+        self.written: tuple[tuple[str, str], ...] = ()
         self.version = 0
         self.against: int | None = None
         self.chosen: Mask | None = None
         self.moment = 0
         self.axis: int | None = None
         self.table: Table | None = None
+        self.panel, self.lower, self.quantity = "Open", DEPENDS, 1
 
-    def work(self, method: str, *arguments: object) -> str:
-        """Let the process do something; return why it failed, empty if it did not."""
-        changes, why = self.worker.call(self._hear, method, *arguments)
-        if not why:
+    def draw(self) -> None:
+        """Let everything be drawn anew."""
+        for listener in self.listeners:
+            listener()
+
+    def work(self, *calls: Sequence[Any], then: tuple[str, str] = ("", "")) -> None:
+        """Do things that take long, one after the other, everything drawn anew after each.
+
+        Parameters
+        ----------
+        calls : tuples
+            Name of a method of `bench.Bench`, and its arguments.
+        then : (str, str), optional
+            Panel and lower picture to go to after the first.
+        """
+        if self.busy:
+            ui.notify("Wait for the running task, or cancel it", type="warning")
+            return
+        self.busy = True
+        background_tasks.create(self._work(calls, then))
+
+    async def _work(self, calls: Sequence[Sequence[Any]], then: tuple[str, str]) -> None:
+        why = ""
+        for method, *arguments in calls:
+            found = await run.io_bound(self.worker.call, self._hear, method, *arguments)
+            changes, why = found or ({}, "The workbench is being ended.")
+            if why:
+                break
             self._take(changes)
-        return why
+            self.panel, self.lower = then[0] or self.panel, then[1] or self.lower
+            self.draw()
+        self.busy, self.words = False, ""
+        with self._client:
+            if why == "cancelled":
+                ui.notify("Cancelled. Nothing was changed.")
+            elif why:
+                ui.notify(why, type="warning", multi_line=True, close_button="OK", timeout=0)
 
     def _hear(self, message: tuple[Any, ...]) -> None:
         if message[0] == "told":
@@ -119,10 +163,31 @@ class Tab:
             self.against = None
             self.views = {n: v for n, v in self.views.items() if n < number} | {number: seen}
             self.depends = self.depends[: number + 1]
-        if "glances" in changes:
+        if "contents" in changes:
             self.chosen, self.axis, self.planned, self.written = None, None, ("", ""), ()
+            self.lower = DEPENDS
             self.table = load_model(self.model_path).table
-            self.moment = int(np.nanargmax(length(self.views[0].left.values, self.quantities[-1])))
+            first = self.views[0]
+            # Begin with the quantity that stands farthest above its noise, where it is worst.
+            over = [rms(first.left.values, q) / first.noise[q.key] for q in self.quantities]
+            self.quantity = int(np.nanargmax(over))
+            self.moment = self._worst(first.left.values)
+
+    def _worst(self, left: Array, chosen: Mask | None = None) -> int:
+        sizes = np.nan_to_num(length(left, self.quantities[self.quantity]))
+        return int(np.argmax(sizes if chosen is None else np.where(chosen, sizes, -1.0)))
+
+    def choose(self, chosen: Mask | None) -> None:
+        """Look at some of the units, or at all, and at the worst of them in three dimensions."""
+        self.chosen = chosen
+        self.moment = self._worst(self.views[self.version].left.values, chosen)
+        self.draw()
+
+    def look(self, version: int) -> None:
+        """Look at a version."""
+        if not self.busy:
+            self.version, self.seen, self.against = version, None, None
+            self.draw()
 
     @property
     def candidate(self) -> str:
@@ -134,9 +199,12 @@ class Tab:
         """What was measured."""
         return self.views[0].left.reported
 
-    def shown(self, quantity: Quantity) -> Shown:
-        """Return what all pictures show."""
-        view = self.views[self.version]
+    @property
+    def shown(self) -> Shown | None:
+        """What all pictures show; None while nothing is opened."""
+        if self.version not in self.views:
+            return None
+        view, quantity = self.views[self.version], self.quantities[self.quantity]
         values = view.left.values
         after, name = None, self.candidate
         if self.seen is not None:
@@ -159,6 +227,16 @@ class Tab:
     def curves(self) -> dict[str, Curve]:
         """What was drawn of the version that is shown, by condition."""
         return dict(self.depends[self.version].curves) if self.version < len(self.depends) else {}
+
+    @property
+    def not_varied(self) -> Sequence[str]:
+        """Conditions of which these recordings say nothing."""
+        return self.depends[self.version].not_varied if self.version < len(self.depends) else ()
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """Noise floor as the newest version tells it, by the key of the quantity."""
+        return dict(self.views[max(self.views)].noise)
 
     @property
     def sentences(self) -> Sequence[str]:

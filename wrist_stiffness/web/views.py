@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from nicegui import events, ui
@@ -14,26 +14,24 @@ from wrist_stiffness.web.figures import (
     AXES,
     SYMBOL,
     Figure,
+    Shown,
     contrast,
     error_map,
+    minutes,
     number,
     rms,
     time_line,
     unit_of,
     waterfall,
 )
+from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab
 from wrist_stiffness.web.wrist_figure import wrist_figure
-
-if TYPE_CHECKING:
-    from wrist_stiffness.web.figures import Shown
-    from wrist_stiffness.web.page import Workbench
-
-DEPENDS, VERSIONS = "Depends on", "Versions"
 
 EXAGGERATIONS = (1, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
-POINTS = "(e) => emit(e ? e.points.filter(p => p.curveNumber === 0).map(p => p.pointIndex) : null)"
-"""What of a selection goes to the server: numbers of points of the first trace."""
+POINTS = """(e) => emit(e
+  ? [...new Set(e.points.filter(p => p.data.meta).map(p => p.pointIndex))] : [])"""
+"""What of a selection goes to the server: numbers of the units, whose traces are marked."""
 
 
 class Views:
@@ -41,112 +39,90 @@ class Views:
 
     Parameters
     ----------
-    page : Workbench
+    tab : Tab
         Whose they are.
     """
 
-    def __init__(self, page: Workbench) -> None:
-        self._page = page
-        with ui.row().classes("w-full no-wrap gap-2 items-stretch"):
-            with ui.column().classes("panel gap-0").style("flex: 1; min-width: 0"):
-                self._numbers = ui.row().classes("gap-6 items-end")
-                self._scope = ui.label("").classes("text-xs text-gray-600")
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        row, panel, equal = "w-full no-wrap gap-2 items-stretch", "panel gap-0", "flex: 1 1 0"
+        with ui.row().classes(row):
+            with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
+                self._numbers = ui.row().classes("gap-x-8 gap-y-0 items-end no-wrap")
             with ui.column().classes("panel gap-1 justify-center"):
-                self._quantity = ui.toggle({0: "shift s [µm]", 1: "rotation φ [mdeg]"}, value=1)
-                self._quantity.props("dense no-caps").on_value_change(self.refresh)
-                with ui.row().classes("items-center gap-2"):
+                quantity = ui.toggle({0: "shift s [µm]", 1: "rotation φ [mdeg]"})
+                quantity.props("dense").bind_value(tab, "quantity").on_value_change(self.draw)
+                with ui.row().classes("items-center gap-2 no-wrap"):
                     ui.label("along").classes("text-xs")
-                    self._axis = ui.toggle(
-                        {-1: "strongest", **dict(enumerate(AXES))}, value=-1
-                    ).props("dense no-caps")
-                    self._axis.on_value_change(self._axis_chosen)
-                    self._all = ui.button("show all", on_click=self._show_all)
+                    axes = {-1: "strongest", **dict(enumerate(AXES))}
+                    axis = ui.toggle(axes, value=-1, on_change=self._axis_chosen)
+                    axis.props("dense")
+                    self._all = ui.button("Show all", on_click=lambda: tab.choose(None))
                     self._all.props("dense flat")
-        row, column = "w-full no-wrap gap-2 items-stretch", "panel gap-0"
-        with ui.row().classes(row).style("height: calc((100vh - 152px) * 0.52)"):
-            with ui.column().classes(column).style("flex: 1; min-width: 0"):
-                self._map_title = ui.label("Where does it fail?").classes("font-bold")
+        height = "height: calc((100vh - 156px) * "
+        with ui.row().classes(row).style(f"{height}0.52)"):
+            with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
+                self._map_title = ui.label().classes("font-bold")
                 self._map = self._plot("map")
-            with ui.column().classes(column).style("flex: 1; min-width: 0"):
+            with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
                 with ui.row().classes("items-center gap-2 w-full no-wrap"):
-                    self._wrist_title = ui.label("The wrist").classes("font-bold whitespace-nowrap")
+                    self._wrist_title = ui.label().classes("font-bold ellipsis")
                     ui.space()
-                    self._drawn = ui.label("").classes("text-xs whitespace-nowrap")
-                    choices = {0: "as fits", **{n: f"× {n}" for n in EXAGGERATIONS}}
-                    self._factor = ui.select(choices, value=0).props(
-                        "dense options-dense borderless"
-                    )
+                    ui.label("displacement").classes("text-xs")
+                    self._factor = ui.select({0: "automatic"}, value=0)
+                    self._factor.props("dense options-dense borderless")
                     self._factor.on_value_change(self._draw_wrist)
                 self._wrist = self._plot("wrist")
-        with ui.row().classes(row).style("height: calc((100vh - 152px) * 0.48)"):
-            with ui.column().classes(column).style("flex: 1.5; min-width: 0"):
-                ui.label("When: measured and predicted, and what is left").classes("font-bold")
+        with ui.row().classes(row).style(f"{height}0.48)"):
+            with ui.column().classes(panel).style("flex: 1.4 1 0; min-width: 0"):
+                self._time_title = ui.label().classes("font-bold")
                 self._time = self._plot("time")
-            with ui.column().classes(column).style("flex: 1; min-width: 0"):
+            with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
                 with ui.row().classes("w-full no-wrap items-center gap-2"):
-                    self._lower = ui.toggle([DEPENDS, VERSIONS], value=DEPENDS)
-                    self._lower.props("dense no-caps").on_value_change(self._draw_lower)
-                    self._condition = ui.select([]).classes("grow").props("dense options-dense")
-                    self._condition.on_value_change(self._draw_lower)
-                    self._condition.bind_visibility_from(self._lower, "value", value=DEPENDS)
-                self._plot_lower = self._plot("lower")
-        for plot in (self._map, self._time, self._plot_lower):
+                    lower = ui.toggle([DEPENDS, VERSIONS]).props("dense")
+                    lower.bind_value(tab, "lower").on_value_change(self._draw_lower)
+                    self._condition = ui.select([], on_change=self._draw_lower)
+                    self._condition.props("dense options-dense").classes("ellipsis")
+                    self._condition.style("flex: 1 1 0; min-width: 0")
+                    self._condition.bind_visibility_from(lower, "value", value=DEPENDS)
+                self._lower = self._plot("lower")
+        for plot in (self._map, self._time, self._lower):
             plot.on("plotly_selected", self._selected, js_handler=POINTS)
             plot.on("plotly_click", self._clicked, js_handler=POINTS)
+        tab.listeners.append(self.draw)
 
     def _plot(self, name: str) -> ui.plotly:
-        plot = ui.plotly({"data": [], "layout": {"xaxis": {"visible": False}}})
-        plot.classes("w-full grow").style("min-height: 0").props(f"id=plot-{name}")
-        return plot
+        plot = ui.plotly({"data": [], "layout": {}})
+        return plot.classes("w-full grow").style("min-height: 0").props(f"id=plot-{name}")
 
-    def begin(self) -> None:
-        """Begin with the quantity that stands farthest above its noise."""
-        tab = self._page.tab
-        view = tab.views[0]
-        over = [
-            rms(view.left.values, each) / max(view.noise[each.key], 1e-9) for each in tab.quantities
-        ]
-        self._quantity.set_value(int(np.argmax(over)))
-
-    @property
-    def shown(self) -> Shown | None:
-        """What the pictures show; None while nothing is opened."""
-        tab = self._page.tab
-        if tab.version not in tab.views:
-            return None
-        number = min(int(self._quantity.value or 0), len(tab.quantities) - 1)
-        return tab.shown(tab.quantities[number])
-
-    def refresh(self) -> None:
+    def draw(self) -> None:
         """Draw all pictures anew."""
-        shown, tab = self.shown, self._page.tab
+        tab, shown = self._tab, self._tab.shown
         if shown is None or tab.table is None:
             return
         self._tell_numbers(shown)
-        border = tab.table.workspace.operative_border
-        _show(self._map, error_map(shown, border))
+        self._all.set_enabled(tab.chosen is not None)
         what = tab.rows[tab.version].name
         if tab.seen is not None:
             what = f"if {tab.candidate} were added"
         elif shown.after is not None:
             what = shown.candidate
-        self._map_title.text = f"Where does it fail? ({what})"
+        self._map_title.text = f"Where: remaining error, {what}"
+        _show(self._map, error_map(shown, tab.table.workspace.operative_border))
+        self._time_title.text = f"When: {shown.part_label.partition(' [')[0]}"
         _show(self._time, time_line(shown))
-        names, curves = list(shown.view.left.covariates), tab.curves
-        ordered = {name: f"{name} (the error depends on it)" for name in curves}
-        ordered |= {name: condition_label(name) for name in names if name not in curves}
+        curves = tab.curves
+        ordered = {name: f"{name} (found)" for name in curves}
+        others = [name for name in shown.view.left.covariates if name not in curves]
+        ordered |= {name: condition_label(name) for name in others}
         if self._condition.options != ordered:
             self._condition.set_options(ordered, value=next(iter(ordered)))
         self._draw_lower()
         self._draw_wrist()
 
-    def _noise(self) -> dict[str, float]:
-        tab = self._page.tab
-        return dict(tab.views[max(tab.views)].noise)
-
     def _tell_numbers(self, shown: Shown) -> None:
-        tab = self._page.tab
-        versions = tab.rows
+        """Write the held-out error largest; it is what a version is judged by."""
+        tab, versions = self._tab, self._tab.rows
         self._numbers.clear()
         with self._numbers:
             for quantity in tab.quantities:
@@ -154,81 +130,87 @@ class Views:
                 sizes = [each.held_out[key] for each in versions[1:] or versions]
                 path = " → ".join(number(size) for size in dict.fromkeys((sizes[0], sizes[-1])))
                 with ui.column().classes("gap-0"):
-                    ui.label(f"{SYMBOL[quantity.name]} on unseen data").classes("text-xs")
+                    ui.label(f"Held-out error of {SYMBOL[quantity.name]}").classes("text-xs")
                     ui.label(f"{path} {unit}").classes("text-3xl font-bold whitespace-nowrap")
-                    ui.label(f"noise {self._noise()[key]:.2g} {unit}").classes("text-xs")
+                    ui.label(f"noise floor {number(tab.noise[key])} {unit}").classes("text-xs")
             with ui.column().classes("gap-0"):
-                every, count = shown.chosen is None, shown.view.left.n_units
-                if shown.chosen is not None:
-                    count = int(shown.chosen.sum())
-                ui.label("on all of these data" if every else "on the selection").classes("text-xs")
-                left = shown.view.left.values if shown.after is None else shown.after
-                size = rms(left, shown.quantity, shown.chosen)
-                ui.label(f"{size:.3g} {shown.unit}").classes("text-xl")
-                ui.label(f"left, over {count} units").classes("text-xs")
+                units = shown.view.left.n_units
+                every = f"all {units} poses"
+                chosen = shown.chosen
+                if chosen is not None:
+                    every = f"selected {int(chosen.sum())} of {units} poses"
+                sizes = [rms(shown.view.left.values, shown.quantity, chosen)]
+                if shown.after is not None:
+                    sizes.append(rms(shown.after, shown.quantity, chosen))
+                path = " → ".join(map(number, sizes))
+                what = f"Remaining {SYMBOL[shown.quantity.name]}, {every}"
+                ui.label(what).classes("text-xs whitespace-nowrap")
+                ui.label(f"{path} {shown.unit}").classes("text-xl whitespace-nowrap")
+                ui.label(f"with {shown.candidate}" if shown.candidate else "\u00a0").classes(
+                    "text-xs"
+                )
 
     def _draw_lower(self) -> None:
-        shown, tab = self.shown, self._page.tab
+        tab, shown = self._tab, self._tab.shown
         if shown is None:
             return
-        if self._lower.value == VERSIONS:
-            _show(self._plot_lower, waterfall(tab.rows, self._noise(), shown.quantity))
+        if tab.lower == VERSIONS:
+            _show(self._lower, waterfall(tab.rows, tab.noise, shown.quantity))
             return
         told = tab.curves.get(str(self._condition.value))
         name = str(self._condition.value) if told is None else told.names[0]
         if name in shown.view.left.covariates:
-            _show(self._plot_lower, contrast(shown, name, told))
+            _show(self._lower, contrast(shown, name, told))
 
     def _draw_wrist(self) -> None:
-        shown, tab = self.shown, self._page.tab
+        tab, shown = self._tab, self._tab.shown
         if shown is None or tab.table is None:
             return
         told, at = shown.view.left.covariates, shown.moment
         theta = np.array([told["theta_1"][at], told["theta_2"][at]])
         load = np.array([told[name][at] for name in ("fx", "fy", "fz", "mx", "my", "mz")])
         error: Array = shown.view.measured[at]
+        asked = float(self._factor.value or 0.0) or None
         try:
-            factor = float(self._factor.value) or None
-            drawn, factor = wrist_figure(tab.table, theta, load, error, factor)
+            drawn, factor = wrist_figure(tab.table, theta, load, error, asked)
         except WristError as reason:
             self._wrist_title.text = f"The wrist: {reason}"
             return
         one, two = np.degrees(theta)
-        force = float(np.linalg.norm(load[:3]))
-        self._wrist_title.text = f"The wrist at {one:.0f}°, {two:.0f}° under {force:.2f} N"
-        self._drawn.text = f"drawn × {factor:g}"
+        time, force = minutes(shown.view.left)[at], float(np.linalg.norm(load[:3]))
+        self._wrist_title.text = f"At {time:.2f} min: {one:.0f}°, {two:.0f}°, {force:.2f} N"
+        if asked is None:
+            usual = {n: f"× {n}" for n in EXAGGERATIONS}
+            self._factor.set_options({0: f"× {factor:g} (automatic)", **usual})
         _show(self._wrist, drawn)
 
-    def _axis_chosen(self) -> None:
-        value = int(self._axis.value)
-        self._page.tab.axis = None if value < 0 else value
-        self.refresh()
-
-    def _show_all(self) -> None:
-        self._page.tab.chosen = None
-        self.refresh()
+    def _axis_chosen(self, event: events.ValueChangeEventArguments) -> None:
+        self._tab.axis = None if event.value < 0 else int(event.value)
+        self.draw()
 
     def _selected(self, event: events.GenericEventArguments) -> None:
-        shown = self.shown
+        shown = self._tab.shown
         if shown is None or not event.args:
             return
         chosen = np.zeros(shown.view.left.n_units, dtype=bool)
         chosen[_places(event.args, len(chosen))] = True
         if chosen.any():
-            self._page.tab.chosen = chosen
-            self.refresh()
+            self._tab.choose(chosen)
 
     def _clicked(self, event: events.GenericEventArguments) -> None:
-        shown = self.shown
-        places = _places(event.args or [], shown.view.left.n_units if shown else 0)
-        bars = event.sender is self._plot_lower and self._lower.value == VERSIONS
-        if places and not bars:
-            self._page.tab.moment = places[0]
-            self.refresh()
+        tab, shown = self._tab, self._tab.shown
+        if shown is None:
+            return
+        if event.sender is self._lower and tab.lower == VERSIONS:
+            if places := _places(event.args, len(tab.rows)):
+                tab.look(places[0])
+        elif places := _places(event.args, shown.view.left.n_units):
+            tab.moment = places[0]
+            self.draw()
 
 
 def _places(told: Any, count: int) -> list[int]:
-    return [n for n in told if isinstance(n, int) and 0 <= n < count]
+    return [n for n in told or [] if isinstance(n, int) and 0 <= n < count]
 
 
 def _show(plot: ui.plotly, figure: Figure) -> None:

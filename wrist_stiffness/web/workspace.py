@@ -9,11 +9,15 @@ from pathlib import Path
 
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.sessions.reading.folder import is_recording
+from wrist_stiffness.shipped import shipped_file
 
 MODEL, TABLE = (".yaml", ".yml"), (".npz",)
 TAKEN = (".mcap", ".csv", *MODEL, *TABLE)
 """What may be uploaded, by the end of the name."""
+
+SHIPPED_TABLE = "precomputed/palmieri2015.npz"
 
 NAME = re.compile(r"[\w][\w .+-]{0,99}")
 
@@ -45,6 +49,29 @@ class Workspace:
         path = self.folder / name
         if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
             raise InputError(f"{name!r} is no plain file name within the workspace")
+        return path
+
+    def model(self, name: str) -> Path:
+        """Return the path of a model file that refers to nothing beyond the folder.
+
+        Raises
+        ------
+        InputError
+            As for `path`, or if its table or a law lies elsewhere; a table of the package may.
+        """
+        path = self.path(name)
+        told = read_yaml(path, InputError).plain
+        told = told if isinstance(told, dict) else {}
+        table, effects = told.get("table"), told.get("effects")
+        names = [table.get("path")] if isinstance(table, dict) else []
+        for effect in effects if isinstance(effects, list) else ():
+            if isinstance(effect, dict) and "class" in effect:
+                names.append(str(effect["class"]).partition(":")[0])
+        own = shipped_file(SHIPPED_TABLE).resolve()
+        for each in filter(None, names):
+            target = (self.folder / str(each)).resolve()
+            if target != own and target.parent != self.folder:
+                raise InputError(f"{name}: {each} lies outside the workspace")
         return path
 
     def free(self, name: str) -> str:

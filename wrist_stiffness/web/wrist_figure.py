@@ -20,11 +20,10 @@ MM = 1e3
 SEEN_M = 0.008
 """How far the largest displacement is drawn where nobody says otherwise."""
 
-NAMED = 2.0
-"""Share from which a body bears its name [%]; the others say it when they are pointed at."""
-
-BENT, MEASURED = "platform, as the load bends it", "platform, as measured"
-EYE = {"x": 1.05, "y": -1.2, "z": 0.65}
+BENT, MEASURED = "platform under the load", "platform measured"
+EYE = np.array([1.0, 0.75, 0.85])
+LEADER_PX = 18.0
+"""Of the line from a part to its name."""
 
 
 def wrist_figure(
@@ -75,21 +74,19 @@ def wrist_figure(
     if np.isfinite(measured).all():
         turn, shift = exp_twist(exaggeration * measured)
         traces.append(_disc(platform.points @ turn.T + shift, MEASURED, RED))
-    traces.append(_names(bodies))
-    axes = {
-        f"{axis}axis": {
-            "title": {"text": f"{axis} [mm]", "font": {"size": 11}},
-            "tickfont": {"size": 9},
-            "nticks": 5,
-        }
-        for axis in "xyz"
-    }
+    scene = {f"{axis}axis": {"visible": False} for axis in "xyz"}
     layout = {
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "font": {"size": 12, "color": "#1f2937"},
-        "scene": {**axes, "aspectmode": "data", "camera": {"eye": EYE}},
+        "scene": {
+            **scene,
+            "domain": {"x": [0.0, 1.0], "y": [0.1, 1.0]},
+            "aspectmode": "data",
+            "camera": {"eye": dict(zip("xyz", EYE, strict=True))},
+            "annotations": _names(bodies),
+        },
         "uirevision": "kept",
-        "showlegend": False,
+        "legend": {"orientation": "h", "x": 0, "y": 0, "font": {"size": 11}},
     }
     config = {"displaylogo": False}
     return {"data": traces, "layout": layout, "config": config}, exaggeration
@@ -134,7 +131,7 @@ def _bodies(bodies: list[tuple[Array, float]], top: float) -> Figure:
         "cmin": 0.0,
         "cmax": top,
         "colorbar": {
-            "title": {"text": "share of the bending [%]", "side": "right"},
+            "title": {"text": "share of strain energy [%]", "side": "right"},
             "thickness": 12,
             "len": 0.8,
         },
@@ -162,6 +159,7 @@ def _rigid(shapes: list[Shape]) -> Figure:
     return {
         "type": "scatter3d",
         "mode": "lines",
+        "showlegend": False,
         "x": x,
         "y": y,
         "z": z,
@@ -178,22 +176,34 @@ def _disc(points: Array, name: str, colour: str) -> Figure:
         **{"x": x, "y": y, "z": z, "i": i, "j": j, "k": k},
         "color": colour,
         "opacity": 0.55,
+        "name": name,
+        "showlegend": True,
         "hovertemplate": f"{name}<extra></extra>",
     }
 
 
-def _names(bodies: list[tuple[Array, float]]) -> Figure:
-    """Return the names beside the bodies; none of a body that hardly bends."""
-    told = [(name, *each) for name, each in zip(ELASTIC, bodies, strict=True) if each[1] >= NAMED]
-    middle = [1.15 * MM * points.mean(axis=(0, 1)) for _, points, _ in told]
-    x, y, z = np.reshape(middle, (-1, 3)).T
-    return {
-        "type": "scatter3d",
-        "mode": "text",
-        "x": x,
-        "y": y,
-        "z": z,
-        "text": [f"{name} {share:.0f} %" for name, _, share in told],
-        "textfont": {"size": 12, "color": "#111827"},
-        "hoverinfo": "skip",
-    }
+def _names(bodies: list[tuple[Array, float]]) -> list[Figure]:
+    """Return names and shares of the bodies, each led away from the middle as first seen."""
+    right = np.cross([0.0, 0.0, 1.0], EYE)
+    right /= np.linalg.norm(right)
+    up = np.cross(EYE, right) / np.linalg.norm(EYE)
+    middles = np.array([points.mean(axis=(0, 1)) for points, _ in bodies])
+    seen = (middles - middles.mean(axis=0)) @ np.stack([right, up], axis=1)
+    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    # Neighbours take turns in the length of their leaders.
+    turn = np.argsort(np.argsort(np.arctan2(seen[:, 1], seen[:, 0]))) % 2
+    leaders = LEADER_PX * (1.0 + turn[:, None]) * seen
+    return [
+        {
+            **dict(zip("xyz", (MM * middle).tolist(), strict=True)),
+            "text": f"{name.replace('_', ' ')}: {share:.0f} %",
+            "ax": float(way[0]),
+            "ay": -float(way[1]),
+            "xanchor": "left" if way[0] > 0.0 else "right",
+            "arrowwidth": 1,
+            "arrowhead": 0,
+            "bgcolor": "rgba(255, 255, 255, 0.8)",
+            "font": {"size": 11, "color": "#111827"},
+        }
+        for name, (_, share), middle, way in zip(ELASTIC, bodies, middles, leaders, strict=True)
+    ]
