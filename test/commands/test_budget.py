@@ -66,13 +66,14 @@ def test_load_out_of_range_draws_nothing(table, tmp_path):
 
 
 @pytest.mark.slow
-def test_four_pictures_that_show_something(table, tmp_path):
+def test_five_pictures_that_show_something(table, tmp_path):
     pictures = draw_maps(table, tmp_path, Push.of_millimetres([0.0, 2.0, 0.0], [20.0, 0.0, -18.0]))
     assert [path.name for path in pictures] == [
         "map_s.png",
         "map_phi.png",
         "budget.png",
         "bent.png",
+        "uncertainty.png",
     ]
     for path in pictures:
         colours = np.unique(np.round(imread(path)[..., :3].reshape(-1, 3), 1), axis=0)
