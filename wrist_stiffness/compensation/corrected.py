@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,7 @@ from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
 
 
-@dataclass(frozen=True)
-class CorrectedCommand:
+class CorrectedCommand(NamedTuple):
     """What to send to the motors for one command.
 
     Parameters

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import copysign
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ ANSWERS = 0.5
 """A motor whose error changes by less than this share of its step is crossing a lost motion."""
 
 
-@dataclass(frozen=True)
-class Correction:
+class Correction(NamedTuple):
     """Corrected motor angles and what remains.
 
     Parameters

@@ -149,15 +149,15 @@ class CorrectionStream(Stream):
         """
         theta = self._motor_angles(names, positions)
         theta_dot = self.settings.motors.speeds(names, velocities)
-        sent = np.array(positions, dtype=float)
         if frame_id == CORRECTED_FRAME:
             self._corrector.reset()
             self._remember(stamp_ns, theta, None, theta_dot)
             twice = InputError(TWICE) if self.correcting else None
-            return CorrectedCommand(frame_id, sent, theta, None, twice)
+            return CorrectedCommand(frame_id, np.array(positions, float), theta, None, twice)
         load: Load | None = None
         fault: WristError | None = None
-        if self.correcting:
+        correcting = self.correcting
+        if correcting:
             load, fault = self._judged(stamp_ns, theta)
         delta, correction = NOTHING, None
         if self._running is not None:
@@ -172,16 +172,17 @@ class CorrectionStream(Stream):
             )
             delta, correction = corrected.delta, corrected.correction
             fault = fault or corrected.fault
-        forgotten = self._remember(stamp_ns, theta + delta, load, theta_dot)
-        if self.correcting:
-            fault = fault or forgotten
         driven = theta + delta
+        forgotten = self._remember(stamp_ns, driven, load, theta_dot)
+        if correcting:
+            fault = fault or forgotten
+        sent = list(positions)
         first, second = self.settings.motors.places(names)
         sent[first], sent[second] = driven.tolist()
-        marked = self.correcting or any(delta.tolist())
+        marked = correcting or any(delta.tolist())
         return CorrectedCommand(
             CORRECTED_FRAME if marked else frame_id,
-            sent,
+            np.array(sent, float),
             driven,
             correction,
             fault,

@@ -31,7 +31,7 @@ from wrist_stiffness.mechanism.compiled import (
     CorrectorState,
 )
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.error_model import IN_F, IN_U, ErrorModel, Load
+from wrist_stiffness.model.error_model import ErrorModel, Load
 
 WANTED = np.ones(1, dtype=bool)
 
@@ -63,8 +63,7 @@ class Corrector:
         self.held = np.zeros(2)
         self._settings_of: tuple[StreamSettings, ErrorModel] | None = None
         self._task = self._safety = np.zeros(0)
-        # Of one command on its way.
-        self._stamp, self._share = np.zeros(1, dtype=np.int64), np.ones(1)
+        self._one: Correcting | None = None
 
     def release(self) -> None:
         """Search the next correction from nothing."""
@@ -106,11 +105,12 @@ class Corrector:
         """
         compiled = running.compiled
         if load is not None and compiled is not None:
-            flags = IN_U if load.on_platform else IN_F
-            self._stamp[0] = stamp_ns
-            own = CompiledCommands(self._stamp, theta, load.wrench, flags, WANTED, self._share)
-            block = Correcting(self, running, compiled, settings, own)
-            if block.only_one(share):
+            block = self._one
+            if block is None or not block.is_of(running, settings):
+                own = np.zeros(1, np.int64), np.zeros(2), np.zeros(6), np.zeros(1, bool)
+                commands = CompiledCommands(*own, WANTED, np.ones(1))
+                block = self._one = Correcting(self, running, compiled, settings, commands)
+            if block.only_one(stamp_ns, theta, load, share):
                 applied = correction_of(block.found, 0, running.model, load)
                 return Corrected(applied.delta, applied, None)
         return self.searched(running, settings, stamp_ns, theta, theta_dot, load, share)
@@ -226,9 +226,19 @@ class Correcting:
             at = one.correction.prediction
             self.found.put(place, one.correction.after, at.twist, at.configuration)
 
-    def only_one(self, share: Share) -> bool:
-        """Correct the only command of a block; tell whether the compiled formulas serve."""
-        own, state, found = self.commands, self._state, self.found
+    def is_of(self, running: RunningModel, settings: StreamSettings) -> bool:
+        """Tell whether this goes by a model and settings."""
+        return self._running is running and self._settings is settings
+
+    def only_one(self, stamp_ns: int, theta: Array, load: Load, share: Share) -> bool:
+        """Correct one command as the only one; tell whether the compiled formulas serve.
+
+        What was found for the one before stays its own.
+        """
+        own, state = self.commands, self._state
+        own.stamp_ns[0], own.on_platform[0] = stamp_ns, load.on_platform
+        own.theta[:], own.load[:] = theta, load.wrench
+        found = self.found = CorrectedRows.room(1, self._compiled.sectors)
         if not callable(share):
             own.share[0] = share
             return self._compiled.correct(self._task, self._safety, own, state, found) > 0

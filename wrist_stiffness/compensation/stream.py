@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,8 +117,7 @@ class Stream:
         return self._running
 
 
-@dataclass(frozen=True)
-class PredictedSample:
+class PredictedSample(NamedTuple):
     """Prediction for one joint state.
 
     Parameters

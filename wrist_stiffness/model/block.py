@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,8 +89,7 @@ class Block:
         )
 
 
-@dataclass(frozen=True)
-class Load:
+class Load(NamedTuple):
     """Wrench on the platform at O, fixed in F or turning with the platform.
 
     Parameters
