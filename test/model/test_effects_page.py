@@ -1,6 +1,6 @@
-"""The page on effects says what the code does: names, parameters, sizes, and its code runs.
+"""The page on effects says what the code does: names, parameters, exactness, and its code runs.
 
-`python test/model/test_effects_page.py` writes the tables of typical magnitudes and of exactness.
+`python test/model/test_effects_page.py` writes the table of exactness.
 """
 
 import re
@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.parameters import has_unit
 from wrist_stiffness.model.python_laws import python_laws
 from wrist_stiffness.model.registry import catalogue
 from wrist_stiffness.shipped import shipped_file
@@ -20,50 +19,6 @@ TEXT = PAGE.read_text()
 ROWS = {
     row[0]: row[3] for row in re.findall(r"^\| `(\w+)` \| (.*?) \| (.*?) \| (.*?) \|$", TEXT, re.M)
 }
-
-SIGNS = {"um": "µm", "percent": "%", "Nmm": "N mm", "gmm2": "g mm²", "Nm": "(N m)"}
-
-
-def unit_of(key):
-    """Return the unit that a parameter's name ends in, as people write it."""
-    if not has_unit(key):
-        return ""
-    first = -3 if "_per_" in key else -1
-    return "/".join(SIGNS.get(w, w) for w in key.split("_")[first:] if w != "per")
-
-
-def named(keys):
-    """Return the names of some parameters, a long row shortened."""
-    told = [f"`{key}`" for key in keys]
-    return ", ".join(told) if len(told) <= 3 else f"{told[0]} … {told[-1]} ({len(told)})"
-
-
-def sizes_of(law):
-    """Return names of parameters of a law, and the typical magnitude that they share."""
-    alike, at = {}, {}
-    for place in law.places:
-        for each in law.parameters(place):
-            middle = f"{each.mean:g} ± " if each.mean else ""
-            size = f"{middle}{each.scale:g} {unit_of(each.key)}".rstrip()
-            alike.setdefault(size, {}).setdefault(each.key, []).append(place)
-            at.setdefault(each.key, set()).add(size)
-    rows = []
-    for size, keys in alike.items():
-        key, places = next(iter(keys.items()))
-        rows.append((named(keys) + (f" at {', '.join(places)}" if len(at[key]) > 1 else ""), size))
-    return tuple(rows)
-
-
-def usual_sizes():
-    """Return the table of typical magnitudes; laws with the same ones share their rows."""
-    shared = {}
-    for law in catalogue().values():
-        shared.setdefault(sizes_of(law), []).append(f"`{law.id}`")
-    lines = ["| effect | parameters | typical magnitude |", "|---|---|---|"]
-    for rows, laws in shared.items():
-        for number, (keys, size) in enumerate(rows):
-            lines.append(f"| {', '.join(laws) if number == 0 else ''} | {keys} | {size} |")
-    return "\n".join(lines) + "\n"
 
 
 def exactness():
@@ -76,7 +31,7 @@ def exactness():
     return "\n".join(lines) + "\n"
 
 
-TABLES = {"typical magnitudes": usual_sizes, "exactness": exactness}
+TABLES = {"exactness": exactness}
 
 
 def written(text, name):
@@ -112,7 +67,7 @@ def blocks(language):
 
 def test_files_on_the_page_are_models(tmp_path):
     whole, formula, python = blocks("yaml")
-    (tmp_path / "my_laws.py").write_text(blocks("python")[0])
+    (tmp_path / "my_laws.py").write_text(blocks("python")[1])
     table = str(shipped_file("precomputed/palmieri2015.npz"))
     text = whole.replace("../precomputed/palmieri2015.npz", table) + formula + python
     (tmp_path / "m.yaml").write_text(text)
@@ -123,6 +78,13 @@ def test_files_on_the_page_are_models(tmp_path):
     ]  # fmt: skip
 
 
+def test_typical_magnitudes_are_printed(capsys):
+    exec(blocks("python")[0], {})
+    printed = capsys.readouterr().out
+    assert "backlash width_mdeg 0 +- 20\n" in printed
+    assert {line.split()[0] for line in printed.splitlines()} == {*catalogue()}
+
+
 def test_python_on_the_page_runs(monkeypatch):
     monkeypatch.chdir(PAGE.parents[1])
     names = {
@@ -130,7 +92,7 @@ def test_python_on_the_page_runs(monkeypatch):
         "theta": np.radians([[5.0, 5.0], [6.0, 5.0]]),
         "load": np.array([[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]] * 2),
     }
-    exec(blocks("python")[1], names)
+    exec(blocks("python")[2], names)
     assert np.allclose(names["several"][1].twist, names["recording"].twist, rtol=1e-12)
     assert np.array_equal(names["tried"].twist, names["prediction"].twist)
 
