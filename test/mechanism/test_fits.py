@@ -71,9 +71,43 @@ def test_a_sleeve_in_the_bar_has_to_fit_and_one_beside_it_not():
     checked(values)
 
 
-def test_bars_that_cross_in_every_pose_are_refused():
-    message = refused("links", "link_3", "arc_radius_mm", 42.0)
-    assert message == (
-        "links.link_3.arc_radius_mm: 42 is 2.75 mm from that of link_2, and the bars cross at "
-        "joint_4: half of both section_radial_mm is 3.96 mm"
-    )
+IN_ONE_PLACE = r"are in one place at motor angles \(.*\) deg, in the operative workspace"
+
+
+@pytest.mark.parametrize(
+    ("block", "name", "key", "value", "message"),
+    [
+        ("links", "link_3", "arc_radius_mm", 42.0, f"link_3 and link_2 {IN_ONE_PLACE}"),
+        ("links", "link_1", "section_radial_mm", 60.0, f"the plate and link_1 {IN_ONE_PLACE}"),
+        (
+            "bushings",
+            "joint_1",
+            "radius_mm",
+            -53.0,
+            f"the pin of joint_1 and link_2 {IN_ONE_PLACE}",
+        ),
+        ("limits", "singularity", None, 0.999, r"no pose of the operative workspace has such a"),
+        ("platform", "diameter_mm", None, 70.0, f"the plate and link_1 {IN_ONE_PLACE}"),
+        ("limits", "operative_tilt_deg", None, 89.9, "89.9 is not reached in every direction"),
+        ("materials", "steel", "young_GPa", 20.0, "20 is not steel, which has 200"),
+        ("materials", "steel", "density_kg_m3", 785.0, "785 is not steel, which has 7850"),
+        ("materials", "polymer", "young_GPa", 1500.0, "speed of sound of 3.17e.04 m/s"),
+        ("materials", "polymer", "density_kg_m3", 14900.0, "speed of sound of 401 m/s"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_place(block, name, key, value, message):
+    values = copy.deepcopy(VALUES)
+    keys = [block, name, *([key] if key else [])]
+    inner = values
+    for each in keys[:-1]:
+        inner = inner[each]
+    inner[keys[-1]] = value
+    with pytest.raises(GeometryError, match=message):
+        checked(values)
+
+
+def test_bars_in_one_shell_that_never_meet_are_not_refused():
+    """It is the workspace that decides: these two lie on opposite sides of O."""
+    values = copy.deepcopy(VALUES)
+    values["links"]["link_1"]["arc_radius_mm"] = values["links"]["link_2"]["arc_radius_mm"]
+    checked(values)

@@ -1,9 +1,19 @@
-"""Refuse bodies that cannot be put together, before any of them is meshed."""
+"""Refuse what cannot be built or measured in other units, before anything is meshed."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from wrist_stiffness.errors import UnreachablePoseError
 from wrist_stiffness.inputs.document import Node
+from wrist_stiffness.mechanism.collisions import collision
 from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.geometry_file import mechanism_of
+from wrist_stiffness.mechanism.kinematics import angles_text
+from wrist_stiffness.mechanism.workspace import Workspace
+
+POSES_PER_AXIS = 15
+"""Of the grid over the motor angles on which bodies are tried."""
 
 WIDEST_FIT = 0.37e-3
 """Most by which a bore and what sits in it may differ [m]: the largest clearance of H11/c11, the
@@ -18,9 +28,26 @@ PINS = {
 }
 """Bores that hold a joint's pin; link_3's other bore may hold the sleeve of joint_4."""
 
+NAMED = {
+    "steel": (200.0, 7850.0),
+    "alumin": (70.0, 2700.0),
+    "titan": (110.0, 4500.0),
+    "brass": (105.0, 8500.0),
+    "bronze": (110.0, 8800.0),
+    "magnesium": (45.0, 1750.0),
+}
+"""Young's modulus [GPa] and density [kg/m^3] of metals by the beginning of their names."""
+
+ALLOYS = 2.0
+"""Factor by which alloys of one name may differ from these: a wrong unit is ten or more."""
+
+SLOWEST_METAL, METAL_DENSITY, FASTEST = 1000.0, 3000.0, 20e3
+"""Speed of sound in a bar [m/s]: lead has 1190, and nothing denser than 3000 kg/m^3 has less;
+diamond has 18,500 (M. F. Ashby, Materials Selection in Mechanical Design, chart of E and rho)."""
+
 
 def check_fits(root: Node, geometry: Geometry) -> None:
-    """Refuse pins and sleeves of another size than their bores, and bars that cross.
+    """Refuse impossible materials, pins and sleeves that do not fit, and bodies that collide.
 
     Parameters
     ----------
@@ -34,12 +61,70 @@ def check_fits(root: Node, geometry: Geometry) -> None:
     GeometryError
         Names the first value that is in the way, its line and the limit.
     """
+    for name, material in root["materials"].value.items():
+        if name != "source":
+            _check_material(name, material)
+    _check_bores(root, geometry)
+    limits, tilt = root["limits"], np.degrees(geometry.limits.operative_tilt)
+    workspace = Workspace(mechanism_of(geometry), geometry.limits)
+    try:
+        poses = workspace.grid(POSES_PER_AXIS)
+    except UnreachablePoseError as error:
+        raise limits["operative_tilt_deg"].refuse(
+            f"{tilt:g} is not reached in every direction: {error}"
+        ) from error
+    poses = poses[workspace.operative(poses)]
+    if not len(poses):
+        raise limits["singularity"].refuse(
+            f"no pose of the operative workspace has such a |D|, up to {tilt:g} deg of tilt"
+        )
+    found = collision(geometry, poses)
+    if found is not None:
+        keys, name = _place_of(found.second, geometry)
+        node = root
+        for key in keys:
+            node = node[key]
+        raise node.refuse(
+            f"{name} and {found.first} are in one place at motor angles "
+            f"{angles_text(found.theta)}, in the operative workspace"
+        )
+
+
+def _place_of(body: str, geometry: Geometry) -> tuple[tuple[str, ...], str]:
+    """Return the keys of the value that places a body, and what the body is called."""
+    if body in geometry.links:
+        return ("links", body, "arc_radius_mm"), body
+    if body in geometry.bushings:
+        return ("bushings", body, "radius_mm"), f"the pin of {body}"
+    return ("platform", "centre_mm"), "the plate"
+
+
+def _check_material(name: str, material: Node) -> None:
+    young, density = (material[key].value for key in ("young_GPa", "density_kg_m3"))
+    for metal, usual in NAMED.items():
+        for key, value, normal in zip(
+            ("young_GPa", "density_kg_m3"), (young, density), usual, strict=True
+        ):
+            if name.lower().startswith(metal) and not 1 / ALLOYS < value / normal < ALLOYS:
+                raise material[key].refuse(
+                    f"{value:g} is not {name}, which has {normal:g}: another unit?"
+                )
+    speed = np.sqrt(1e9 * young / density)
+    if speed > FASTEST or (density > METAL_DENSITY and speed < SLOWEST_METAL):
+        limit = f"below {FASTEST:g}" if speed > FASTEST else f"at least {SLOWEST_METAL:g}"
+        raise material["young_GPa"].refuse(
+            f"{young:g} with {density:g} kg/m^3 makes a speed of sound of {speed:.3g} m/s, which "
+            f"is {limit} m/s in any material so dense: another unit?"
+        )
+
+
+def _check_bores(root: Node, geometry: Geometry) -> None:
     links, bushings = geometry.links, geometry.bushings
     rooms = {
         f"{link}.{bore}_mm": (getattr(links[link], bore), joint)
         for (link, bore), joint in PINS.items()
     }
-    other, hub, seat = links["link_2"], links["link_3"], bushings["joint_4"]
+    hub, seat = links["link_3"], bushings["joint_4"]
     # A bushing beside the bar sits in a boss, which is not described.
     if abs(abs(seat.radius) - hub.arc_radius) < (seat.length + hub.section_radial) / 2.0:
         rooms["link_3.motor_bore_mm"] = (hub.motor_bore - 2.0 * seat.wall, "joint_4")
@@ -50,10 +135,3 @@ def check_fits(root: Node, geometry: Geometry) -> None:
                 f"{1e3 * pin:g} does not fit links.{bore}, which has room for {1e3 * room:g} "
                 f"(may differ by {1e3 * WIDEST_FIT:g})"
             )
-    # At joint_4 these two bars lie one above the other in every pose.
-    apart = abs(other.arc_radius - hub.arc_radius)
-    if apart < (needed := (other.section_radial + hub.section_radial) / 2.0):
-        raise root["links"]["link_3"]["arc_radius_mm"].refuse(
-            f"{1e3 * hub.arc_radius:g} is {1e3 * apart:.3g} mm from that of link_2, and the bars "
-            f"cross at joint_4: half of both section_radial_mm is {1e3 * needed:.3g} mm"
-        )
