@@ -1,4 +1,8 @@
 import os
+import sys
+from pathlib import Path
+
+import hypothesis
 
 # Before anything loads numpy.  Workers share the cores: threads of their own below them wait for
 # each other: on a busy machine a test of half a second was not done after a minute.
@@ -12,6 +16,14 @@ os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 90))
 worker = os.environ.get("PYTEST_XDIST_WORKER")
 if worker is not None:
     os.environ["ROS_DOMAIN_ID"] = str(int(os.environ["ROS_DOMAIN_ID"]) + int(worker[2:]) % 11)
+
+# Fixtures of several rooms.
+sys.path.append(str(Path(__file__).parent))
+pytest_plugins = ["measured_wrist"]
+
+# On a busy machine any example can take long.
+hypothesis.settings.register_profile("any machine", deadline=None)
+hypothesis.settings.load_profile("any machine")
 
 
 def pytest_collection_modifyitems(items):

@@ -6,19 +6,12 @@ import pytest
 from wrist_stiffness.analysis import Analysis, Cancelled
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
 
 PLAY = "backlash@motor_2"
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,8 @@ from matplotlib.image import imread
 
 from wrist_stiffness.commands.budget import Push, budget
 from wrist_stiffness.errors import LoadRangeError
-from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.report.pictures.bent_wrist import bent_shapes
 from wrist_stiffness.report.table_pictures import draw_maps
-from wrist_stiffness.shipped import shipped_file
-
-
-@pytest.fixture(scope="module")
-def table():
-    return load_table(shipped_file("precomputed/palmieri2015.npz"))
 
 
 def test_rated_budget_is_the_paper_map(table):

@@ -70,11 +70,6 @@ class Bow(Law):
 '''
 
 
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
-
-
 def session_of(model, effect, seed=1, n=60):
     """Return poses of a wrist with one effect, measured one by one; all but the zeros are known."""
     rng = np.random.default_rng(seed)

@@ -21,18 +21,12 @@ from wrist_stiffness.commands.read_sessions import (
 from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015_model.yaml")
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(SHIPPED)
 
 
 def read(paths, *models):

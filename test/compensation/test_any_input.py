@@ -89,7 +89,7 @@ def test_only_our_own_errors_come_out(model, effects):
     found = model.with_effects(*(Effect(find_law(name), place, {}) for name, place in effects))
     answers = Counter()
 
-    @settings(max_examples=EXAMPLES, deadline=None)
+    @settings(max_examples=EXAMPLES)
     @given(MESSAGES)
     def check(messages):
         answers.update(answers_of(found, messages))

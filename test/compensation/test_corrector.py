@@ -39,7 +39,7 @@ def corrected(corrector, running, stamp_ns, theta, load, own=SETTINGS):
     return corrector.command(running, own, stamp_ns, theta, None, load, all_of_it)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=2).map(np.array),
     st.lists(st.floats(-0.7, 0.7), min_size=6, max_size=6).map(np.array),

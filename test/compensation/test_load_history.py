@@ -106,7 +106,7 @@ def test_tare_takes_the_mean_of_the_last_second_as_zero():
     assert load.wrench.tolist() == pytest.approx([0.6, 0, 0, 0, 0, 0])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     hertz=st.floats(0.5, 2.0),
     phase=st.floats(0.0, 6.3),
@@ -129,7 +129,7 @@ def test_tare_under_a_swinging_load_is_refused(hertz, phase, rate, couple):
         assert loads.zero is None
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 1000), rate=st.sampled_from([50, 200]), size=st.floats(0.0, 3.0))
 def test_tare_of_a_noisy_sensor_is_no_swing(seed, rate, size):
     """Its thresholds grow with its noise instead."""

@@ -94,7 +94,7 @@ payloads = st.builds(
 angles = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)).map(np.array)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(part=payloads, pose=angles, on_platform=st.booleans())
 def test_pick_carry_and_release_are_recognised_from_the_load(table, part, pose, on_platform):
     cell = Cell(table)
@@ -123,7 +123,7 @@ wrenches = st.lists(
 )
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(loads=wrenches, part=st.none() | payloads)
 def test_whatever_acts_only_a_weight_is_corrected_for(table, loads, part):
     """The loop of a contact stays open: no side force and no spin comes through."""
@@ -136,7 +136,7 @@ def test_whatever_acts_only_a_weight_is_corrected_for(table, loads, part):
         assert cell.corrected[2] <= 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(noise=st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 6), min_size=1, max_size=50))
 def test_noise_below_the_thresholds_changes_nothing(table, noise):
     cell, limit = Cell(table), SupervisorSettings().limit
@@ -387,7 +387,7 @@ def test_a_payload_is_learned_by_time_not_by_the_number_of_readings(table, hertz
     assert learned.open_moment(reading.rows) == pytest.approx(wanted, rel=1e-3)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(doubt=st.floats(1.0, 10.0), stop=st.floats(-2.0, 2.0), place=st.floats(0.0, 1.0))
 def test_beside_any_stop_the_trusted_part_leaves_no_more_than_no_correction(doubt, stop, place):
     softer = doubt ** (2.0 * place - 1.0)

@@ -6,7 +6,6 @@ from before_after import before_and_after
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import (
     Header,
     JointState,
@@ -18,7 +17,6 @@ from wrist_stiffness.recording.messages import (
     Quaternion,
 )
 from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.shipped import shipped_file
 
 MILLISECOND = 1_000_000
 MOTORS = ("motor_1_joint", "motor_2_joint")
@@ -27,11 +25,6 @@ SAID_SHIFT_UM = np.array([3.0, 0.0, 0.0])
 POINTING = 2e-4
 SPIN = 5e-4
 """About the normal: no pointing error."""
-
-
-@pytest.fixture(scope="module")
-def table():
-    return load_model(shipped_file("config/palmieri2015_model.yaml")).table
 
 
 def true_pose(table, stamp_ns, degrees):

@@ -257,7 +257,7 @@ def test_what_is_not_excited_is_listed_with_what_to_record(rng):
     assert "cross" not in [each.effect for each in result.not_excited]
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(-6.0, 6.0).filter(lambda size: abs(size) > 2.5), st.integers(0, 1000))
 def test_what_was_learned_predicts_what_no_fit_has_seen(size, seed):
     rng = np.random.default_rng(seed)

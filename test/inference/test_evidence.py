@@ -45,7 +45,7 @@ def density(point, ground, amplitude, excess):
     return multivariate_normal(np.zeros(ROWS), covariance).logpdf(data)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.integers(0, 2**32 - 1),
     st.lists(st.floats(0.1, 5.0), min_size=4, max_size=4),

@@ -52,7 +52,7 @@ def rotation_between(first, second):
 
 @pytest.mark.parametrize("fit", [fit_platform_error, fit_markers])
 @given(turn=vectors, shift=vectors, size=st.floats(-9.0, 0.0), seed=seeds)
-@settings(deadline=None, max_examples=60, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 def test_a_rigid_motion_of_any_size_is_recovered(fit, turn, shift, size, seed):
     points = seven_points(0.01) + np.random.default_rng(seed).normal(0.0, 1e-3, 3)
     truth = PlatformError(
@@ -102,7 +102,7 @@ def test_poses_are_fitted_together_with_points_that_turn_with_the_platform():
 
 
 @given(seed=seeds)
-@settings(deadline=None, max_examples=50, derandomize=True)
+@settings(max_examples=50, derandomize=True)
 def test_points_in_space_give_what_the_equations_of_the_paper_give(seed):
     generator = np.random.default_rng(seed)
     before = seven_points(0.01) + generator.normal(0.0, 1e-3, (7, 3))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.lookup.response import respond
-from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.energy import component_screws, component_wrenches, strain_energies
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.statics import (
@@ -16,12 +15,6 @@ from wrist_stiffness.mechanism.statics import (
     slides,
     turned_flexibilities,
 )
-from wrist_stiffness.shipped import shipped_file
-
-
-@pytest.fixture(scope="module")
-def table():
-    return load_table(shipped_file("precomputed/palmieri2015.npz"))
 
 
 @pytest.fixture(scope="module")

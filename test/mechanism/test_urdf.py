@@ -6,17 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.configuration import BODIES
 from wrist_stiffness.mechanism.urdf import FRAMES, urdf
-from wrist_stiffness.shipped import shipped_file
 
 DIGITS = 1e-8  # of the text
-
-
-@pytest.fixture(scope="module")
-def table():
-    return load_table(shipped_file("precomputed/palmieri2015.npz"))
 
 
 def numbers(text):

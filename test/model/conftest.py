@@ -9,10 +9,8 @@ import pytest
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.shipped import shipped_file
 
 SIGNALS = ("ambient", "link_1", "joint_3", "motor_1", "motor_2")
 
@@ -78,11 +76,6 @@ def make():
         compose=compose,
         motion=motion,
     )
-
-
-@pytest.fixture(scope="session")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="session")

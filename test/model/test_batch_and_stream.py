@@ -44,7 +44,7 @@ def whole(model, make):
     return loaded, block, loaded.batch(block)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.lists(st.integers(1, 59), max_size=6))
 def test_any_split_gives_the_same(whole, cuts):
     loaded, block, at_once = whole

@@ -153,7 +153,7 @@ def test_undefined_values_are_not_finite_and_not_loud():
     assert not np.isfinite(Formula("1 / fx", NAMES)({"fx": 0.0}))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.text(st.sampled_from("fxk012.+-*/()[]{}:,'\"\\ \n\x00=<>&|~^@%!_ébé"), max_size=30))
 def test_random_text_is_a_formula_or_one_clear_line(text):
     refusal = ""
@@ -179,7 +179,7 @@ def trees():
     )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(trees())
 def test_allowed_formulas_agree_with_python(text):
     """The oracle is Python's own arithmetic on scalars."""

@@ -46,7 +46,7 @@ def scale(approach, gap):
     return np.abs(gap).max(axis=1, keepdims=True) / stiffest
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(stacks)
 def test_every_guess_leads_to_the_least_energy(case):
     approach, gap, state = problems(*case)
@@ -59,7 +59,7 @@ def test_every_guess_leads_to_the_least_energy(case):
         assert np.array_equal(active, force > 0.0)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(stacks, st.sampled_from([1, 4]))
 def test_problems_with_the_same_flexibility_are_solved_beside_each_other(case, problems_each):
     approach, gap, state = problems(*case)
@@ -73,7 +73,7 @@ def test_problems_with_the_same_flexibility_are_solved_beside_each_other(case, p
         assert np.array_equal(active[..., number], force[..., number] > 0.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(stacks)
 def test_forces_close_what_is_held_and_nothing_else(case):
     approach, gap, state = problems(*case)
@@ -83,7 +83,7 @@ def test_forces_close_what_is_held_and_nothing_else(case):
     assert np.all(np.abs(opening[state]) <= ROUNDING * np.abs(gap).max())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(stacks)
 def test_the_stiffness_of_a_state_gives_its_forces(case):
     approach, gap, state = problems(*case)

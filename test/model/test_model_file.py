@@ -156,7 +156,7 @@ def test_saved_elsewhere_the_paths_still_lead_to_table_and_law(tmp_path):
     ]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_every_law_and_value_survives_the_file(model, tmp_path_factory, data):
     laws = list(catalogue().values())

@@ -35,7 +35,7 @@ TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 # The types that are a part of no other one: they hold all the others.
 PARTS = {item.element for ros_type in MESSAGE_TYPES for item in fields_of(ros_type)}
 BY_NAME = pytest.mark.parametrize("ros_type", sorted(MESSAGE_TYPES.keys() - PARTS))
-FEW = settings(max_examples=12, deadline=None)
+FEW = settings(max_examples=12)
 
 # Stamps fill int32 seconds; text without NUL, which ends a string in C, and without surrogates.
 TIMES = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
@@ -182,7 +182,7 @@ def test_numpy_arrays_are_encoded_like_tuples():
 
 @BY_NAME
 def test_every_cut_is_one_clear_error(ros_type):
-    @settings(max_examples=5, deadline=None)
+    @settings(max_examples=5)
     @given(messages(ros_type))
     def check(message):
         payload = encode(message)
@@ -195,7 +195,7 @@ def test_every_cut_is_one_clear_error(ros_type):
 
 @pytest.mark.parametrize("ros_type", [DiagnosticArray.ros_type, JointTrajectory.ros_type])
 def test_random_bytes_never_escape_as_another_error(ros_type):
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=200)
     @given(st.binary(max_size=120))
     def check(noise):
         with contextlib.suppress(RecordingError):

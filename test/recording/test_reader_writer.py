@@ -219,7 +219,7 @@ def test_several_files_of_one_folder_are_merged_by_time(tmp_path, timeline, writ
     assert len(list(recording.messages())) == len(entries[::2])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.lists(
         st.tuples(
@@ -237,7 +237,7 @@ def test_any_sequence_comes_back_in_stable_time_order(tmp_path_factory, written,
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.integers(0, 9).map(lambda each: each if each < 9 else 2**63 - 1), max_size=30))
 def test_chunks_that_overlap_are_merged_in_stable_time_order(tmp_path_factory, times):
     path = tmp_path_factory.mktemp("overlapping") / "recording.mcap"

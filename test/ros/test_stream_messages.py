@@ -29,7 +29,7 @@ ROWS = st.lists(NUMBERS, max_size=7).map(tuple)
 JOINTS = st.builds(
     JointSample, STAMPS, TEXTS, st.lists(TEXTS, max_size=7).map(tuple), ROWS, ROWS, ROWS
 )
-THOROUGH = settings(max_examples=200, deadline=None)
+THOROUGH = settings(max_examples=200)
 
 
 def joint_message(sample):

@@ -8,7 +8,6 @@ from scipy.linalg import block_diag
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.planning.earlier import as_experiment
 from wrist_stiffness.planning.information import (
     CHARGE,
@@ -36,7 +35,6 @@ from wrist_stiffness.planning.signatures import plausible, signatures
 from wrist_stiffness.planning.timeline import LOAD_RAMP_S, Pace, Visit, run_through
 from wrist_stiffness.planning.truths import after_data, as_asked
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.shipped import shipped_file
 
 LOAD = AppliedLoad(
     "push", np.array([0.3, 0.2, -1.0]), np.array([0.004, 0.0, 0.002]), np.zeros(3), True, True, 1.0
@@ -47,11 +45,6 @@ EFFECTS = {
     "drive_compliance@motor_1": {"compliance_mdeg_per_Nm": 500.0},
     "mount_compliance@motor_1": {},
 }
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,7 @@
-"""A small recording of a known wrist in known motion, built in code and changed by each test."""
+"""The shipped wrist and its measurements, for the tests of several rooms.
+
+A small recording of a known wrist in known motion is built in code and changed by each test.
+"""
 
 from dataclasses import dataclass, field
 from pathlib import Path

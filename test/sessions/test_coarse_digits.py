@@ -6,21 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.sessions.observing import observe
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.sessions.unit_session import as_units
-from wrist_stiffness.shipped import shipped_file
 
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
 
 DIGIT = 3e-5
 """Of the instrument [m]; far more than the noise, 0.7 um, which else would even it out a little."""
-
-
-@pytest.fixture(scope="module")
-def model():
-    return load_model(shipped_file("config/palmieri2015_model.yaml"))
 
 
 @pytest.fixture(scope="module")
