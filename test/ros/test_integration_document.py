@@ -16,20 +16,29 @@ TEXT = (Path(__file__).parents[2] / "docs/integration.md").read_text(encoding="u
 LAST_DIGIT = 0.02  # um or mdeg; the document has two digits
 
 
-@pytest.mark.parametrize(
-    "entry", [*COMMON, *PREDICTION, *CORRECTION, *MONITOR], ids=lambda e: e.name
-)
-def test_every_parameter_is_described_with_its_default(entry):
+ENTRIES = {entry.name: entry for entry in (*COMMON, *PREDICTION, *CORRECTION, *MONITOR)}
+ROWS = re.findall(r"^\| `(\w+)` \| `(.*?)` \| (.*?) ?\|(.*)\|$", TEXT, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("name", "shown", "limits", "text"), ROWS, ids=lambda text: text[:20])
+def test_a_parameter_on_the_page_is_that_of_the_nodes(name, shown, limits, text):
+    entry = ENTRIES[name]
     default = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
-    row = re.search(rf"^\| `{entry.name}` \| `(.*?)` \|(.*)\|", TEXT, re.MULTILINE)
-    assert row is not None
-    assert row[1] == (str(default) or "empty")
-    limits, _, text = row[2].partition("|")
+    assert shown == (str(default) or "empty")
     for choice in entry.choices:
         assert choice in limits
     if isinstance(entry.default, int | float) and not isinstance(entry.default, bool):
-        assert limits.strip() == f"{entry.lower:g} … {entry.upper:g}"
+        assert limits == f"{entry.lower:g} … {entry.upper:g}"
     assert ("(at the start only)" in text) is entry.fixed
+
+
+def test_parameters_are_found_on_the_page():
+    assert len(ROWS) > 15
+
+
+@pytest.mark.parametrize("name", set(re.findall(r"`([a-z]+_[a-z_]+_(?:deg|n|nm|s|hz))`", TEXT)))
+def test_a_parameter_named_in_the_text_exists(name):
+    assert name in ENTRIES
 
 
 @pytest.mark.parametrize(
