@@ -5,11 +5,12 @@ import struct
 import numpy as np
 import pytest
 from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
 from mcap.records import Channel as McapChannel
 from mcap.records import Chunk, MessageIndex, Schema
 from mcap.records import Header as McapHeader
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import IndexType, Writer
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import RecordingWriter, open_recording
@@ -116,6 +117,30 @@ def test_flipped_bytes_never_escape_as_another_error(tmp_path, small):
         except RecordingError:
             continue
         assert times == sorted(times)
+
+
+def test_a_chunk_that_became_a_record_of_unknown_kind_is_told(tmp_path, small):
+    """Records of unknown kinds are allowed; without indexes or statistics one may hide a loss."""
+    entries, _ = small
+    path = tmp_path / "unknown.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=2500, index_types=IndexType.NONE, use_statistics=False)
+        writer.start("ros2")
+        schema_id = writer.register_schema("a/A", "ros2msg", b"")
+        channel_id = writer.register_channel("/a", "cdr", schema_id)
+        for _, time_ns, _ in entries:
+            writer.add_message(channel_id, time_ns, bytes(50), time_ns)
+        writer.finish()
+    assert not open_recording(path).damage
+    offset, chunk = next(chunk_data_offsets(path))
+    head = offset - 8 - len(chunk.compression) - 4 - 28 - 9
+    damaged = bytearray(path.read_bytes())
+    assert damaged[head] == Opcode.CHUNK
+    damaged[head] ^= 0x80
+    path.write_bytes(damaged)
+    recording = open_recording(path)
+    assert len(list(recording.raw_messages())) < len(entries)
+    assert f"unknown kind {Opcode.CHUNK ^ 0x80} at byte {head}" in recording.damage
 
 
 def chunk_data_offsets(path):

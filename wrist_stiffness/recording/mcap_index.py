@@ -162,6 +162,7 @@ class _Walk:
     # Of chunks that were not understood, as far as their index tells.
     lost: list[Spans] = field(default_factory=list)
     last_is_lost: bool = False
+    unknown: list[str] = field(default_factory=list)
 
     def index(self) -> McapIndex:
         size = os.fstat(self.stream.fileno()).st_size
@@ -236,6 +237,7 @@ class _Walk:
             handlers[opcode](content, length)
         elif opcode > Opcode.DATA_END:
             self._lose_chunk()
+            self.unknown.append(f"a record of unknown kind {opcode} at byte {position} was skipped")
         self.stream.seek(content + length)
         return opcode, content + length
 
@@ -343,6 +345,8 @@ class _Walk:
             if spans:
                 self.flaws.append(f"lost with its chunk: {index.told(spans)}")
         if self.stated is None:
+            # Such records are allowed, but one may be a damaged chunk, and nothing counts messages.
+            self.flaws.extend(self.unknown)
             return
         found, stated = index.spans, self.stated.channel_message_counts
         for number in sorted({*found, *stated}):
