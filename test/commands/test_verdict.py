@@ -6,6 +6,7 @@ import pytest
 
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.report.diagnosis_lines import class_of, correction_of, verdict_lines
 
 GROWTH = Finding(
@@ -61,6 +62,20 @@ def test_what_is_named_comes_with_its_probability_and_with_what_is_left():
 )
 def test_unknown_is_an_error_without_a_name_or_a_name_without_an_answer(depends_on, words):
     assert verdict_lines(answer("unknown", (), depends_on))[0] == words
+
+
+def test_a_search_that_was_stopped_does_not_say_that_nothing_explains_it():
+    left = [Standing("creep@joint_1", 0.0, gain, False, "") for gain in (0.5,)]
+    left += [Standing("backlash@motor_1", 0.0, 40.0, False, "")]
+    stopped = replace(
+        answer("unknown", (), {"the pose": 1.0}), standings=tuple(left), complete=False
+    )
+    first, rest = verdict_lines(stopped)
+    assert first == (
+        "The time was over before every candidate was fitted; most promising: backlash@motor_1. "
+        "Allow more --seconds."
+    )
+    assert "depends on the pose" in rest
 
 
 def test_the_members_of_a_class_have_their_shares():

@@ -133,9 +133,14 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_says_on_what_it_depends(
 
 @pytest.mark.slow
 def test_a_time_that_is_over_is_said(model, worn):
-    found = diagnose_sessions(model, [worn[0]], seconds=1e-3).diagnosis
+    whole = diagnose_sessions(model, [worn[0]], seconds=1e-3)
+    found = whole.diagnosis
     assert found.findings == ()
-    assert found.notes == ("the time was over before every candidate was fitted",)
+    assert not found.complete
+    assert whole.proposals is None, "a law is asked for where the catalogue has none"
+    backlash = next(each for each in found.standings if each.name == "backlash@motor_1")
+    assert backlash in found.promising
+    assert "time was over" in backlash.why_not
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from wrist_stiffness.inference.answer import (
     Finding,
     NotExcited,
     Reading,
+    not_shown,
     read,
     standings,
 )
@@ -38,9 +39,6 @@ from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import TOLERATED
 from wrist_stiffness.sessions.unit_session import UnitSession, as_units
-
-DETECTABLE = 3.0
-"""Standard deviations that an effect of typical size must leave beyond the base to be seen."""
 
 Tell = Callable[[str], None]
 
@@ -174,12 +172,13 @@ def diagnose_sessions(
         reading.depends_on,
         reading.unexplained,
         standings(search, reading),
-        _not_excited(problem, search),
+        _not_excited(search),
         tuple(each.sentence for each in absorbed),
         judge.scope,
-        () if search.in_time else ("the time was over before every candidate was fitted",),
+        complete=search.in_time,
     )
-    proposals = propose(problem, state.fit, naming, tell) if reading.verdict == "unknown" else None
+    stranger = reading.verdict == "unknown" and search.in_time
+    proposals = propose(problem, state.fit, naming, tell) if stranger else None
     # Tolerances that give way to an unknown law say nothing of the drawing.
     tense = None if proposals and proposals.terms else strain(state.fit)
     beyond = state.fit.base.beyond()
@@ -298,14 +297,10 @@ def _errors(table: Observations, left: HeldOut) -> dict[str, float]:
     return {quantity.key: left.rmse(quantity) for quantity in table.reported}
 
 
-def _not_excited(problem: WristProblem, search: Search) -> tuple[NotExcited, ...]:
-    """Return the candidates of which a typical size would not show."""
-    silent_ones = []
-    for trial in problem.trials(search.base.fit):
-        if trial.name in {name for names in search.states for name in names}:
-            continue
-        strongest = max(search.base.evidence.strength(columns) for _, columns in trial.blocks)
-        law, place = _law_and_place(trial.name)
-        if strongest < DETECTABLE and law not in TOLERATED:
-            silent_ones.append(NotExcited(law, place, catalogue()[law].excited_by))
-    return tuple(silent_ones)
+def _not_excited(search: Search) -> tuple[NotExcited, ...]:
+    found = [_law_and_place(name) for name in not_shown(search)]
+    return tuple(
+        NotExcited(law, place, catalogue()[law].excited_by)
+        for law, place in found
+        if law not in TOLERATED
+    )

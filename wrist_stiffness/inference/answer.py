@@ -31,6 +31,9 @@ LEAST_REST = 1e-3
 """Least share of an effect's energy that something else beside it may have: its logarithm is evenly
 spread from there to 1 (assumed)."""
 
+DETECTABLE = 3.0
+"""Standard deviations that an effect of typical size must leave beyond the rest to be seen."""
+
 Verdict = Literal["effect", "none", "unknown"]
 
 
@@ -224,6 +227,16 @@ def _depends_on(state: State) -> dict[str, float]:
     return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
 
+def not_shown(search: Search) -> list[str]:
+    """Return the candidates of which a typical size would not show."""
+    fitted = {name for names in search.states for name in names}
+    return [
+        name
+        for name, strength in search.strength.items()
+        if name not in fitted and strength < DETECTABLE
+    ]
+
+
 def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
     """Return how every candidate stands, the most probable first."""
     weights = probabilities(search)
@@ -243,6 +256,8 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         gain = fitted[name] if name in fitted else search.promised[name] - nominal
         probability = chance.get(name, 0.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
+        if name not in fitted and gain >= 1.0 and not search.in_time:
+            why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))
     return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
 
@@ -349,6 +364,8 @@ class Diagnosis:
         What the held-out units are.
     notes : tuple of str
         What a person should know of it.
+    complete : bool
+        Whether every candidate worth a fit was fitted; if not, more time may change the answer.
     """
 
     verdict: Verdict
@@ -366,6 +383,13 @@ class Diagnosis:
     absorbed: tuple[str, ...] = ()
     scope: str = ""
     notes: tuple[str, ...] = field(default=())
+    complete: bool = True
+
+    @property
+    def promising(self) -> tuple[Standing, ...]:
+        """Candidates that were not fitted, though to first order they explain something."""
+        left = [each for each in self.standings if not each.fitted and each.log_gain >= 1.0]
+        return tuple(sorted(left, key=lambda each: -each.log_gain))
 
     def as_json(self, ranking: bool = False) -> dict[str, Any]:
         """Return plain containers for `json.dump`.
@@ -378,6 +402,7 @@ class Diagnosis:
         found: dict[str, Any] = {
             "schema": SCHEMA,
             "verdict": self.verdict,
+            "complete": self.complete,
             "probability": self.probability,
             "scope": self.scope,
             "noise": dict(self.noise),

@@ -159,6 +159,15 @@ class Search:
     falls : float, optional
         Share of what was left that an effect may leave if the search is to go on beside it;
         infinite where fits cost so little that it always may.
+
+    Attributes
+    ----------
+    promised : dict of str to float
+        Log evidence that each candidate has to first order beside the nominal model.
+    strength : dict of str to float
+        Standard deviations that a typical size of each would leave beside it.
+    in_time : bool
+        Whether every candidate worth a fit was fitted.
     """
 
     def __init__(
@@ -174,6 +183,7 @@ class Search:
         self._end = time.monotonic() + seconds
         self.states: dict[Names, State] = {}
         self.promised: dict[str, float] = {}
+        self.strength: dict[str, float] = {}
         self.in_time = True
         self._grown_from: dict[Names, State] = {}
         self._fits = 0
@@ -229,6 +239,10 @@ class Search:
         as_noise = ranked(state.evidence.without_discrepancy(), trials)
         beyond = ranked(state.evidence, trials)
         if not state.names:
+            strength = state.evidence.strength
+            self.strength = {
+                each.name: max(strength(columns) for _, columns in each.blocks) for each in trials
+            }
             self.promised = {}
             for each in (*beyond, *as_noise):
                 known = self.promised.get(each.trial.name, -np.inf)

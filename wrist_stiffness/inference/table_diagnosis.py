@@ -15,6 +15,7 @@ from wrist_stiffness.inference.answer import (
     Diagnosis,
     Finding,
     NotExcited,
+    not_shown,
     probabilities,
     read,
     standings,
@@ -31,9 +32,6 @@ from wrist_stiffness.inference.search import Search, State
 
 HELD_OUT = 5
 """One unit of so many judges where there is one session only."""
-
-DETECTABLE = 3.0
-"""Standard deviations that an effect of plausible size must leave beyond the rest to be seen."""
 
 MOST_EFFECTS = 8
 """Effects of a set."""
@@ -140,9 +138,7 @@ def diagnose(
         reading = replace(reading, state=search.base, named=(), verdict="unknown", unexplained=1.0)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
-    notes = [] if search.in_time else ["the time was over before every candidate was fitted"]
-    if refused:
-        notes.append("what was found made the held-out part worse: it is not handed over")
+    notes = ["what was found made the held-out part worse: it is not handed over"]
     answer = Diagnosis(
         reading.verdict,
         reading.probability,
@@ -160,7 +156,8 @@ def diagnose(
         standings(search, reading),
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
-        notes=tuple(notes),
+        notes=tuple(notes if refused else ()),
+        complete=search.in_time,
     )
     return TableDiagnosis(
         **{each.name: getattr(answer, each.name) for each in fields(answer)},
@@ -309,13 +306,10 @@ def _values(state: State, name: str) -> dict[str, tuple[float, float]]:
 
 def _not_excited(problem: LinearProblem, search: Search) -> tuple[NotExcited, ...]:
     """Return the candidates of which a plausible size would not show."""
-    fitted = {name for names in search.states for name in names}
-    strength = search.base.evidence.strength
     laws = {each.name: each for each in problem.candidates}
     return tuple(
-        NotExcited(laws[each.name].effect, laws[each.name].component, laws[each.name].needs)
-        for each in problem.trials(search.base.fit)
-        if each.name not in fitted and max(strength(c) for _, c in each.blocks) < DETECTABLE
+        NotExcited(laws[name].effect, laws[name].component, laws[name].needs)
+        for name in not_shown(search)
     )
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""
 
+MOST_PROMISING = 3
+
 
 def diagnosis_lines(found: Diagnosed) -> list[str]:
     """Return the answer for a terminal, the verdict first."""
@@ -42,12 +44,21 @@ def verdict_lines(result: Diagnosis) -> list[str]:
         return [f"Nothing is missing: what is left is noise ({percent(result.probability)} sure)."]
     found = "; ".join(f"{class_of(e)}, {percent(e.probability)} sure" for e in result.findings)
     lines = [f"Missing in the model: {found}."] if found else []
-    if result.verdict == "unknown":
+    if not result.complete:
+        lines.append(_unfinished(result))
+    elif result.verdict == "unknown":
         if result.depends_on:
             lines.append("The error is real, but no effect in the catalogue explains it.")
         else:
             lines.append("An effect is missing, but these recordings do not say which.")
     return [*lines, *rest_lines(result)]
+
+
+def _unfinished(result: Diagnosis) -> str:
+    text = "The time was over before every candidate was fitted"
+    if result.promising:
+        text += f"; most promising: {', '.join(e.name for e in result.promising[:MOST_PROMISING])}"
+    return f"{text}. Allow more --seconds."
 
 
 def rest_lines(result: Diagnosis) -> list[str]:
