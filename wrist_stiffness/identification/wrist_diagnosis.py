@@ -179,8 +179,9 @@ def diagnose_sessions(
     )
     stranger = reading.verdict == "unknown" and search.in_time
     proposals = propose(problem, state.fit, naming, tell) if stranger else None
-    # Tolerances that give way to an unknown law say nothing of the drawing.
-    tense = None if proposals and proposals.terms else strain(state.fit)
+    # Tolerances that give way to an unknown law, or one not asked yet, say nothing of the drawing.
+    told = bool(proposals and proposals.terms) or not search.in_time
+    tense = None if told else strain(state.fit)
     beyond = state.fit.base.beyond()
     effects = tuple(beyond[each.name] for each in reading.named)
     return WristDiagnosis(
