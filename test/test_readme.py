@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.commands.node_list import LAUNCH_ARGUMENTS
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.planning.loads_file import read_loads
@@ -244,6 +245,19 @@ def test_files_of_the_document_can_be_read(tmp_path):
             assert read_loads(path, np.array([0.0, 0.0, -9.81]), force_limit=5.0)
         else:
             assert load_model(path).effects
+
+
+def test_tables_of_the_document_can_be_imported(tmp_path):
+    tables = re.findall(
+        r"^```text\n(time_s.*?)^```$", (ROOT / "docs/files.md").read_text(), re.M | re.S
+    )
+    assert len(tables) == 4
+    for number, table in enumerate(tables):
+        path = tmp_path / "table.csv"
+        path.write_text(table)
+        imported = import_csv(path, tmp_path / f"{number}.mcap", unloaded="fx_N" not in table)
+        assert imported.rows == table.count("\n") - 1
+        assert imported.measured == imported.rows - table.count("nan")
 
 
 PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]

@@ -12,6 +12,9 @@ from wrist_stiffness.errors import InputError
 
 BASE_FRAME = "wrist_base"
 PLATFORM_FRAME = "wrist_platform"
+INSTRUMENT_FRAME = "instrument"
+"""Of poses from an instrument of which nobody knows where it stands: they are registered."""
+
 CORRECTED_FRAME = "wrist_corrected"
 """No frame: marks a command that was corrected, so that no second corrector does it again."""
 

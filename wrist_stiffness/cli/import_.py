@@ -6,6 +6,7 @@ import argparse
 
 from wrist_stiffness.cli.output import say
 from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 DESCRIPTION = """\
 Make a recording of a table, as a campaign with a CMM, a tracker or dial gauges ends in. Every
@@ -16,7 +17,8 @@ columns, each with its unit, in any order:
                                        such as 2026-03-02T10:15:00.25 (UTC, or with +01:00)
   motor_1_deg motor_2_deg              motor angles
   fx_N fy_N fz_N mx_Nm my_Nm mz_Nm     load on the platform at O, in wrist_base
-  x_mm y_mm z_mm                       measured: the platform's point O in wrist_base
+  x_mm y_mm z_mm                       measured: the platform's point O in wrist_base, or with
+                                       --register a target in the instrument's own axes
   qx qy qz qw                          measured: rotation from platform to base
   p1x_mm p1y_mm p1z_mm p2x_mm ...      or markers: the geometry's readout points, in its order
   T_COMPONENT_degC                     temperature of link_1, frame, ambient ...
@@ -29,6 +31,7 @@ backlash remember: list the poses that the wrist turned back at."""
 EPILOG = """\
 examples:
   wrist-stiffness import cmm.csv -o cmm
+  wrist-stiffness import tracker.csv -o tracker --register
   wrist-stiffness import gauge.csv -o gauge.mcap --unloaded"""
 
 
@@ -43,6 +46,7 @@ def add_parser(commands: Commands) -> None:
         "-o", "--output", required=True, metavar="RECORDING", help="folder or .mcap file"
     )
     parser.flag("--unloaded", "there are no load columns because nothing pulled at the platform")
+    parser.flag("--register", "the instrument stands anywhere: the wrist's motion will tell where")
     parser.flag("--overwrite", "replace an existing recording")
 
 
@@ -56,6 +60,7 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.unloaded,
         arguments.overwrite,
         Progress("rows"),
+        INSTRUMENT_FRAME if arguments.register else BASE_FRAME,
     )
     lines = [f"{found.path}: {found.rows} rows, {found.measured} with a measured value"]
     for what, names in (

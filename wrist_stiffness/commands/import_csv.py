@@ -104,6 +104,7 @@ def import_csv(
     unloaded: bool = False,
     overwrite: bool = False,
     progress: Progress = silent,
+    frame: str = BASE_FRAME,
 ) -> Imported:
     """Write a table of measured poses as a recording.
 
@@ -119,6 +120,8 @@ def import_csv(
         Replace an existing recording.
     progress : callable
         Told rows done and in all.
+    frame : str
+        Of the measured poses.
 
     Returns
     -------
@@ -150,7 +153,7 @@ def import_csv(
                 note = String(json.dumps(facts, sort_keys=True))
                 writer.write(topics.RECORDING_NOTES, note, zero_ns + row.time_ns)
             stamp_ns = zero_ns + row.time_ns
-            for topic, message in _messages(row, columns, stamp_ns):
+            for topic, message in _messages(row, columns, stamp_ns, frame):
                 writer.write(topic, message, stamp_ns)
             rows += 1
             measured += row.is_measured(columns)
@@ -338,7 +341,9 @@ def _zero(time_ns: int) -> int:
     return 0 if time_ns >= EPOCH_FROM_S * 1_000_000_000 else TIME_ZERO_NS
 
 
-def _messages(row: _Row, columns: Columns, stamp_ns: int) -> Iterator[tuple[str, Message]]:
+def _messages(
+    row: _Row, columns: Columns, stamp_ns: int, frame: str
+) -> Iterator[tuple[str, Message]]:
     """Give the messages of a row; the load goes first, so that it has arrived with its angles."""
     header = Header(stamp_ns, BASE_FRAME)
     load = row.of(LOAD) if columns.loads else [0.0] * 6
@@ -356,9 +361,10 @@ def _messages(row: _Row, columns: Columns, stamp_ns: int) -> Iterator[tuple[str,
     if columns.markers:
         points = np.reshape(row.of(marker_columns(columns.markers)), (-1, 3))
         poses = tuple(Pose(Point(*point)) for point in points.tolist())
-        yield topics.PLATFORM_MARKERS, PoseArray(header, poses)
+        yield topics.PLATFORM_MARKERS, PoseArray(Header(stamp_ns, frame), poses)
     else:
-        yield topics.PLATFORM_POSE, PoseWithCovarianceStamped(header, _pose(row))
+        pose = PoseWithCovarianceStamped(Header(stamp_ns, frame), _pose(row))
+        yield topics.PLATFORM_POSE, pose
 
 
 def _pose(row: _Row) -> PoseWithCovariance:

@@ -9,6 +9,9 @@ from wrist_stiffness.mechanism.components import Array
 
 LEAST_MARKERS = 3
 
+MIRROR_SHARE = 0.5
+"""Of markers in a plane the mirror image is a motion too: then both misfits are noise."""
+
 
 def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
     """Return the rigid motions with the least squared misfit (Kabsch), as `fit_markers` does.
@@ -48,3 +51,17 @@ def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
         rotation[rows] = left @ right
         shift[rows] = centre - rotation[rows] @ nominal[pattern].mean(axis=0)
     return shift, rotation
+
+
+def mirrored(nominal: Array, measured: Array) -> bool:
+    """Tell whether measured markers, as in `poses_from_markers`, are those of a mirror image."""
+    motion, mirror = (_misfit(nominal, sign * measured) for sign in (1.0, -1.0))
+    return mirror < MIRROR_SHARE * motion
+
+
+def _misfit(nominal: Array, measured: Array) -> float:
+    """Return the median misfit of a rigid motion [m]; infinite where there is none."""
+    shift, rotation = poses_from_markers(nominal, measured)
+    off = measured - nominal @ np.swapaxes(rotation, 1, 2) - shift[:, None]
+    known = np.linalg.norm(off[np.isfinite(off).all(axis=2)], axis=1)
+    return float(np.median(known)) if len(known) else np.inf

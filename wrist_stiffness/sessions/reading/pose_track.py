@@ -8,14 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.measured_pose import NOT_MEASURED, UNIT_TOLERANCE
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
-from wrist_stiffness.sessions.reading.marker_poses import LEAST_MARKERS, poses_from_markers
+from wrist_stiffness.sessions.reading.marker_poses import (
+    LEAST_MARKERS,
+    mirrored,
+    poses_from_markers,
+)
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps
+from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 """Quaternion, scalar last."""
@@ -45,6 +50,8 @@ class PoseTrack:
         As the instrument states it, zero where it does not [m, rad].
     remarks : tuple of str
         What could not be used.
+    unplaced : bool
+        All of this is in the axes of an instrument that stands anywhere, not in F.
     """
 
     time_ns: Stamps
@@ -52,6 +59,7 @@ class PoseTrack:
     rotation: Array
     covariance: Array | None = None
     remarks: tuple[str, ...] = ()
+    unplaced: bool = False
 
     def __len__(self) -> int:
         """Return the number of poses."""
@@ -78,10 +86,22 @@ def pose_track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
     Raises
     ------
     FrameError
-        If they are in a frame that is neither `wrist_base` nor mapped to it.
+        If they are in a frame that is neither `wrist_base` nor mapped to it nor `instrument`.
     InputError
         If the markers are not those of the geometry or too few of them were ever seen.
     """
+    measured = [each for each in (samples.poses, samples.markers) if len(each.time_ns)]
+    unplaced = INSTRUMENT_FRAME in measured[0].frame_id
+    if unplaced:
+        names = {*measured[0].frame_id.tolist(), *samples.frame_poses.frame_id.tolist()}
+        if len(names) > 1:
+            raise FrameError(f"poses come in several frames: {', '.join(sorted(names))}")
+        own = {INSTRUMENT_FRAME: SensorFrame(BASE_FRAME)}
+        frames = Frames({**frames.sensors, **own}, frames.prefix)
+    return replace(_track(samples, markers, frames), unplaced=unplaced)
+
+
+def _track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
     if len(samples.poses.time_ns):
         track = _track_of_poses(samples.poses, "measured pose", frames)
         if len(samples.markers.time_ns):
@@ -212,7 +232,13 @@ def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) ->
             f"{what}: messages hold {count} markers, the geometry names {len(nominal)} readout "
             "points; both must be in the same order"
         )
-    shift, rotation = poses_from_markers(nominal, samples.position @ turn.T + origin)
+    places = samples.position @ turn.T + origin
+    shift, rotation = poses_from_markers(nominal, places)
+    if mirrored(nominal, places):
+        raise InputError(
+            f"{what}: they are the mirror image of the geometry's readout points: the instrument's "
+            "axes are left-handed; swap two of its axes, or turn the sign of one"
+        )
     unseen = int(np.isnan(shift).any(axis=1).sum())
     if unseen == len(shift):
         seen = np.isfinite(samples.position).all(axis=2).sum(axis=1)

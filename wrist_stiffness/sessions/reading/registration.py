@@ -113,6 +113,23 @@ def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
     return said
 
 
+def turns_of(measured: Array, rigid: Array) -> tuple[Rotation, Rotation]:
+    """Return the turns X of the instrument and Y of its target, measured being X rigid Y.
+
+    Both are (n, 3, 3) float and finite; a few wild ones do no harm.
+    """
+    used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
+    seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
+    weight = np.ones(len(used))
+    for _ in range(ROUNDS):
+        instrument = _instrument(seen, said, weight)
+        target = (said.inv() * instrument.inv() * seen).mean(weight)
+        off = (seen * (instrument * said * target).inv()).magnitude()
+        # All keep a say: at rest the misfit is least, and it is motion that tells the instrument.
+        weight = 1.0 / (off**2 + (SOUND * np.median(off)) ** 2 + np.finfo(float).eps)
+    return instrument, target
+
+
 def turn_left(measured: Array, rigid: Array) -> Array:
     """Return what constant turns of instrument and target leave of measured rotations.
 
@@ -130,15 +147,7 @@ def turn_left(measured: Array, rigid: Array) -> Array:
     known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
     if len(known) == 0:
         return np.full((len(measured), 3), np.nan)
-    used = known[np.unique(np.linspace(0, len(known) - 1, POSES_USED).astype(int))]
-    seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
-    weight = np.ones(len(used))
-    for _ in range(ROUNDS):
-        instrument = _instrument(seen, said, weight)
-        target = (said.inv() * instrument.inv() * seen).mean(weight)
-        off = (seen * (instrument * said * target).inv()).magnitude()
-        # All keep a say: at rest the misfit is least, and it is motion that tells the instrument.
-        weight = 1.0 / (off**2 + (SOUND * np.median(off)) ** 2 + np.finfo(float).eps)
+    instrument, target = turns_of(measured[known], rigid[known])
     back, and_back = instrument.inv().as_matrix(), target.inv().as_matrix()
     return in_pieces(
         lambda here, there: rotation_vector(back @ here @ and_back @ np.swapaxes(there, 1, 2)),
@@ -164,16 +173,23 @@ def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
     lever : float
         Distance of the target from its place in U, as far as motion tells it [m].
     """
+    target, origin = places_of(shift, rigid)
+    return shift - rigid @ target - origin, float(np.linalg.norm(target))
+
+
+def places_of(shift: Array, rigid: Array) -> tuple[Array, Array]:
+    """Return the place of the target in U and of O where it is measured, (3,) and (3,) [m].
+
+    Of positions (n, 3), NaN = not measured, and rotations (n, 3, 3); a few wild ones do no harm.
+    """
     used = np.unique(np.linspace(0, len(shift) - 1, POSES_USED).astype(int))
     places = np.concatenate([rigid[used], np.tile(np.eye(3), (len(used), 1, 1))], axis=2)
     design, seen = places.reshape(-1, 6), shift[used].ravel()
     good = np.isfinite(seen)
-    if not good.any():
-        return shift, 0.0
     fitted = np.zeros(6)
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if good.any() else 0):
         fitted = np.linalg.lstsq(design[good], seen[good], rcond=None)[0]
         off = np.abs(seen - design @ fitted)
         # A lost beam is far beyond three times the median of what is left.
         good = off <= SOUND * np.nanmedian(off)
-    return shift - rigid @ fitted[:3] - fitted[3:], float(np.linalg.norm(fitted[:3]))
+    return fitted[:3], fitted[3:]

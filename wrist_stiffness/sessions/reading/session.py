@@ -30,6 +30,7 @@ from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
+from wrist_stiffness.sessions.reading.instrument import registered
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.sessions.reading.path import GAP_S, turning_stamps
@@ -190,6 +191,12 @@ def session_of(
         raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
     block = machine.at(time_ns)
     rigid = rigid_rotation(table, block.theta)
+    covariance = track.covariance
+    if track.unplaced:
+        found = registered(shift, rotation, rigid)
+        shift, rotation = found.in_base(shift, rotation)
+        covariance = None if covariance is None else found.covariance(covariance)
+        remarks.append(str(found))
     require_same_wrist(rotation, rigid, block.theta, table)
     require_near(shift)
     remarks += beyond_range(table, block)
@@ -213,7 +220,7 @@ def session_of(
         block if len(all_ns) == len(block) else machine.at(all_ns),
         _spread(shift, rows, len(all_ns)),
         _spread(rotation, rows, len(all_ns)),
-        track.covariance,
+        covariance,
         remarks=tuple(remarks),
         clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
     )

@@ -1,0 +1,103 @@
+"""An instrument that stands anywhere: the wrist's own motion tells where."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.commands.import_csv import import_csv
+from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.recording.messages import Header, Pose, PoseStamped
+from wrist_stiffness.sessions.reading.instrument import Registration
+from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.topics import INSTRUMENT_FRAME
+
+INSTRUMENT = Rotation.from_euler("xyz", [12.0, -25.0, 130.0], degrees=True).as_matrix()
+TARGET = Rotation.from_euler("xyz", [5.0, 8.0, -40.0], degrees=True).as_matrix()
+O_SEEN = np.array([1.4, -1.3, 0.6])
+PLACE = np.array([0.015, 0.020, -0.030])
+NOISE = 1e-5  # m and rad of one pose, a tracker's
+
+TOLERANCE = 5.0 * NOISE / np.sqrt(799)
+"""Of the mean over all poses: five standard deviations."""
+
+
+@pytest.fixture
+def tracked(campaign):
+    """A tracker two metres away, its target off O, one pose in a hundred wild by centimetres."""
+    rng = np.random.default_rng(0)
+    campaign.frame_id = "instrument"
+    campaign.with_joints().with_loads()
+    rigid = campaign.rigid(campaign.pose_ns)
+    noise = Rotation.from_rotvec(NOISE * rng.standard_normal((799, 3))).as_matrix()
+    shift = (rigid @ PLACE + NOISE * rng.standard_normal((799, 3))) @ INSTRUMENT.T + O_SEEN
+    shift[50::100] += rng.normal(0.0, 0.05, (8, 3))
+    return campaign.with_poses(shift, INSTRUMENT @ noise @ rigid @ TARGET)
+
+
+def test_poses_come_into_the_wrist_s_frame(tmp_path, tracked, table):
+    session = read_session(tracked.written(tmp_path / "bag"), table)
+    sound = np.isfinite(session.shift).all(axis=1)
+    assert (~sound).sum() == 8  # the wild ones
+    rigid = tracked.rigid(tracked.pose_ns)[sound]
+    left = Rotation.from_matrix(session.rotation[sound] @ np.swapaxes(rigid, 1, 2)).as_rotvec()
+    assert np.abs(session.shift[sound].mean(axis=0)).max() < TOLERANCE
+    assert np.abs(left.mean(axis=0)).max() < TOLERANCE
+    assert np.std(session.shift[sound]) < 1.2 * NOISE
+    stand = ", ".join(f"{1e3 * each:.0f}" for each in -INSTRUMENT.T @ O_SEEN)
+    (said,) = (remark for remark in session.remarks if "was registered" in remark)
+    turned = np.degrees(Rotation.from_matrix(INSTRUMENT).magnitude())
+    assert f"stands at ({stand}) mm in wrist_base, turned by {turned:.1f} deg" in said
+    assert "sits at (15, 20, -30) mm" in said
+
+
+def test_a_mirrored_instrument_is_told_by_its_markers(tmp_path, campaign, table):
+    """Left-handed axes: one sign turned."""
+    campaign.frame_id = "instrument"
+    nominal = table.geometry.platform.readout_points
+    seen = nominal @ np.swapaxes(campaign.rigid(campaign.pose_ns), 1, 2)
+    seen = seen @ INSTRUMENT.T + O_SEEN
+    campaign.with_joints().with_loads().with_markers(seen * [1.0, -1.0, 1.0])
+    with pytest.raises(InputError, match="bag: measured markers: .* axes are left-handed"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_positions_alone_do_not_tell_where_it_stands(tmp_path, table):
+    rows = "".join(f"{i},{i},{-i},1400,{i}.5,-600\n" for i in range(6))
+    (tmp_path / "t.csv").write_text("time_s,motor_1_deg,motor_2_deg,x_mm,y_mm,z_mm\n" + rows)
+    import_csv(tmp_path / "t.csv", tmp_path / "bag", unloaded=True, frame=INSTRUMENT_FRAME)
+    with pytest.raises(InputError, match="needs positions and rotations of the same poses"):
+        read_session(tmp_path / "bag", table)
+
+
+def test_a_wrist_that_hardly_moves_does_not_tell_where_it_stands(tmp_path, campaign, table):
+    still = 1e-3 * campaign.theta(campaign.pose_ns)
+    rigid = campaign.mechanism.forward(still).platform
+    noise = 1e-3 * np.random.default_rng(1).standard_normal((799, 3))
+    campaign.frame_id = "instrument"
+    campaign.theta = lambda stamps: 1e-3 * type(campaign).theta(campaign, stamps)
+    campaign.with_joints().with_loads()
+    campaign.with_poses(rotation=INSTRUMENT @ Rotation.from_rotvec(noise).as_matrix() @ rigid)
+    with pytest.raises(InputError, match="about a second axis, .* move both motors"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_another_unknown_frame_is_a_mistake(tmp_path, campaign, table):
+    campaign.frame_id = "tracker"
+    campaign.with_joints().with_loads().with_poses()
+    with pytest.raises(FrameError, match="'tracker'"):
+        read_session(campaign.written(tmp_path / "bag"), table)
+
+
+def test_the_wrist_s_frame_must_be_seen_by_the_same_instrument(tmp_path, tracked, table):
+    for stamp in tracked.pose_ns:
+        header = Header(int(stamp), "wrist_base")
+        tracked.add("/frame_pose_measured", stamp, PoseStamped(header, Pose()))
+    with pytest.raises(FrameError, match="bag: poses come in several frames: instrument, wrist_ba"):
+        read_session(tracked.written(tmp_path / "bag"), table)
+
+
+def test_a_stated_scatter_turns_with_the_axes():
+    standing = Registration(INSTRUMENT, TARGET, O_SEEN, PLACE)
+    along_x = standing.covariance(np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 4.0]))
+    np.testing.assert_allclose(along_x[:3, :3], np.outer(INSTRUMENT[0], INSTRUMENT[0]))
+    np.testing.assert_allclose(along_x[3:, 3:], 4.0 * np.outer(INSTRUMENT[2], INSTRUMENT[2]))
