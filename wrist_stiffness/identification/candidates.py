@@ -193,7 +193,7 @@ def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[Wr
     signals = point.signals
     plans = [(law, place, law.linearised(place, signals)) for law, place in asked]
     for law, place, _ in plans:
-        _require_usual_sizes(law, place)
+        _require_prior_scales(law, place)
     trials: dict[tuple[object, ...], int] = {}
     listed: list[Trial] = []
 
@@ -233,7 +233,7 @@ def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[Wr
     return tuple(found)
 
 
-def _require_usual_sizes(law: Law, place: str) -> None:
+def _require_prior_scales(law: Law, place: str) -> None:
     for each in law.parameters(place):
         if not 0.0 < each.scale < np.inf:
             raise InputError(

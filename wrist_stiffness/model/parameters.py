@@ -90,10 +90,6 @@ class Parameter:
         """Return a value, brought within the bounds."""
         return min(max(value, self.lower), self.upper)
 
-    def usual_sizes(self, value: float) -> float:
-        """Return how many prior standard deviations a value is from the prior mean."""
-        return abs(value - self.mean) / self.scale
-
 
 @dataclass(frozen=True)
 class Estimate:
