@@ -21,7 +21,7 @@ def sessions(model):
     for day in (0, 1):
         settings = CellSettings(
             rate_hz=10.0,
-            program_seconds=90.0,
+            program_seconds=60.0,
             program_seed=41 + day,
             base="wrong",
             base_seed=3,
@@ -29,7 +29,7 @@ def sessions(model):
             hidden=(HiddenEffect("backlash", "motor_2", "single", np.radians(0.06), 5),),
         )
         cell = VirtualCell(model.table, settings, np.random.default_rng(day))
-        time = np.arange(900) / 10.0
+        time = np.arange(600) / 10.0
         sample = cell.run(time, cell.desired(time))
         block = Block(time, sample.encoder, sample.wrench, sample.speed)
         scatter = np.diag(instrument(settings.instrument).sigma ** 2)
@@ -80,8 +80,8 @@ def test_contents_say_what_a_recording_holds(model, sessions):
     analysis = Analysis(model, sessions)
     first, second = analysis.contents()
     assert (first.name, second.name) == ("day_0", "day_1")
-    assert first.measured == 900
-    assert first.duration_s == pytest.approx(89.9)
+    assert first.measured == 600
+    assert first.duration_s == pytest.approx(59.9)
     assert first.rate_hz == pytest.approx(10.0, rel=0.01)
     assert 5 < first.dwells < 100
     lowest, highest = sessions[0].block.theta[:, 1].min(), sessions[0].block.theta[:, 1].max()

@@ -1,7 +1,6 @@
 """Many wrists diagnosed at once: one line for each."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -9,8 +8,6 @@ import pytest
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.fleet import FleetRow
 from wrist_stiffness.report.fleet_lines import diagnosed_lines
-
-DATA = Path(__file__).parents[1] / "data"
 
 
 def diagnosed(verdict, *classes, mistake="", keys=("s_um", "phi_mdeg")):
@@ -60,7 +57,9 @@ def test_a_folder_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys
     pytest.importorskip("distributed", reason="the extra fleet")
     folder = tmp_path / "wrists"
     folder.mkdir()
-    shutil.copy(DATA / "wrist_b.mcap", folder)
+    hidden = ["--effect", "backlash@motor_2", "--size", "10", "--seconds", "40", "--rate", "10"]
+    assert main(["simulate", *hidden, "-o", str(folder / "wrist_b.mcap")]) == 0
+    capsys.readouterr()
     (folder / "wrist_x.mcap").write_bytes(b"no recording")
     out = tmp_path / "fleet.json"
     assert main(["diagnose", str(folder), "--each", "--json", str(out)]) == 0
