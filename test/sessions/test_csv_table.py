@@ -97,7 +97,7 @@ def test_conversions_are_those_of_numpy():
 
 def test_a_table_becomes_the_session_that_it_says(tmp_path, full, table):
     imported = import_csv(full, tmp_path / "bag")
-    assert (imported.rows, imported.measured) == (6, 6)
+    assert (imported.rows, imported.measured, imported.seconds) == (6, 6, 50.0)
     session = read_session(tmp_path / "bag", table)
     np.testing.assert_allclose(session.block.theta, np.radians(COUNTS), atol=1e-16)
     np.testing.assert_array_equal(np.diff(session.block.time), 10.0)

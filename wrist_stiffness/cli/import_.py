@@ -62,7 +62,10 @@ def _run(arguments: argparse.Namespace) -> int:
         Progress("rows"),
         INSTRUMENT_FRAME if arguments.register else BASE_FRAME,
     )
-    lines = [f"{found.path}: {found.rows} rows, {found.measured} with a measured value"]
+    lines = [
+        f"{found.path}: {found.rows} rows in {found.seconds:g} s, {found.measured} with a measured "
+        "value"
+    ]
     for what, names in (
         ("temperatures of", found.temperatures),
         ("covariates", found.covariates),
@@ -74,6 +77,7 @@ def _run(arguments: argparse.Namespace) -> int:
         "recording": str(found.path),
         "rows": found.rows,
         "measured": found.measured,
+        "seconds": found.seconds,
         "temperatures": found.temperatures,
         "covariates": found.covariates,
         "cut_row": found.cut_row,

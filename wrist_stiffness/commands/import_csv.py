@@ -84,6 +84,8 @@ class Imported:
         The recording.
     rows, measured : int
         Rows of the table; those in which something was measured.
+    seconds : float
+        From the first row to the last [s]; a wrong unit of time shows in it.
     temperatures, covariates : tuple of str
         Components and names that were found.
     cut_row : int
@@ -93,6 +95,7 @@ class Imported:
     path: Path
     rows: int
     measured: int
+    seconds: float
     temperatures: tuple[str, ...]
     covariates: tuple[str, ...]
     cut_row: int
@@ -142,7 +145,7 @@ def import_csv(
         columns = _columns(form.header, unloaded)
     except InputError as error:
         raise InputError(f"{table}: {error}") from error
-    rows = measured = zero_ns = 0
+    rows = measured = zero_ns = first_ns = stamp_ns = 0
     with RecordingWriter(output, overwrite=overwrite) as writer:
         for row in _rows(table, form, columns):
             if rows == 0:
@@ -151,7 +154,8 @@ def import_csv(
                 if unloaded:
                     facts["load_source"] = "constant"
                 note = String(json.dumps(facts, sort_keys=True))
-                writer.write(topics.RECORDING_NOTES, note, zero_ns + row.time_ns)
+                first_ns = zero_ns + row.time_ns
+                writer.write(topics.RECORDING_NOTES, note, first_ns)
             stamp_ns = zero_ns + row.time_ns
             for topic, message in _messages(row, columns, stamp_ns, frame):
                 writer.write(topic, message, stamp_ns)
@@ -168,6 +172,7 @@ def import_csv(
         Path(output),
         rows,
         measured,
+        1e-9 * (stamp_ns - first_ns),
         tuple(columns.temperatures),
         tuple(columns.covariates),
         form.cut_row,
