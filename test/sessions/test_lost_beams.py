@@ -24,7 +24,7 @@ def test_spikes_are_left_out_and_counted_but_steps_are_not(tmp_path, campaign, t
     campaign.with_joints().with_loads().with_poses(shift)
     session = read_session(campaign.written(tmp_path / "bag"), table)
     np.testing.assert_array_equal(np.flatnonzero(~session.measured.any(axis=1)), lost)
-    assert "4 of 799 measured poses are spikes: left out" in session.remarks
+    assert "4 of 799 measured poses are lost beams: left out" in session.remarks
 
 
 @pytest.mark.parametrize("late_ms", [20, 66])

@@ -125,7 +125,7 @@ def test_the_own_diagnosis_gets_what_reading_the_recording_gives(
     assert len(read) < len(day.recorded)  # rows without a pose tell nothing new
     assert (read.name, read.notes) == (day.recorded.name, day.recorded.notes)
     assert read.remarks == wanted.remarks
-    assert any("spikes: left out" in remark for remark in read.remarks) == ("lost_beams" in how)
+    assert any("lost beams: left out" in remark for remark in read.remarks) == ("lost_beams" in how)
     assert np.array_equal(read.measured, wanted.measured)
     for found, right in (
         (read.shift, wanted.shift),

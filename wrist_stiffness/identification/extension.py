@@ -38,7 +38,7 @@ SIGNIFICANT = 2.0
 """Uncertainties that tell something from nothing."""
 
 MOST_FAR = 3
-"""So many parameters far beyond their usual size are named, the furthest first."""
+"""So many parameters far beyond their typical magnitude are named, the furthest first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Extension:
     def log_gain(self) -> float:
         """Natural logarithm of the evidence with the effect over that without it.
 
-        It says nothing of an effect without a usual size, such as a formula's.
+        It says nothing of an effect without a typical magnitude, such as a formula's.
         """
         return self.fit.fit.evidence.log - self.base.fit.evidence.log
 

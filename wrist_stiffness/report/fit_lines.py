@@ -137,7 +137,7 @@ def told_lines(
     all_of_them : bool
         Also those that the data do not tell.
     usual : bool
-        Whether they have a usual size: those of a user's formula have none.
+        Whether they have a typical magnitude: those of a user's formula have none.
     """
     lines = []
     for each in parameters:

@@ -203,7 +203,7 @@ def session_of(
     meant = _rigid_when_measured(machine, time_ns, late, table, rigid)
     lost = lost_beams(block.time, shift, rotation, meant, table.geometry.limits.encoder_step)
     if lost.any():
-        remarks.append(f"{lost.sum()} of {len(lost)} measured poses are spikes: left out")
+        remarks.append(f"{lost.sum()} of {len(lost)} measured poses are lost beams: left out")
         shift, rotation = shift.copy(), rotation.copy()
         shift[lost], rotation[lost] = np.nan, np.nan
     if np.all(block.load == block.load[0]):
