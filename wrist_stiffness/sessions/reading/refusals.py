@@ -99,8 +99,8 @@ def require_same_wrist(rotation: Array, rigid: Array, theta: Array, table: Table
     raise InputError(
         "the measured rotations are not about the axes of wrist_base: half of them are more than "
         f"{np.degrees(found.misfit):.1f} deg ({limit}) from what the motor angles say, unless the "
-        f"instrument is turned by {np.degrees(found.turn):.0f} deg; map its frame, or check the "
-        "joints' names, order and signs"
+        f"instrument is turned by {np.degrees(found.turn):.0f} deg; map its frame (a table: import "
+        "--register), or check the joints' names, order and signs"
     )
 
 
