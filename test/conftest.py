@@ -27,5 +27,6 @@ hypothesis.settings.load_profile("any machine")
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the documents: they take the longest, and at the end one worker would be alone."""
-    items.sort(key=lambda item: "test_readme.py::test_commands" not in item.nodeid)
+    """Begin with what takes longest: at the end one worker would be alone with it."""
+    longest = ("test_readme.py::test_commands", "test_page.py::", "test_base_fit.py::")
+    items.sort(key=lambda item: not any(name in item.nodeid for name in longest))
