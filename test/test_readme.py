@@ -276,14 +276,27 @@ def test_tables_of_the_document_can_be_imported(tmp_path):
         assert imported.measured == imported.rows - table.count("nan")
 
 
-PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
+PAGES = sorted(
+    str(page.relative_to(ROOT))
+    for pattern in ("*.md", "docs/*.md", "bench/*.md")
+    for page in ROOT.glob(pattern)
+)
+HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
+
+
+def anchors_of(page):
+    """Return the names of the headings of a page, as GitHub makes them."""
+    titles = HEADING.findall(re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S))
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 @pytest.mark.parametrize("document", PAGES)
 def test_links_lead_somewhere(document):
     path = ROOT / document
-    links = re.findall(r"\]\((?!https?:)([^)#]+)", path.read_text())
-    assert [link for link in links if not (path.parent / link).exists()] == []
+    for file, anchor in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", path.read_text()):
+        page = path.parent / file if file else path
+        assert page.exists(), file
+        assert not anchor or anchor in anchors_of(page), f"{file}#{anchor}"
 
 
 def write_outputs(document):
