@@ -40,7 +40,7 @@ def hidden_in(folder):
 
 
 def test_a_node_that_hangs_is_named_and_the_recording_is_kept(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr(cell, "END_PATIENCE_S", 10.0)
+    monkeypatch.setattr(cell, "END_PATIENCE_S", 6.0)
     path, stopped = tmp_path / "hung.mcap", []
 
     def stop(done, total):
@@ -50,14 +50,14 @@ def test_a_node_that_hangs_is_named_and_the_recording_is_kept(tmp_path, monkeypa
             os.kill(stopped[0], signal.SIGSTOP)
 
     monkeypatch.setattr(progress, "Progress", lambda label: stop)
-    seconds = ["--seconds", "8", "--rate", "50"]
+    seconds = ["--seconds", "4", "--rate", "50"]
     assert command_line.main(["cell", *seconds, "--record", str(path)]) == 1
     out, errors = capfd.readouterr()
     assert out == f"written: {path}\n"
     silent, killed = [line for line in errors.splitlines() if line.startswith("wrist-stiffness")]
     assert "error: pose_error_predictor: no answer heard to" in silent
     assert killed == (
-        "wrist-stiffness: cell: node pose_error_predictor had not ended 10 s after it was told to; "
+        "wrist-stiffness: cell: node pose_error_predictor had not ended 6 s after it was told to; "
         "killed"
     )
     recording = open_recording(path)
@@ -131,7 +131,7 @@ def test_a_cell_whose_recorder_hangs_ends_in_an_error(tmp_path, monkeypatch):
             os.kill(stopped[0], signal.SIGSTOP)
 
     with pytest.raises(InputError, match="node recorder ended with code -9"):
-        cell.run_cell(seconds=4.0, record=path, rate_hz=50.0, progress=stop, tell=told.append)
+        cell.run_cell(seconds=2.5, record=path, rate_hz=50.0, progress=stop, tell=told.append)
     assert "cell: node recorder had not ended 5 s after it was told to; killed" in told
     assert not path.exists()
     assert [part.name.endswith(".partial") for part in tmp_path.iterdir()] == [True]
