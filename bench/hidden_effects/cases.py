@@ -156,18 +156,14 @@ def stage_of(case: Case) -> int:
     return 2 if case.static else 1
 
 
-def quick_cases() -> list[Case]:
-    """Return some of each kind in one design: a look at everything within minutes."""
-    turn = ("backlash", "motor_1", "single")
+def quick_cases() -> list[tuple[Case, str]]:
+    """Return a sound wrist and a visible fault, each with the verdict that is right.
+
+    A stranger takes minutes: of one the tutorial tells, which `test/test_readme.py` runs.
+    """
     return [
-        Case((), 0.0),
-        Case((turn,), 3.0),
-        Case((("mount_compliance", "motor_1", "plain"),), 3.0),
-        Case((turn,), 3.0, instrument="tracker", lost_beams=0.02),
-        Case((turn,), 3.0, sees="pointing"),
-        Case((turn, ("load_point", "load_sensor", "frame")), 3.0),
-        Case((("creep", "joint_1", "standard_solid"),), 0.05),
-        Case((("loose_seat", "platform", "plain"),), 3.0),
+        (Case((), 0.0), "none"),
+        (Case((("backlash", "motor_1", "single"),), 3.0), "effect"),
     ]
 
 

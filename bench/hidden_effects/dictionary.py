@@ -30,12 +30,12 @@ KEPT = 3e-3
 SMALL = 0.3
 """Share of the plausible magnitude at which a law is taken as linear."""
 
-QUICK_DRAWS, DRAWS = 3, 6
+DRAWS = 6
 """Draws of an effect's shape."""
 
-QUICK_BASES, BASES = 60, 160
-"""Wrong bases that are drawn to know what a wrong base does: 160 leave 0.1 of a unit's variance
-unknown, 60 leave 0.4."""
+BASES = 160
+"""Wrong bases that are drawn to know what a wrong base does: so many leave 0.1 of a unit's
+variance unknown."""
 
 FIRST_BASE = 50_000
 """Seeds of these bases, which no case has."""
@@ -148,17 +148,13 @@ def _task(task: tuple[Callable[..., object], tuple[object, ...]]) -> object:
 
 
 @cache
-def dictionary(
-    design: tuple[str, bool], quick: bool, folder: Path, processes: int = 1
-) -> Dictionary:
+def dictionary(design: tuple[str, bool], folder: Path, processes: int = 1) -> Dictionary:
     """Return what the laws do in a design, from the folder where it was kept before.
 
     Parameters
     ----------
     design : (str, bool)
         See `design_of`.
-    quick : bool
-        The first place of each effect alone, and few draws.
     folder : Path
         Cache.
     processes : int
@@ -167,13 +163,13 @@ def dictionary(
     names = [
         f"{effect}@{component}"
         for effect, entry in CATALOGUE.items()
-        for component in (entry.components[:1] if quick else entry.components)
+        for component in entry.components
     ]
     version = code_version(TRUTH, SOURCES)
-    kind = f"{design[0]}{'_rests' if design[1] else ''}{'_quick' if quick else ''}"
+    kind = f"{design[0]}{'_rests' if design[1] else ''}"
     path = folder / f"words_{kind}_{version}.npz"
     if not path.exists():
-        _make(names, design, quick, path, processes)
+        _make(names, design, path, processes)
     with np.load(path, allow_pickle=False) as kept:
         found = [
             Word(name, kept[f"{name}|train"], kept[f"{name}|test"])
@@ -183,20 +179,17 @@ def dictionary(
     return Dictionary(tuple(found[1:]), found[0])
 
 
-def _make(
-    names: list[str], design: tuple[str, bool], quick: bool, path: Path, processes: int
-) -> None:
-    bases, draws = (QUICK_BASES, QUICK_DRAWS) if quick else (BASES, DRAWS)
-    tasks = [(base_draw, (number, design)) for number in range(bases)]
-    tasks += [(word_of, (name, design, draws)) for name in names]
+def _make(names: list[str], design: tuple[str, bool], path: Path, processes: int) -> None:
+    tasks = [(base_draw, (number, design)) for number in range(BASES)]
+    tasks += [(word_of, (name, design, DRAWS)) for name in names]
     progress, made = Progress(f"words of {path.stem}"), []
     with ProcessPoolExecutor(processes) as pool:
         for one in pool.map(_task, tasks):
             made.append(one)
             progress(len(made), len(tasks))
-    drawn = [np.stack(day, axis=-1) / np.sqrt(bases) for day in zip(*made[:bases], strict=True)]
+    drawn = [np.stack(day, axis=-1) / np.sqrt(BASES) for day in zip(*made[:BASES], strict=True)]
     arrays = {"base|train": drawn[0], "base|test": drawn[1]}
-    for word in made[bases:]:
+    for word in made[BASES:]:
         if word is not None:
             arrays |= {f"{word.name}|train": word.train, f"{word.name}|test": word.test}
     partial = path.with_suffix(".part.npz")

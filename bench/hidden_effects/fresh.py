@@ -165,7 +165,7 @@ def answer(group: str, case: Case, days: int, stated: bool) -> dict[str, Any]:
     line |= found.details
     if riddle is None:
         return line
-    words = dictionary(design_of(case), False, Path(os.environ.get("DICTIONARIES", ".")))
+    words = dictionary(design_of(case), Path(os.environ.get("DICTIONARIES", ".")))
     score = asdict(Judge(riddle, words).line("own", found, "", line["seconds"]))
     kept = ("kind", "plausible", "excitation", "detectability", "top", "inside", "found")
     kept += ("class_size", "spurious", "not_excited", "before", "after")

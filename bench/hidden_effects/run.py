@@ -1,6 +1,6 @@
 """Run the hidden-effect benchmark: pose riddles, ask solvers, keep scores.
 
-    python bench/hidden_effects/run.py --quick --processes 2   # a look at everything, 3 minutes
+    python bench/hidden_effects/run.py --quick                # two verdicts; a wrong one fails
     python bench/hidden_effects/run.py --processes 4           # all; stop and start again at will
     python bench/hidden_effects/run.py --only joint_clearance --solvers own_diagnosis
     python bench/hidden_effects/page.py                        # tables and pictures of the results
@@ -33,13 +33,13 @@ from types import FrameType
 from typing import Any
 
 from bench_wrist import OWN, READING, TRUTH, code_version
-from cases import TINY, Case, full_cases, quick_cases, stage_of
+from cases import Case, full_cases, quick_cases, stage_of
 from ceiling import knows_the_laws
 from diagnosis_core import diagnosis_core
 from dictionary import Dictionary, design_of, dictionary
 from elastic_net import elastic_net
 from observe import Riddle, pose_riddle
-from own_diagnosis import own_diagnosis, own_diagnosis_mcap
+from own_diagnosis import diagnosed_sessions, own_diagnosis, own_diagnosis_mcap
 from score import Judge
 from solvers import (
     Solver,
@@ -88,9 +88,6 @@ FILES = {
 LONGEST_S = 1800
 """A riddle or an answer that takes longer is given up."""
 
-LONG = ("knows_the_laws", "told_the_name")
-"""They fit for minutes: of the quick part only the smallest effect is asked them."""
-
 RESTARTS = 5
 """Of the pool, after a process was killed from outside."""
 
@@ -115,13 +112,13 @@ def version_of(solver: str) -> str:
     return code_version((*TRUTH, *modules), (*TRUTH_FILES, *FILES.get(solver, ("solvers.py",))))
 
 
-def solve(case: Case, solvers: Sequence[str], quick: bool, folder: Path) -> list[dict[str, Any]]:
+def solve(case: Case, solvers: Sequence[str], folder: Path) -> list[dict[str, Any]]:
     """Return a line for each solver on one case; a line with `error` where there is no answer."""
     begun = time.perf_counter()
     try:
         with time_limit(LONGEST_S):
             riddle = pose_riddle(case)
-            words = dictionary(design_of(case), quick, folder)
+            words = dictionary(design_of(case), folder)
             judge = Judge(riddle, words)
     except InputError as error:
         return [_without(case, name, "out_of_reach", str(error)) for name in solvers]
@@ -156,10 +153,9 @@ def _without(case: Case, solver: str, why: str, text: str) -> dict[str, Any]:
     }
 
 
-def asked(case: Case, solvers: Sequence[str], quick: bool = False) -> list[str]:
+def asked(case: Case, solvers: Sequence[str]) -> list[str]:
     """Return those of the solvers that are asked this case."""
-    names = [name for name in solvers if name not in SAMPLED or case.asked(name)]
-    return [name for name in names if name not in LONG or case.size == TINY] if quick else names
+    return [name for name in solvers if name not in SAMPLED or case.asked(name)]
 
 
 class time_limit:
@@ -203,7 +199,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="the small subset")
+    parser.add_argument("--quick", action="store_true", help="two verdicts, no scores")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--most", type=int, help="stop after so many cases")
     parser.add_argument("--minutes", type=float, help="begin no case after so many minutes")
@@ -216,22 +212,22 @@ def main() -> int:
     parser.add_argument("--solvers", default=",".join(SOLVERS), help="names with commas between")
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
     arguments = parser.parse_args()
+    if arguments.quick:
+        return quick()
     unknown = set(arguments.solvers.split(",")) - SOLVERS.keys()
     if unknown:
         parser.error(f"{', '.join(sorted(unknown))}: solvers are {', '.join(SOLVERS)}")
     arguments.output.mkdir(parents=True, exist_ok=True)
-    path = arguments.output / ("quick.jsonl" if arguments.quick else "full.jsonl")
+    path = arguments.output / "full.jsonl"
     solvers = arguments.solvers.split(",")
     done = defaultdict(set)
     for line in current(path, solvers):
         done[line["key"]].add(line["solver"])
     stages = {int(each) for each in arguments.stages.split(",")}
     cases = [
-        case
-        for case in (quick_cases() if arguments.quick else full_cases())
-        if arguments.only in case.key and stage_of(case) in stages
+        case for case in full_cases() if arguments.only in case.key and stage_of(case) in stages
     ]
-    to_ask = [(case, asked(case, solvers, arguments.quick)) for case in cases]
+    to_ask = [(case, asked(case, solvers)) for case in cases]
     todo = [
         (case, missing)
         for case, names in to_ask
@@ -245,6 +241,23 @@ def main() -> int:
     return 1 if failed else 0
 
 
+def quick() -> int:
+    """Ask the project's own diagnosis a few cases; return 1 where a verdict is wrong."""
+    wrong = 0
+    for case, verdict in quick_cases():
+        begun = time.process_time()
+        answer = diagnosed_sessions(None, [pose_riddle(case).days[0].read], case.seed)
+        named = [name for members in answer.classes for name in members]
+        good = answer.verdict == verdict and {name.split("@")[0] for name in named} <= {
+            effect for effect, _, _ in case.effects
+        }
+        wrong += not good
+        seconds = time.process_time() - begun
+        said = f"{answer.verdict} {' '.join(named)}".strip()
+        print(f"{'ok   ' if good else 'WRONG'} {case.key}: {said} ({seconds:.0f} s)", flush=True)
+    return 1 if wrong else 0
+
+
 def run(todo: Sequence[tuple[Case, list[str]]], path: Path, arguments: argparse.Namespace) -> None:
     """Solve cases and append their scores to the results file as they come."""
     begun = time.monotonic()
@@ -252,7 +265,7 @@ def run(todo: Sequence[tuple[Case, list[str]]], path: Path, arguments: argparse.
         part = [each for each in todo if stage_of(each[0]) == stage]
         print(f"stage {stage}: {len(part)} cases", flush=True)
         for design in sorted({design_of(case) for case, _ in part}):
-            dictionary(design, arguments.quick, arguments.output, arguments.processes)
+            dictionary(design, arguments.output, arguments.processes)
         _stage(part, path, arguments, begun)
         if _over(arguments, begun):
             return
@@ -288,10 +301,7 @@ def _drain(
     begun: float,
     progress: Progress,
 ) -> None:
-    waiting = {
-        pool.submit(solve, *todo[number], arguments.quick, arguments.output): number
-        for number in left
-    }
+    waiting = {pool.submit(solve, *todo[number], arguments.output): number for number in left}
     with path.open("a", encoding="utf-8") as out:
         for finished in as_completed(waiting):
             if finished.cancelled():
