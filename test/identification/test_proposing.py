@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.identification import wrist_problem
 from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.proposing import propose
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.cell import CellSettings
 
@@ -29,11 +32,11 @@ def day(model, in_the_cell):
     return replace(session, block=replace(session.block, covariates={"clamp_bar": bar}))
 
 
-def planted(model, session, place, direction, text, **sizes):
-    """The session with a law of the user's more in the wrist."""
+def planted(model, session, place, direction, text, *others, **sizes):
+    """The session with a law of the user's more in the wrist, and other effects."""
     law = FormulaLaw("planted", place, np.array(direction), text, ("clamp_bar",), tuple(sizes))
-    effect = effect_at(law, place, sizes)
-    bare, grown = model.with_effects().batch_with(session.block, [(), (effect,)])
+    effects = (effect_at(law, place, sizes), *others)
+    bare, grown = model.with_effects().batch_with(session.block, [(), effects])
     change = grown.measured - bare.measured
     turned = Rotation.from_rotvec(change[:, 3:]).as_matrix() @ session.rotation
     return replace(session, shift=session.shift + change[:, :3], rotation=turned)
@@ -87,3 +90,21 @@ def test_a_wave_of_the_difference_of_the_angles_in_a_link_is_found_there(model, 
     assert law.shape[0] == pytest.approx(18.0, rel=0.05)
     assert law.value == pytest.approx(40.0, abs=4.0 * law.sigma)
     assert found.places["link_3"] > 0.9
+
+
+def test_beside_an_effect_that_is_named_a_law_is_proposed_for_the_rest(model, day, monkeypatch):
+    # Of all others the answer would be the same, a minute later.
+    asked = [(find_law("backlash"), place) for place in ("motor_1", "motor_2")]
+    monkeypatch.setattr(wrist_problem, "searched", lambda absent: asked)
+    play = effect_at(find_law("backlash"), "motor_2", {"width_mdeg": 70.0})
+    both = planted(
+        model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * clamp_bar", play, lift_um=2.0
+    )
+    found = diagnose_sessions(model, [both])
+    assert [each.name for each in found.diagnosis.findings] == ["backlash@motor_2"]
+    assert found.proposals.terms[0].formula == "size_um * clamp_bar"
+    assert found.proposals.terms[0].value == pytest.approx(2.0, abs=0.3)
+    lines = found.proposals.lines("m.yaml", ["day"], ["backlash@motor_2"])
+    first, second = [line for line in lines if line.startswith("   wrist-stiffness")]
+    assert first.endswith("extend m.yaml --effect backlash@motor_2 --fit day -o found_1.yaml")
+    assert "extend found_1.yaml --formula 'size_um * clamp_bar'" in second

@@ -89,7 +89,8 @@ class Diagnosed:
         """Return whether tolerances are strained, and the laws for what no effect explains."""
         found, strain = self.answer.proposals, self.answer.strain
         told = [strain.sentence] if strain and strain.sentence else []
-        return told + (found.lines(self.model, self.paths) if found else [])
+        named = [each.name for each in self.result.findings]
+        return told + (found.lines(self.model, self.paths, named) if found else [])
 
     def as_values(self, ranking: bool = False) -> dict[str, Any]:
         """Return what programs read, with units in the names.

@@ -163,15 +163,36 @@ class Proposals:
             return f"record {'; and '.join(needs)}"
         return f"record {one.needs}, each at {EVERYWHERE}"
 
-    def lines(self, model: str = "MODEL", recordings: Sequence[str] = ("RECORDING",)) -> list[str]:
-        """Return them for a terminal."""
+    def lines(
+        self,
+        model: str = "MODEL",
+        recordings: Sequence[str] = ("RECORDING",),
+        named: Sequence[str] = (),
+    ) -> list[str]:
+        """Return them for a terminal, with the commands that add them.
+
+        Parameters
+        ----------
+        model : str
+            Model file.
+        recordings : sequence of str
+            To fit to.
+        named : sequence of str
+            Effects, `name@component`, beside which they were found: these are added first.
+        """
         out = []
         for number, each in enumerate(self.terms, 1):
             name = f"proposed_{number}"
             out.append(f"{'Proposed law' if number == 1 else 'And'}: {each.sentence}.")
             of = "the error above the noise" if number == 1 else "what the first leaves above it"
             out.append(f"   explains {100.0 * each.explains:.0f} % of {of}")
+            for place, effect in enumerate(named if number == 1 else (), 1):
+                target = f"found_{place}.yaml"
+                words = ["extend", model, "--effect", effect, "--fit", *recordings, "-o", target]
+                out.append(f"   {shlex.join(['wrist-stiffness', *words])}")
+                model = target
             out.append(f"   {each.command(model, recordings, name)}")
+            model = f"{name}.yaml"
         others = [f"   or ({100.0 * e.probability:.0f} %) {e.sentence}" for e in self.rivals]
         if others:
             sure = 100.0 * self.terms[0].probability

@@ -177,8 +177,9 @@ def diagnose_sessions(
         judge.scope,
         complete=search.in_time,
     )
-    stranger = reading.verdict == "unknown" and search.in_time
-    proposals = propose(problem, state.fit, naming, tell) if stranger else None
+    stranger = reading.verdict == "unknown" or bool(reading.depends_on)
+    asks = stranger and search.in_time
+    proposals = propose(problem, state.fit, naming, tell) if asks else None
     # Tolerances that give way to an unknown law, or one not asked yet, say nothing of the drawing.
     told = bool(proposals and proposals.terms) or not search.in_time
     tense = None if told else strain(state.fit)
