@@ -13,10 +13,24 @@ from pathlib import Path
 
 import pytest
 
+from wrist_stiffness.recording import RecordingWriter, open_recording
+
 TUTORIAL = Path(__file__).parents[1] / "data" / "tutorial"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PICTURES = "WRIST_WORKBENCH_PICTURES"
 """Folder in which screenshots are kept; the test's own where it is not set."""
+
+DAYS_S = {"monday": 90.0, "wednesday": 120.0}
+"""How much of the tutorial's days [s]: enough to show the same."""
+
+
+def first_seconds(source, seconds, target):
+    messages = list(open_recording(source).raw_messages())
+    end_ns = messages[0].log_time_ns + 1e9 * seconds
+    with RecordingWriter(target) as writer:
+        for each in messages:
+            if each.log_time_ns < end_ns:
+                writer.write_raw(each.channel, each.payload, each.log_time_ns)
 
 
 @pytest.fixture(scope="session")
@@ -24,8 +38,8 @@ def address(tmp_path_factory):
     """Address of a workbench whose folder holds the days of the tutorial."""
     pytest.importorskip("nicegui", reason="the extra `web` is not installed")
     folder = tmp_path_factory.mktemp("workbench")
-    for day in ("monday", "wednesday", "thursday"):
-        shutil.copy(TUTORIAL / f"{day}.mcap", folder)
+    for day, seconds in DAYS_S.items():
+        first_seconds(TUTORIAL / f"{day}.mcap", seconds, folder / f"{day}.mcap")
     (folder / "broken.mcap").write_bytes(b"no recording")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -22,6 +22,8 @@ class Hand:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.goto(address)
         self.page.wait_for_selector("text=Examples")
+        # Drawing what turns, and asking at every frame, take half a core from what is waited for.
+        self.page.add_style_tag(content="#busy svg { display: none }")
         self._pictures, self._size = pictures, size
 
     def open(self, *names, model=""):
@@ -43,7 +45,7 @@ class Hand:
 
     def idle(self):
         self.page.wait_for_timeout(500)
-        self.page.wait_for_function(IDLE, timeout=LONG_MS)
+        self.page.wait_for_function(IDLE, timeout=LONG_MS, polling=250)
         self.page.wait_for_timeout(500)
 
     def text(self):
@@ -66,13 +68,13 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     url, folder = address
     hand = Hand(browser, url, pictures)
     hand.open("monday.mcap")
-    assert hand.page.locator("#plot-map .point").count() > 100
-    for text in ("3.0 min", "10 Hz", "interferometer", "registered to"):
+    assert hand.page.locator("#plot-map .point").count() > 50
+    for text in ("1.5 min", "10 Hz", "interferometer", "registered to"):
         assert text in hand.text()
     assert "Every recorded condition was varied." in hand.text()
     hand.picture("1_opened")
     # A region is chosen on the map, and all views follow.
-    before = hand.text()
+    (everything,) = set(re.findall(r"all \d+ poses", hand.text()))
     box = hand.page.locator("#plot-map .nsewdrag").bounding_box()
     hand.page.mouse.move(box["x"] + 5, box["y"] + 5)
     hand.page.mouse.down()
@@ -82,8 +84,7 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     hand.page.wait_for_selector("text=Remaining φ, selected")
     hand.picture("2_selected")
     hand.click("Show all")
-    hand.page.wait_for_selector("text=all 214 poses")
-    assert "all 214 poses" in before
+    hand.page.wait_for_selector(f"text={everything}")
     # What is missing, and what it would explain before it is added.
     hand.panel("Missing")
     hand.click("What is missing?")
@@ -93,9 +94,9 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     hand.idle()
     assert "If backlash@motor_2 were added" in hand.text()
     assert "approach one angle from both sides" in hand.text()
-    assert hand.held_out("φ")[-1] > 30.0
+    assert hand.held_out("φ")[-1] > 20.0
     (before, after) = re.findall(r"\n([\d.]+) → ([\d.]+) mdeg\nwith backlash", hand.text())[0]
-    assert float(after) < 6.0 < 30.0 < float(before)
+    assert float(after) < 6.0 < 20.0 < float(before)
     hand.picture("3_seen")
     hand.page.get_by_text("Which experiment would decide?").click()
     hand.click("Plan it")
@@ -104,7 +105,7 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     hand.click("Add it")
     hand.idle()
     calibrated, added = hand.held_out("φ")
-    assert calibrated > 30.0
+    assert calibrated > 20.0
     assert added < 6.0
     # Without a click more the page shows how the error fell, and towards what.
     hand.page.wait_for_selector("#plot-lower .bars")
@@ -124,7 +125,7 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
 
     # Another day a clamp stands beside the wrist; no law of the catalogue knows it.
     hand = Hand(browser, url, pictures, (1920, 1080))
-    hand.open("wednesday.mcap", "thursday.mcap", model="wrist_1.yaml")
+    hand.open("wednesday.mcap", model="wrist_1.yaml")
     hand.panel("Missing")
     hand.click("What is missing?")
     hand.idle()
@@ -167,12 +168,13 @@ def test_a_bad_file_gets_a_sentence_and_a_long_call_can_be_cancelled(address, br
     hand.done()
     hand, other = (Hand(browser, url, pictures) for _ in range(2))
     hand.open("monday.mcap")
+    remaining = hand.held_out("φ")
     hand.panel("Missing")
     hand.click("What is missing?")
     hand.page.wait_for_timeout(1000)
     hand.page.keyboard.press("Escape")
     hand.page.wait_for_selector("text=Cancelled. Nothing was changed.")
-    assert "33.6 mdeg" in hand.text()
+    assert hand.held_out("φ") == remaining
     # Another tab knows nothing of it.
     assert "nothing opened" in other.text()
     hand.done()
