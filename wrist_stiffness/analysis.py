@@ -215,8 +215,7 @@ class Analysis:
     @property
     def residual(self) -> Observations:
         """What the newest model leaves once set-up and tolerances are fitted, and conditions."""
-        base = self._problem().begin().base
-        return base.problem.table.with_values(base.residual)
+        return self.view().left
 
     def view(self, number: int = -1) -> View:
         """Return what a version says of each unit, for pictures.
@@ -226,7 +225,9 @@ class Analysis:
         number : int
             Place among the versions, the newest by default.
         """
-        fit = self._problem(number).begin()
+        version = self._versions[number]
+        # What the version was fitted with is known; only the model as given needs a fit for this.
+        fit = self._problem(number).begin() if version.fit is None else version.fit.fit
         base, predicted = fit.base, []
         for n, session in enumerate(base.problem.sessions):
             model = base.model(n)
@@ -358,7 +359,8 @@ class Analysis:
             If the model has it already, or the recordings lack a signal that it needs.
         """
         now, effect = self._versions[-1], _effect(candidate)
-        found = extend(self._known(), effect, self.sessions, self._watched())
+        watched, known = self._watched(), self._problem()
+        found = extend(self._known(), effect, self.sessions, watched, known)
         step = Step("extend", "", "", {}, added=effect.name)
         child = replace(found.model, lineage=(*now.model.lineage, step))
         held_out = {q.key: found.after.rmse(q) for q in found.quantities}
@@ -411,8 +413,11 @@ class Analysis:
         """Return the problem of a version, fitted once."""
         key = range(len(self._versions))[number]
         if key not in self._problems:
-            known = self._known(key)
-            units = tuple(as_units(known, each) for each in self.sessions)
+            known, fit = self._known(key), self._versions[key].fit
+            if fit is None:
+                units = tuple(as_units(known, each) for each in self.sessions)
+            else:
+                units = fit.problem.sessions
             self._problems[key] = WristProblem(known, units)
         return self._problems[key]
 

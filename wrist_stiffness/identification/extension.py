@@ -49,8 +49,10 @@ class Extension:
     ----------
     effect : Effect
         What was added, as it was given.
-    base, fit : Fit
-        Without the effect, and of everything together, to all recordings.
+    fit : Fit
+        Of everything together, to all recordings.
+    without : WristFit
+        Without the effect, where its first steps ended.
     before, after : HeldOut
         Without and with the effect, of units that neither fit has seen.
     judged_by : str
@@ -58,8 +60,8 @@ class Extension:
     """
 
     effect: Effect
-    base: Fit
     fit: Fit
+    without: WristFit
     before: HeldOut
     after: HeldOut
     judged_by: str
@@ -73,6 +75,11 @@ class Extension:
     def parameters(self) -> tuple[FittedParameter, ...]:
         """All that was fitted."""
         return self.fit.parameters
+
+    @cached_property
+    def base(self) -> Fit:
+        """Fit without the effect, to all recordings."""
+        return Fit(self.without.settled(), self.fit.lost)
 
     @property
     def own(self) -> tuple[FittedParameter, ...]:
@@ -149,6 +156,7 @@ def extend(
     effect: Effect,
     sessions: Sequence[MeasuredSession],
     progress: Progress = silent,
+    known: WristProblem | None = None,
 ) -> Extension:
     """Add an effect, fit it with everything else, and judge it by units that were not seen.
 
@@ -162,6 +170,8 @@ def extend(
         In the order of time.
     progress : callable
         Told steps done and in all.
+    known : WristProblem, optional
+        Of these sessions; used where it asks the same, so that nothing is fitted twice.
 
     Returns
     -------
@@ -177,13 +187,17 @@ def extend(
     loose, held = commissioning(model, said_calibrated(sessions))
     free = within_tolerances(loose, shimmed=effect.law.id != AXES)
     _require_new(model, effect, free)
-    units = tuple(as_units(model, session) for session in sessions)
+    # A tolerance that is found is one no more: the usual prior would hold it back.
+    others = tuple(each for each in free if each.effect.name != effect.name)
+    if known is None or not known.asks(model, (others, held)):
+        known = None
+        units = tuple(as_units(model, session) for session in sessions)
+    else:
+        units = known.begin().base.problem.sessions
     _require_signals(model, effect, units)
     require_units(FitProblem(model.with_effects(*held), units, free))
     progress(0, STEPS)
-    # A tolerance that is found is one no more: the usual prior would hold it back.
-    others = tuple(each for each in free if each.effect.name != effect.name)
-    problem = WristProblem(model, units, (others, held))
+    problem = known or WristProblem(model, units, (others, held))
     base = problem.begin()
     progress(1, STEPS)
     grown = problem.extended(base, effect)
@@ -199,9 +213,8 @@ def extend(
         sessions_used = grown.base.problem.sessions
         whole = fit_base(model, sessions_used, (), base.base, base=(free, held))
         base = WristFit(whole, problem.table)
-    without = Fit(base.settled(), problem.lost)
     progress(STEPS, STEPS)
-    return Extension(effect, without, found, before, after, judge.by)
+    return Extension(effect, found, base, before, after, judge.by)
 
 
 def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:

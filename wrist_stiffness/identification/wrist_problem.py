@@ -61,7 +61,14 @@ class WristProblem:
         self._first, self.lost = fit_cleaned(FitProblem(model.with_effects(*held), sessions, free))
         self._sessions = self._first.problem.sessions
         self.table = WristTable(self._first.problem.table, self._sessions)
+        self._extended: tuple[WristFit, Effect, WristFit] | None = None
         self._asked: dict[int, tuple[BaseFit, WristPoint, dict[str, WristCandidate]]] = {}
+
+    def asks(self, model: ErrorModel, base: Base) -> bool:
+        """Tell whether it is of this model, with this free and that held."""
+        one = self._model
+        same = one.table is model.table and one.evaluation == model.evaluation
+        return same and one.effects == model.effects and self._base == base
 
     @property
     def background(self) -> Background:
@@ -89,13 +96,20 @@ class WristProblem:
         return self._added(fit, ranked, point, candidates[ranked.trial.name])
 
     def extended(self, fit: WristFit, effect: Effect) -> WristFit:
-        """Return the best fit with an effect that somebody named.
+        """Return the best fit with an effect that somebody named; the last one is kept.
 
         Raises
         ------
         InputError
             If its law finds no equilibrium anywhere near these data.
         """
+        last = self._extended
+        if last is None or last[0].base is not fit.base or last[1] != effect:
+            last = fit, effect, self._extend(fit, effect)
+        self._extended = last
+        return last[2]
+
+    def _extend(self, fit: WristFit, effect: Effect) -> WristFit:
         point = self.about(fit)
         if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
             start = Beyond(fit.base, point).best_multiple(effect)

@@ -22,6 +22,7 @@ from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.identification.proposal import Proposal
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -106,7 +107,10 @@ class Offer:
     sentence, formula, component, way : str
         What it does, and the same as `extend --formula` takes it.
     probability : float
-        That it is the one.
+        That it is the one, beside what stands before it.
+    role : str
+        The law itself, another beside it, or one in place of the first: only the first and those
+        in its place exclude each other, and only their probabilities add up to at most 1.
     """
 
     sentence: str
@@ -114,6 +118,7 @@ class Offer:
     component: str
     way: str
     probability: float
+    role: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,9 +226,11 @@ class Bench:
         self._tell("asking which effect is missing")
         self._answer = self._opened.rank()
         found, offers = self._answer.proposals, []
-        for law in (*found.terms, *found.rivals[:RIVALS]) if found else ():
-            told = law.sentence, law.formula, law.component, law.way, law.probability
-            offers.append(Offer(*told))
+        if found:
+            first, beside = found.terms[:1], found.terms[1:]
+            offers += [_offer(law, "Proposed") for law in first]
+            offers += [_offer(law, "Or in its place") for law in found.rivals[:RIVALS]]
+            offers += [_offer(law, "And once the first is added") for law in beside]
         return {"diagnosis": self._answer.diagnosis, "offers": tuple(offers), "seen": None}
 
     def look_at(self, candidate: str | FormulaEffect) -> Changes:
@@ -317,6 +324,10 @@ def _row(version: Version) -> Row:
     found = {} if version.added is None else version.added.estimates
     values = {key: (each.value, each.sigma) for key, each in found.items()}
     return Row(version.name, dict(version.held_out), version.warnings, values)
+
+
+def _offer(law: Proposal, role: str) -> Offer:
+    return Offer(law.sentence, law.formula, law.component, law.way, law.probability, role)
 
 
 def _depends(model: ComparedModel) -> Depends:

@@ -1,7 +1,8 @@
-"""Pictures of a view as Plotly takes them, all in um, mdeg, deg and minutes."""
+"""Pictures of a view as Plotly takes them, all in µm, mdeg, deg and minutes."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -86,7 +87,12 @@ class Shown:
 
 def unit_of(quantity: Quantity) -> str:
     """Return the unit of a quantity as people write it."""
-    return "µm" if quantity.unit == "um" else quantity.unit
+    return spelled(quantity.unit)
+
+
+def spelled(text: str) -> str:
+    """Return text for the page, with one spelling of units; names such as `size_um` stay."""
+    return re.sub(r"\bum\b", "µm", text).replace("+-", "±")
 
 
 def length(values: Array, quantity: Quantity) -> Array:

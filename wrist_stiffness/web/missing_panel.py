@@ -8,10 +8,10 @@ from itertools import groupby
 from nicegui import ui
 
 from wrist_stiffness.comparing.sentences import percent
-from wrist_stiffness.inference.answer import Diagnosis, Standing
+from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.report.diagnosis_lines import verdict_lines
 from wrist_stiffness.web.bench import Seen
-from wrist_stiffness.web.figures import SYMBOL, number, unit_of
+from wrist_stiffness.web.figures import SYMBOL, number, rms, spelled, unit_of
 from wrist_stiffness.web.formula_form import FormulaForm
 from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab
 
@@ -35,14 +35,16 @@ class MissingPanel:
         self._grams = 50.0
         self._body = ui.column().classes("w-full gap-2")
         self._formula = FormulaForm(tab)
+        self._list = ui.column().classes("w-full gap-2")
         tab.listeners.append(self.draw)
         self.draw()
 
     def draw(self) -> None:
         """Say anew what is missing."""
-        self._body.clear()
-        with self._body:
-            self._fill()
+        for part, fill in ((self._body, self._fill), (self._list, self._ranking)):
+            part.clear()
+            with part:
+                fill()
 
     def _fill(self) -> None:
         tab, result = self._tab, self._tab.diagnosis
@@ -51,25 +53,26 @@ class MissingPanel:
             return
         with ui.expansion("What the error depends on", value=result is None).classes("w-full"):
             for line in tab.sentences or ("Not compared yet.",):
-                ui.label(line).classes("text-sm mb-1")
+                ui.label(spelled(line)).classes("text-sm mb-1")
         ask = ui.button("What is missing?", on_click=lambda: tab.work(("rank",)))
         ask.classes("w-full").props("outline" if result else "")
         if result is not None:
             for line in verdict_lines(result):
-                ui.label(line).classes("font-bold")
+                ui.label(spelled(line)).classes("font-bold")
             self._proposals()
         self._chosen()
-        if result is not None:
-            self._ranking(result)
 
     def _proposals(self) -> None:
         """Offer the laws that are proposed where nothing on the list fits."""
         for law in self._tab.offers:
-            text = f"Proposed ({percent(law.probability)}): {law.sentence}"
+            text = f"{law.role} ({percent(law.probability)}): {spelled(law.sentence)}"
             offer = ui.button(text, on_click=partial(self._formula.propose, law))
             offer.props("outline dense align=left").classes("w-full text-left")
 
-    def _ranking(self, result: Diagnosis) -> None:
+    def _ranking(self) -> None:
+        result = self._tab.diagnosis
+        if result is None:
+            return
         ui.label("Candidates, most probable first. Click one to see what it would explain.")
         alike = {
             name: ", ".join(other for other in finding.names if other != name)
@@ -116,8 +119,8 @@ class MissingPanel:
 
     def _chosen(self) -> None:
         """Say what the chosen candidate would explain, and how to be sure of it."""
-        tab, seen = self._tab, self._tab.seen
-        if seen is None:
+        tab, seen, shown = self._tab, self._tab.seen, self._tab.shown
+        if seen is None or shown is None:
             return
         box = ui.column().classes("w-full gap-1 p-2 rounded").style("background: #fff7ed")
         if seen is not self._last:
@@ -127,7 +130,10 @@ class MissingPanel:
             ui.label(f"If {seen.name} were added").classes("font-bold")
             ui.label(f"{seen.sentence}.").classes("text-sm")
             for quantity in tab.quantities:
-                before, after = map(number, seen.explains[quantity.key])
+                sizes = seen.explains[quantity.key]
+                if shown.after is not None:
+                    sizes = rms(shown.view.left.values, quantity), rms(shown.after, quantity)
+                before, after = map(number, sizes)
                 text = f"{SYMBOL[quantity.name]}: {before} → {after} {unit_of(quantity)}"
                 ui.label(f"{text} on these data")
             for name, value in seen.parameters.items():
@@ -158,6 +164,6 @@ class MissingPanel:
 
             ui.button("Plan it", on_click=plan).props("outline dense").classes("w-full mt-2")
             if text:
-                ui.label(text).classes("text-sm whitespace-pre-line")
+                ui.label(spelled(text)).classes("text-sm whitespace-pre-line")
             if folder:
                 ui.label(f"Written into the workspace: {folder}").classes("text-xs")

@@ -7,7 +7,7 @@ from functools import partial
 from nicegui import events, ui
 
 from wrist_stiffness.report.parts import plus_minus
-from wrist_stiffness.web.figures import SYMBOL, number, unit_of
+from wrist_stiffness.web.figures import SYMBOL, number, spelled, unit_of
 from wrist_stiffness.web.tab import VERSIONS, Tab
 
 
@@ -51,9 +51,9 @@ class ModelsPanel:
                 note = " (instrument not registered)" if place == 0 else ""
                 ui.label(f"held-out error: {sizes}{note}").classes("text-xs")
                 for key, (value, sigma) in version.parameters.items():
-                    ui.label(f"{key} = {plus_minus(value, sigma)}").classes("text-xs")
+                    ui.label(f"{key} = {spelled(plus_minus(value, sigma))}").classes("text-xs")
                 for warning in version.warnings:
-                    ui.label(f"Check: {warning}").classes("text-xs")
+                    ui.label(f"Check: {spelled(warning)}").classes("text-xs")
         with ui.row().classes("w-full items-center"):
             calls, lower = (("undo",), ("compare",)), ("", VERSIONS)
             undo = ui.button("Undo the newest", on_click=lambda: tab.work(*calls, then=lower))

@@ -10,7 +10,7 @@ from nicegui import events, run, ui
 from wrist_stiffness.analysis import Contents
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.web.examples import EXAMPLES
-from wrist_stiffness.web.figures import SYMBOL, number
+from wrist_stiffness.web.figures import SYMBOL, number, spelled
 from wrist_stiffness.web.tab import Tab
 
 SHIPPED = "shipped model"
@@ -98,7 +98,7 @@ class OpenPanel:
                 text = f"Not varied, so nothing can be said of: {idle}."
                 ui.label(text if idle else "Every recorded condition was varied.")
             for remark in tab.remarks:
-                ui.label(remark).classes("text-xs text-orange-800")
+                ui.label(spelled(remark)).classes("text-xs text-orange-800")
 
 
 def _told(each: Contents) -> dict[str, str]:
@@ -117,8 +117,7 @@ def _told(each: Contents) -> dict[str, str]:
         "load": f"{each.force[0]:.2f} to {each.force[1]:.2f} N",
         "instrument": each.instrument,
         "registered to": ", ".join(
-            f"{SYMBOL[name]} {number(size)} {'µm' if unit == 'um' else unit}"
-            for (name, _, unit), size in sizes
+            f"{SYMBOL[name]} {number(size)} {spelled(unit)}" for (name, _, unit), size in sizes
         ),
         "other signals": ", ".join(each.signals) or "none",
     }

@@ -208,7 +208,9 @@ class Tab:
         values = view.left.values
         after, name = None, self.candidate
         if self.seen is not None:
-            after = values - self.seen.change
+            change = self.seen.change
+            # A unit that one fit takes for a lost beam another may keep.
+            after = values - change if change.shape == values.shape else None
         elif self.against in self.views:
             other = self.views[self.against].left.values
             after = other if other.shape == values.shape else None
