@@ -92,7 +92,7 @@ def test_a_cut_part_is_condensed_again(values, table, store):
 
 
 @pytest.mark.slow
-def test_rebuild_gives_the_same_numbers(table, tmp_path):
+def test_rebuild_gives_the_same_numbers(table, tmp_path, monkeypatch):
     path = tmp_path / "t.npz"
     save_table(table, path)
     findings = check(path, rebuild=True)
@@ -100,6 +100,8 @@ def test_rebuild_gives_the_same_numbers(table, tmp_path):
     assert {"rebuilt operators", "rebuilt map_values"} <= {finding.name for finding in findings}
     other = replace(table, operators=table.operators * (1.0 + 1e-5))
     save_table(other, path)
+    # These numbers were just built again.
+    monkeypatch.setattr(sweep, "build_table", lambda *_: table)
     failed = {finding.name for finding in check(path, rebuild=True) if not finding.passed}
     assert "rebuilt operators" in failed
 
