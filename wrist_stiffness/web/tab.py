@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +42,22 @@ class Worker:
     """
 
     def __init__(self, folder: Path) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._wires, theirs = context.Pipe()
-        self._stop = context.Event()
-        self._process = context.Process(target=work, args=(folder, theirs, self._stop), daemon=True)
-        self._process.start()
-        theirs.close()
+        self._folder = folder
+        self._context = multiprocessing.get_context("spawn")
+        self._stop = self._context.Event()
+        self._process: SpawnProcess | None = None
+        self._wires: Connection | None = None
+
+    def _begun(self) -> Connection:
+        """Return the wires to the process: a page that only looks around needs none."""
+        if self._wires is None:
+            self._wires, theirs = self._context.Pipe()
+            self._process = self._context.Process(
+                target=work, args=(self._folder, theirs, self._stop), daemon=True
+            )
+            self._process.start()
+            theirs.close()
+        return self._wires
 
     def call(
         self, told: Callable[[tuple[Any, ...]], None], method: str, *arguments: object
@@ -53,9 +65,10 @@ class Worker:
         """Do one thing and return what it changed, and why it failed, empty if it did not."""
         self._stop.clear()
         try:
-            self._wires.send((method, arguments))
+            wires = self._begun()
+            wires.send((method, arguments))
             while True:
-                kind, *rest = self._wires.recv()
+                kind, *rest = wires.recv()
                 if kind == "good":
                     return rest[0], ""
                 if kind == "bad":
@@ -70,8 +83,9 @@ class Worker:
 
     def end(self) -> None:
         """End the process."""
-        self._process.terminate()
-        self._wires.close()
+        if self._process is not None and self._wires is not None:
+            self._process.terminate()
+            self._wires.close()
 
 
 class Tab:
