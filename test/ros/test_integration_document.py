@@ -36,7 +36,9 @@ def test_parameters_are_found_on_the_page():
     assert len(ROWS) > 10
 
 
-@pytest.mark.parametrize("name", set(re.findall(r"`([a-z]+_[a-z_]+_(?:deg|n|nm|s|hz))`", TEXT)))
+@pytest.mark.parametrize(
+    "name", sorted(set(re.findall(r"`([a-z]+_[a-z_]+_(?:deg|n|nm|s|hz))`", TEXT)))
+)
 def test_a_parameter_named_in_the_text_exists(name):
     assert name in ENTRIES
 
