@@ -31,6 +31,9 @@ LEAST_REST = 1e-3
 """Least share of an effect's energy that something else beside it may have: its logarithm is evenly
 spread from there to 1 (assumed)."""
 
+CHANCE = 1.0
+"""Gain of log evidence below which a candidate explains no more than chance would (assumed)."""
+
 DETECTABLE = 3.0
 """Standard deviations that an effect of typical size must leave beyond the rest to be seen."""
 
@@ -256,14 +259,14 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         gain = fitted[name] if name in fitted else search.promised[name] - nominal
         probability = chance.get(name, 0.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
-        if name not in fitted and gain >= 1.0 and not search.in_time:
+        if name not in fitted and gain >= CHANCE and not search.in_time:
             why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))
     return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
 
 
 def _why_not(gain: float, probability: float, fitted: bool) -> str:
-    if gain < 1.0:
+    if gain < CHANCE:
         return "explains no more than chance would"
     if probability < MEMBER:
         return "others explain far more" if fitted else "others explain far more, to first order"
@@ -388,7 +391,7 @@ class Diagnosis:
     @property
     def promising(self) -> tuple[Standing, ...]:
         """Candidates that were not fitted, though to first order they explain something."""
-        left = [each for each in self.standings if not each.fitted and each.log_gain >= 1.0]
+        left = [each for each in self.standings if not each.fitted and each.log_gain >= CHANCE]
         return tuple(sorted(left, key=lambda each: -each.log_gain))
 
     def as_json(self, ranking: bool = False) -> dict[str, Any]:

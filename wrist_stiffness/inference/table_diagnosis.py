@@ -138,7 +138,7 @@ def diagnose(
         reading = replace(reading, state=search.base, named=(), verdict="unknown", unexplained=1.0)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
-    notes = ["what was found made the held-out part worse: it is not handed over"]
+    refusal = "what was found made the held-out part worse: it is not handed over"
     answer = Diagnosis(
         reading.verdict,
         reading.probability,
@@ -156,7 +156,7 @@ def diagnose(
         standings(search, reading),
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
-        notes=tuple(notes if refused else ()),
+        notes=(refusal,) if refused else (),
         complete=search.in_time,
     )
     return TableDiagnosis(
