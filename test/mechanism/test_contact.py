@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.contact import solve_contact, solve_contacts
+from wrist_stiffness.mechanism.contact import solve_contact
 
 ROUNDING = 1e-9
 """Relative; times the condition number of the problem where that is large."""
@@ -137,36 +137,3 @@ def test_joint_without_flanges_has_an_empty_problem():
 def test_input_that_makes_no_sense_is_refused(approach, gap, active, message):
     with pytest.raises(InputError, match=message):
         solve_contact(approach, gap, active)
-
-
-@given(st.lists(st.integers(0, 10**6), min_size=1, max_size=12), st.integers(1, 24))
-def test_many_poses_together_as_one_by_one(seeds, m):
-    cases = [problem(seed, m, 2) for seed in seeds]
-    # One pose without contact among them.
-    cases.append((cases[0][0], np.abs(cases[0][1])))
-    approach, gap = (np.array(column) for column in zip(*cases, strict=True))
-    force, active = solve_contacts(approach, gap)
-    for i, (one_approach, one_gap) in enumerate(cases):
-        wanted, closed = solve_contact(one_approach, one_gap)
-        scale = np.max(np.abs(one_gap)) / np.max(np.diagonal(one_approach))
-        np.testing.assert_allclose(force[i], wanted, atol=ROUNDING * 100.0 * scale)
-        assert np.array_equal(active[i], closed)
-
-
-def test_many_poses_that_do_not_settle_in_blocks_are_solved_one_by_one(monkeypatch):
-    monkeypatch.setattr("wrist_stiffness.mechanism.contact.BLOCK_STEPS", 0)
-    approach, gap = problem(5, 12, 2)
-    force, active = solve_contacts(approach[None], gap[None])
-    wanted, closed = solve_contact(approach, gap)
-    assert np.array_equal(force[0], wanted)
-    assert np.array_equal(active[0], closed)
-
-
-def test_bad_poses_among_many_are_refused():
-    approach, gap = problem(5, 4, 2)
-    bad = gap.copy()
-    bad[1] = np.nan
-    with pytest.raises(InputError, match="not finite"):
-        solve_contacts(np.array([approach, approach]), np.array([gap, bad]))
-    with pytest.raises(InputError, match="positive definite"):
-        solve_contacts(np.zeros((1, 4, 4)), -np.ones((1, 4)))

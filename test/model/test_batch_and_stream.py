@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wrist_stiffness.errors import InputError, LoadRangeError, UnreachablePoseError
-from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.model import batch
 from wrist_stiffness.model.block import Block, Load, Sample
-from wrist_stiffness.model.contacts import solve_contacts
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.formula_law import FormulaLaw
@@ -287,20 +285,6 @@ def test_pins_begin_where_they_rested_last(model, make, monkeypatch, chunk):
     scale = np.abs(cold.twist).max(axis=0)
     assert np.all(np.abs(warm.twist - cold.twist) <= 1e-12 * scale)
     assert np.all(np.abs(beside.twist - alone.twist) <= 1e-12 * scale)
-
-
-def test_many_contacts_at_once_are_each_ones_contact():
-    rng = np.random.default_rng(0)
-    n, m = 200, 9
-    roots = rng.normal(size=(n, m, m)) + 2.0 * np.eye(m)
-    approach = 1e-7 * roots @ np.swapaxes(roots, 1, 2)
-    gap = 1e-6 * rng.normal(size=(n, m))
-    for guess in (None, np.ones(m, dtype=bool)):
-        force, active = solve_contacts(approach, gap, guess)
-        for row in range(n):
-            one, closed = solve_contact(approach[row], gap[row])
-            assert np.array_equal(active[row], closed)
-            assert np.allclose(force[row], one, rtol=1e-8, atol=1e-12 * one.max())
 
 
 def test_candidates_in_one_pass_are_their_own_batches(model, make):

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.contact import solve_contact, solve_contacts
+from wrist_stiffness.mechanism.contact import solve_contact
+from wrist_stiffness.mechanism.contacts import solve_contacts
 from wrist_stiffness.mechanism.statics import ContactOperators
 
 

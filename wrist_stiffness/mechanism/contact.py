@@ -27,9 +27,6 @@ MAX_PIVOTS = 5000
 
 NOT_DEFINITE = "contact: the flexibility of the flanges is singular or not positive definite"
 
-BLOCK_STEPS = 12
-"""Block exchanges for many poses together before the rest are solved one by one."""
-
 
 def solve_contact(
     approach: Array, gap: Array, active: NDArray[np.bool_] | None = None
@@ -126,58 +123,3 @@ def _places(closed: bytes) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return where held sectors stand in a vector and in a raveled square matrix."""
     places = np.flatnonzero(np.frombuffer(closed, dtype=bool))
     return places, len(closed) * places[:, None] + places
-
-
-def solve_contacts(approach: Array, gap: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Solve the contact problems of many poses together.
-
-    The same block exchanges as `solve_contact`, for all poses at once; the few poses that do not
-    settle in `BLOCK_STEPS` are left to it.  Results agree with it to rounding, not to the bit.
-
-    Parameters
-    ----------
-    approach : (n, m, m) float
-        A of each pose [m/N].
-    gap : (n, m) float
-        Opening of each gap without contact forces [m].
-
-    Returns
-    -------
-    force : (n, m) float
-        Contact forces, not negative [N].
-    active : (n, m) bool
-        Sectors in contact.
-
-    Raises
-    ------
-    InputError
-        If an input is not finite or a matrix is not positive definite.
-    """
-    if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(approach))):
-        raise InputError("contact: a gap or a flexibility is not finite")
-    force, closed = np.zeros(gap.shape), gap < 0.0
-    pending = np.flatnonzero(np.any(closed, axis=-1))
-    for _ in range(BLOCK_STEPS):
-        if len(pending) == 0:
-            return force, closed
-        a, g, c = approach[pending], gap[pending], closed[pending]
-        # Sectors that do not touch get an equation of their own: their force is zero.
-        both = c[:, :, None] & c[:, None, :]
-        alone = np.eye(g.shape[-1]) * np.max(np.abs(a), axis=(-1, -2))[:, None, None]
-        try:
-            f = np.linalg.solve(np.where(both, a, alone), np.where(c, -g, 0.0)[..., None])[..., 0]
-        except np.linalg.LinAlgError:
-            break
-        opening = g + np.einsum("nij,nj->ni", a, f)
-        length_scale = np.max(np.abs(g), axis=-1, keepdims=True)
-        force_scale = length_scale / np.max(np.diagonal(a, axis1=-2, axis2=-1), axis=-1)[:, None]
-        wrong = np.where(
-            c, f < -RELATIVE_TOLERANCE * force_scale, opening < -RELATIVE_TOLERANCE * length_scale
-        )
-        settled = ~np.any(wrong, axis=-1) & np.all(np.isfinite(f), axis=-1)
-        force[pending[settled]] = np.maximum(f[settled], 0.0)
-        closed[pending] ^= wrong
-        pending = pending[~settled]
-    for pose in pending:
-        force[pose], closed[pose] = solve_contact(approach[pose], gap[pose])
-    return force, closed

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.contacts import solve_contacts
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
-from wrist_stiffness.model.contacts import Held, solve_alike
 from wrist_stiffness.model.contribution import NOTHING, Contribution
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.stages import (
@@ -78,11 +78,6 @@ class Evaluated:
     def measured(self) -> Array:
         """What the pose sensor says of the twist, composed exactly, (n, 6) [m, rad]."""
         return seen(self.twist, *self.situation.sensor)
-
-    @cached_property
-    def held(self) -> Held:
-        """The contact state, for other models at the same block."""
-        return Held.of(self.situation.operators.approach, self.active)
 
 
 def evaluate(
@@ -163,8 +158,7 @@ def _start(model: Evaluable, like: Evaluated) -> Situation:
         statics = start.statics.with_parts(model.parts)
         return Situation(statics, model.constants, guess=like.active, wrist=wrist)
     if start.constants is not model.constants:
-        guess = like.held if wrist is None else like.active
-        return replace(start, constants=model.constants, guess=guess, wrist=wrist)
+        return replace(start, constants=model.constants, guess=like.active, wrist=wrist)
     return start
 
 
@@ -195,10 +189,10 @@ def _settled_alike(
     """Return the same of situations with the same statics as another one."""
     operators = like.situation.operators
     free = [at.free for at in every]
-    gaps = np.stack([gap for _, gap in free], axis=-1)
-    force, active = solve_alike(operators.approach, gaps, like.held)
-    pushed = np.ascontiguousarray(np.moveaxis(operators.force_twist @ force, -1, 0))
-    return [(twist + pushed[t], force[..., t], active[..., t]) for t, (twist, _) in enumerate(free)]
+    gaps = np.stack([gap for _, gap in free], axis=1)
+    force, active = solve_contacts(operators.approach, gaps, like.active[:, None])
+    pushed = force @ np.swapaxes(operators.force_twist, -1, -2)
+    return [(twist + pushed[:, t], force[:, t], active[:, t]) for t, (twist, _) in enumerate(free)]
 
 
 def seen(twist: Array, left: Array | None, right: Array | None) -> Array:

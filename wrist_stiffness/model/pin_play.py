@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.contacts import forces_of, solve_contacts
+from wrist_stiffness.mechanism.contacts import forces_of, solve_contacts
 
 SMALL_FORCE = 1e-2
 """An end that carries less radial force than this does not reach its wall altogether [N]."""
@@ -214,8 +214,8 @@ class Play:
         return energy, wall.reshape(-1, 4) - self.force - pushed, active
 
     def _hessian(self, x: Array, stiffness: float, active: NDArray[np.bool_]) -> Array:
-        held = forces_of(self.approach, self.opening, active)
-        hessian: Array = -np.swapaxes(self.opening, -1, -2) @ held
+        opened = np.swapaxes(self.opening, -1, -2)
+        hessian: Array = -forces_of(self.approach, opened, active) @ self.opening
         size, into, direction = self._at_walls(x)
         along = direction[..., :, None] * direction[..., None, :]
         share = np.divide(into, size, out=np.zeros_like(into), where=size > 0.0)

@@ -12,6 +12,7 @@ from wrist_stiffness.lookup.table import Evaluation, Table
 from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
+from wrist_stiffness.mechanism.contacts import forces_of, solve_contacts
 from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.influence import IN_LIMB_1, Influence
 from wrist_stiffness.mechanism.statics import ContactOperators, component_rotations, slides
@@ -19,7 +20,6 @@ from wrist_stiffness.mechanism.vectors import block_diagonal, dot
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.constants import Constants
-from wrist_stiffness.model.contacts import Held, forces_of, solve_contacts
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError, together
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
@@ -40,7 +40,7 @@ class Situation:
         Sum of what the model's constant effects add.
     given : Contribution
         Sum of what its other effects added in earlier stages.
-    guess : (m,) or (n, m) bool or Held or None
+    guess : (m,) or (n, m) bool or None
         First guess of the contact state.
     wrist : (CompiledWrist, Configuration), optional
         Of one sample alone: its pose, and the compiled formulas with the model's constants.
@@ -49,7 +49,7 @@ class Situation:
     statics: BlockStatics
     constants: Constants = Constants()
     given: Contribution = NOTHING
-    guess: NDArray[np.bool_] | Held | None = None
+    guess: NDArray[np.bool_] | None = None
     wrist: tuple[CompiledWrist, Configuration] | None = None
 
     @property
@@ -195,7 +195,7 @@ class Situation:
     def with_more(self, given: Contribution) -> Situation:
         """Return the situation after a further stage, with all that was given so far."""
         known, guess = self.__dict__.get("contact"), self.guess
-        if known is not None and not isinstance(guess, Held):
+        if known is not None:
             guess = known[1]
         return Situation(self.statics, self.constants, given, guess, self.wrist)
 

@@ -125,6 +125,55 @@ static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     return PyLong_FromLong(status);
 }
 
+/* Flexibilities (n, m, m), openings (n, t, m), contact states (n, t, m) to begin with, forces
+ * (n, t, m); n, t, m.  Returns the place of the first problem without an answer, else n t. */
+static PyObject *settle_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    long m;
+    if (counted(count, 7) || sectors(args[6], &m)) return 0;
+    const Py_ssize_t n = PyLong_AsSsize_t(args[4]), t = PyLong_AsSsize_t(args[5]);
+    if (PyErr_Occurred()) return 0;
+    const Py_ssize_t real = sizeof(double);
+    const Py_ssize_t sizes[] = {n * m * m * real, n * t * m * real, n * t * m, n * t * m * real};
+    Buffers b;
+    if (take(&b, args, sizes, "ddbd", 3u << 2)) return 0;
+    const double *a = b.view[0].buf, *gap = b.view[1].buf;
+    unsigned char *closed = b.view[2].buf;
+    double *force = b.view[3].buf;
+    Py_ssize_t i = 0;
+    Py_BEGIN_ALLOW_THREADS
+    for (; i < n * t; i++)
+        if (settle_matrix(a + i / t * m * m, (int)m, gap + i * m, closed + i * m, force + i * m))
+            break;
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromSsize_t(i);
+}
+
+/* Flexibilities (n, m, m), openings (n, t, m), contact states (n, m), forces (n, t, m), of which
+ * only those of closed sectors are written; n, t, m.  Returns as above, but for samples. */
+static PyObject *hold_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    long m;
+    if (counted(count, 7) || sectors(args[6], &m)) return 0;
+    const Py_ssize_t n = PyLong_AsSsize_t(args[4]), t = PyLong_AsSsize_t(args[5]);
+    if (PyErr_Occurred()) return 0;
+    const Py_ssize_t real = sizeof(double);
+    const Py_ssize_t sizes[] = {n * m * m * real, n * t * m * real, n * m, n * t * m * real};
+    Buffers b;
+    if (take(&b, args, sizes, "ddbd", 1u << 3)) return 0;
+    const double *a = b.view[0].buf, *gap = b.view[1].buf;
+    const unsigned char *closed = b.view[2].buf;
+    double *force = b.view[3].buf;
+    Py_ssize_t i = 0;
+    Py_BEGIN_ALLOW_THREADS
+    for (; i < n; i++)
+        if (hold_matrix(a + i * m * m, (int)m, (int)t, gap + i * t * m, closed + i * m,
+                        force + i * t * m))
+            break;
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromSsize_t(i);
+}
+
 /* Mechanism, parts, angles (n, 2), loads (n, 6), which of them are in U (n), contact state (m),
  * which are wanted (n); twists (n, 6), configurations (n, 66), contact states (n, m), statuses (n);
  * m.  The contact state goes from sample to sample. */
@@ -324,6 +373,8 @@ static PyObject *log_of(PyObject *self, PyObject *const *args, Py_ssize_t count)
 static PyMethodDef METHODS[] = {
     FAST("forward", forward_of, "Fill the configurations of n poses in the domain."),
     FAST("respond", respond_of, "Fill twist, force and contact state at one configuration."),
+    FAST("settle", settle_of, "Fill contact states and forces of n times t problems."),
+    FAST("hold", hold_of, "Fill the forces that hold the sectors of n samples closed."),
     FAST("predict", predict_of, "Fill twists and configurations of n samples in their order."),
     FAST("correct", correct_of, "Fill the corrections of n commands in their order."),
     FAST("read_load", read_of, "Fill what n loads say of a payload."),

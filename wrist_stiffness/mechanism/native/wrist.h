@@ -134,6 +134,12 @@ void apply_safely(const Mechanism *k, const Safety *safety, const double command
 int settle(const Parts *parts, int m, const double (*half)[3], const double *gap,
            unsigned char *closed, double *force);
 
+/* The same of a flexibility (m, m); and the forces that close the given sectors, of either sign, for
+ * openings (columns, m), which leave the others alone. */
+int settle_matrix(const double *a, int m, const double *gap, unsigned char *closed, double *force);
+int hold_matrix(const double *a, int m, int columns, const double *gap,
+                const unsigned char *closed, double *force);
+
 static inline double dot3(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
