@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -81,6 +80,8 @@ class BaseFit:
         The base with those extras beside which its columns are taken.
     arrived : bool
         Whether the steps settled.
+    columns : (u, 6, p) float
+        Change of what is left by a step of each unknown [m, rad], from where the last step began.
     """
 
     problem: FitProblem
@@ -91,11 +92,11 @@ class BaseFit:
     bare: FitProblem
     firm: FitProblem
     arrived: bool
+    columns: Array
 
-    @cached_property
-    def columns(self) -> Array:
-        """Change of what is left by a step of each unknown, about `z`, (u, 6, p) [m, rad]."""
-        return _columns(self.problem, self.firm, self.z)
+    def with_columns_here(self) -> BaseFit:
+        """Return the fit with the columns of the very point where it ended."""
+        return replace(self, columns=_columns(self.problem, self.firm, self.z))
 
     @property
     def prior_std(self) -> Array:
@@ -200,18 +201,20 @@ def fit_base(
     bare = problem if firm == len(more) else alone
     if 0 < firm < len(more):
         bare = replace(alone, free=(*free, *more[:firm]))
-    z = _start(problem, start, added)
+    z, near = _start(problem, start, added), None
+    if start is not None and alone is start.bare:
+        near = _near(problem, start, len(free))
     if walls != "sharp":
         for force in ROUNDED_N:
             gradual = [replace(each, effect=_rounded(each.effect, force)) for each in more]
             easy = replace(problem, free=(*free, *gradual))
-            z, residual, arrived = _descended(easy, easy, z, NEARLY)
+            z, residual, near, arrived = _descended(easy, easy, z, len(free), NEARLY, near)
             if walls == "rounded":
                 cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
-                return BaseFit(easy, z, residual, tuple(added), cost, alone, easy, arrived)
-    z, residual, arrived = _descended(problem, bare, z)
+                return BaseFit(easy, z, residual, tuple(added), cost, alone, easy, arrived, near)
+    z, residual, near, arrived = _descended(problem, bare, z, len(free), near=near)
     cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
-    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare, arrived)
+    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare, arrived, near)
 
 
 def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFit, int]:
@@ -232,19 +235,22 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
         How many there were.
     """
     z, total = np.zeros(len(problem.unknowns)) if start is None else start, 0
+    usual = len(problem.free)
+    z, residual, columns, arrived = _descended(problem, problem, z, usual)
     for _ in range(MOST_CLEANINGS):
-        z, residual, arrived = _descended(problem, problem, z)
         table = problem.table.with_values(residual)
         # Exact data scatter by rounding: what is lost is far beyond the noise as well.
         white = problem.whiten(residual).reshape(table.values.shape)
-        lost = _lost(table, problem.columns_at(z))
+        lost = _lost(table, columns)
         lost &= np.abs(white).max(axis=1) > OUTLIER_LIMIT
         if not lost.any():
             break
         total += int(lost.sum())
         problem = replace(problem, sessions=parted(problem.sessions, lost).seen)
+        known = columns[~lost]
+        z, residual, columns, arrived = _descended(problem, problem, z, usual, near=known)
     cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
-    return BaseFit(problem, z, residual, (), cost, problem, problem, arrived), total
+    return BaseFit(problem, z, residual, (), cost, problem, problem, arrived, columns), total
 
 
 def _lost(table: Observations, columns: Array) -> Mask:
@@ -272,15 +278,26 @@ def _rounded(effect: Effect, force: float | None) -> Effect:
 
 
 def _descended(
-    problem: FitProblem, bare: FitProblem, z: Array, enough: float = ENOUGH
-) -> tuple[Array, Array, bool]:
-    """Return where Gauss-Newton steps lead from `z`, the residual there, whether they settled."""
+    problem: FitProblem,
+    bare: FitProblem,
+    z: Array,
+    usual: int,
+    enough: float = ENOUGH,
+    near: Array | None = None,
+) -> tuple[Array, Array, Array, bool]:
+    """Return where Gauss-Newton steps lead from `z`: there, the residual, columns, if they settled.
+
+    Columns of the `usual` first effects, the base, cost by far the most and hardly change about a
+    fit: those of `near` (u, 6, p), where there is one, serve until they lead no further.  The end
+    is after a step with all columns of the very point where it began that gains next to nothing.
+    """
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
-    scale = 0.0
+    scale, columns = 0.0, near
     for _ in range(MOST_STEPS):
-        columns = _columns(problem, bare, z)
+        fresh = columns is None
+        columns = _columns(problem, bare, z, columns, usual)
         left = problem.whiten(residual)
         found = _robust_variance(left)
         scale = max(found, COOLING * scale)
@@ -297,24 +314,40 @@ def _descended(
             size /= 2.0
         if after < before:
             z, residual = trial, tried
-        if cooled and before - after < enough * before:
-            return z, residual, True
-    return z, residual, False
+        small = cooled and before - after < enough * before
+        if small and fresh:
+            return z, residual, columns, True
+        if small or near is None:
+            columns = None
+    return z, residual, _columns(problem, bare, z), False
 
 
-def _columns(problem: FitProblem, bare: FitProblem, z: Array) -> Array:
-    """Return the columns of one problem, and of what another has on top of it.
+def _columns(
+    problem: FitProblem, bare: FitProblem, z: Array, near: Array | None = None, usual: int = 0
+) -> Array:
+    """Return the columns of one problem, and of what another has on top of it, (u, 6, p).
 
     Play would be solved again for each column of the base.
+
+    Parameters
+    ----------
+    problem, bare : FitProblem
+        The whole, and the one beside which columns of its own unknowns are taken.
+    z : (p,) float
+        Where.
+    near : (u, 6, p) float, optional
+        Columns of a point near by: those of the first `usual` free effects are taken from there.
+    usual : int
+        How many.
     """
-    of_bare = [place for place, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
-    of_extras = tuple(n for n, u in enumerate(problem.unknowns) if u.free >= len(bare.free))
-    first = bare.columns_at(z[of_bare])
-    if not of_extras:
-        return first
-    columns = np.zeros((*first.shape[:2], len(z)))
-    columns[:, :, of_bare] = first
-    columns[:, :, of_extras] = problem.columns_at(z, of_extras)
+    of_bare = [n for n, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
+    beyond = [n for n in range(len(z)) if n not in set(of_bare)]
+    columns = np.zeros((len(problem.table.values), 6, len(z))) if near is None else near.copy()
+    asked = tuple(i for i, u in enumerate(bare.unknowns) if near is None or u.free >= usual)
+    for of, own, places in ((bare, of_bare, asked), (problem, range(len(z)), tuple(beyond))):
+        if places:
+            at = [own[place] for place in places]
+            columns[:, :, at] = of.columns_at(z[own], places if len(places) < len(own) else None)
     return columns
 
 
@@ -346,6 +379,14 @@ def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effec
         at = u.mean if of_base else added[name].estimates[u.key].value
         found.append((known.get((name, u.key, u.session, of_base), at) - u.mean) / u.step)
     return np.array(found)
+
+
+def _near(problem: FitProblem, start: BaseFit, usual: int) -> Array:
+    """Return the columns of the base where another fit ended, (u, 6, p); those of effects as 0."""
+    own = np.array([unknown.free < usual for unknown in problem.unknowns])
+    columns = np.zeros((len(problem.table.values), 6, len(own)))
+    columns[:, :, own] = start.columns[:, :, start.of_base]
+    return columns
 
 
 def _robust_variance(white: Array) -> float:

@@ -133,14 +133,17 @@ class WristFit:
         A discrepancy takes nothing over from them: they are there to predict, and nobody would
         predict by a discrepancy.
         """
-        fit, gain = self, np.inf
+        fit, gain, here = self, np.inf, False
         for _ in range(MOST_ROUNDS):
             noise = known_noise(fit.point, self.table.background)
             step, gain = fit._step(noise)
             moved = fit._moved(noise, step) if gain >= SMALL_GAIN else None
-            if moved is None:
+            if moved is not None:
+                fit, here = moved, False
+            elif here:
                 break
-            fit = moved
+            else:
+                fit, here = WristFit(fit.base.with_columns_here(), self.table), True
         return WristFit(replace(fit.base, arrived=gain < LARGE_GAIN), self.table)
 
     def _step(self, found: Evidence) -> tuple[Array, float]:
