@@ -31,7 +31,7 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import QUANTITIES
+from wrist_stiffness.sessions.unit_session import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import SENSED, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument

@@ -27,6 +27,7 @@ from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.commands.node_list import LAUNCH_ARGUMENTS
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.planning.loads_file import read_loads
+from wrist_stiffness.sessions.reading.gauges_file import read_gauges
 from wrist_stiffness.shipped import shipped_file
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -259,6 +260,8 @@ def test_files_of_the_document_can_be_read(tmp_path):
         path.write_text(example)
         if "\nloads:" in example:
             assert read_loads(path, np.array([0.0, 0.0, -9.81]), force_limit=5.0)
+        elif "\ngauges:" in example:
+            assert read_gauges(path)
         else:
             assert load_model(path).effects
 
@@ -267,13 +270,20 @@ def test_tables_of_the_document_can_be_imported(tmp_path):
     tables = re.findall(
         r"^```text\n(time_s.*?)^```$", (ROOT / "docs/files.md").read_text(), re.M | re.S
     )
+    (yaml,) = re.findall(
+        r"^```yaml\n(schema: 1\ngauges.*?)^```$", (ROOT / "docs/files.md").read_text(), re.M | re.S
+    )
+    gauges = tmp_path / "gauges.yaml"
+    gauges.write_text(yaml)
     assert len(tables) == 4
     for number, table in enumerate(tables):
         path = tmp_path / "table.csv"
         path.write_text(table)
-        imported = import_csv(path, tmp_path / f"{number}.mcap", unloaded="fx_N" not in table)
-        assert imported.rows == table.count("\n") - 1
-        assert imported.measured == imported.rows - table.count("nan")
+        described = gauges if "level_mdeg" in table else None
+        imported = import_csv(
+            path, tmp_path / f"{number}.mcap", "fx_N" not in table, gauges_file=described
+        )
+        assert imported.measured == imported.rows == table.count("\n") - 1
 
 
 PAGES = sorted(

@@ -8,8 +8,19 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/troubleshooting.md").read_text()
-ROW = re.compile(r"^\| `([^`]+)` \|", re.MULTILINE)
-"""A table row that begins with a message."""
+TABLE = re.compile(r"^\| message \|.*\n\|[-| ]+\n((?:\|.*\n)+)", re.MULTILINE)
+"""Rows of a table of messages."""
+
+
+def explained_on(page):
+    """Return the messages of the tables of messages, at least one for each row."""
+    found = []
+    for row in (row for rows in TABLE.findall(page) for row in rows.splitlines()):
+        cell = re.split(r"(?<!\\)\|", row)[1]
+        own = [text.replace(r"\|", "|") for text in re.findall(r"`([^`]+)`", cell)]
+        assert own, f"no message in {row}"
+        found += own
+    return found
 
 
 def messages_in(text):
@@ -31,7 +42,7 @@ def rendered(node):
 CODE = set().union(
     *(messages_in(path.read_text()) for path in (ROOT / "wrist_stiffness").rglob("*.py"))
 )
-EXPLAINED = [message.replace(r"\|", "|") for message in ROW.findall(PAGE)]
+EXPLAINED = explained_on(PAGE)
 
 
 @pytest.mark.parametrize("message", EXPLAINED)
@@ -40,9 +51,18 @@ def test_explained_message_is_in_the_code(message):
 
 
 def test_the_page_is_read_as_it_looks():
-    table = "| `… samples` | fine |\n| `is \\|D\\|` | x |\n|---|\n| plain | `no` |\n"
-    assert ROW.findall(table) == ["… samples", r"is \|D\|"]
-    assert len(EXPLAINED) > 10
+    table = "| message | do |\n|---|---|\n| `… samples`, `b` | x |\n| `is \\|D\\|` | `no` |\n"
+    assert explained_on(f"text\n{table}\n| symptom |\n|---|\n| `no` |\n") == [
+        "… samples",
+        "b",
+        r"is |D|",
+    ]
+    assert PAGE.count("\n| message |") == len(TABLE.findall(PAGE))
+
+
+def test_a_row_without_a_message_is_found():
+    with pytest.raises(AssertionError, match="no message in"):
+        explained_on("| message |\n|---|\n| plain |\n")
 
 
 def test_texts_are_read_with_a_mark_for_each_value():

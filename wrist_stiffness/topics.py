@@ -24,6 +24,7 @@ TEMPERATURES = "/temperatures"
 COVARIATES = "/covariates/"
 PLATFORM_POSE = "/platform_pose_measured"
 PLATFORM_MARKERS = "/platform_markers_measured"
+GAUGE_READINGS = "/gauge_readings"
 FRAME_POSE = "/frame_pose_measured"
 MOTOR_COMMANDS = "/motor_commands"
 MOTOR_TRAJECTORY = "/motor_trajectory"
@@ -57,6 +58,7 @@ STANDARD_TOPICS = (
     TEMPERATURES,
     PLATFORM_POSE,
     PLATFORM_MARKERS,
+    GAUGE_READINGS,
     FRAME_POSE,
     MOTOR_COMMANDS,
     MOTOR_TRAJECTORY,

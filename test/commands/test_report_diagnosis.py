@@ -19,7 +19,7 @@ from wrist_stiffness.inference.answer import NotExcited, Standing
 from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
 from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
 from wrist_stiffness.report.page import html_of
-from wrist_stiffness.sessions.observing import QUANTITIES
+from wrist_stiffness.sessions.unit_session import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
 
 FINDING = Finding(

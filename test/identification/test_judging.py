@@ -15,8 +15,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import QUANTITIES
-from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.sessions.unit_session import QUANTITIES, as_units
 
 SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 POSES = 60

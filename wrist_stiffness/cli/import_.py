@@ -8,6 +8,9 @@ from wrist_stiffness.cli.output import say
 from wrist_stiffness.cli.parser import Commands, add_command
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
+LONG_DAYS = 1.0
+"""Nobody measures one session for longer, and two minutes in ms are 1.4 days."""
+
 DESCRIPTION = """\
 Make a recording of a table, as a campaign with a CMM, a tracker or dial gauges ends in. Every
 command that reads recordings reads it then. One row is one measured pose; the first line names the
@@ -21,6 +24,8 @@ columns, each with its unit, in any order:
                                        --register a target in the instrument's own axes
   qx qy qz qw                          measured: rotation from platform to base
   p1x_mm p1y_mm p1z_mm p2x_mm ...      or markers: the geometry's readout points, in its order
+  NAME_mm NAME_um NAME_in              or dial gauges, and inclinometers (NAME_deg, NAME_mdeg),
+                                       as --gauges describes them
   T_COMPONENT_degC                     temperature of link_1, frame, ambient ...
   NAME_UNIT                            anything else that may matter: humidity_percent ...
 
@@ -32,7 +37,8 @@ EPILOG = """\
 examples:
   wrist-stiffness import cmm.csv -o cmm
   wrist-stiffness import tracker.csv -o tracker --register
-  wrist-stiffness import gauge.csv -o gauge.mcap --unloaded"""
+  wrist-stiffness import gauges.csv -o gauges --gauges gauges.yaml
+  wrist-stiffness import cmm.csv -o cmm.mcap --unloaded"""
 
 
 def add_parser(commands: Commands) -> None:
@@ -47,6 +53,11 @@ def add_parser(commands: Commands) -> None:
     )
     parser.flag("--unloaded", "there are no load columns because nothing pulled at the platform")
     parser.flag("--register", "the instrument stands anywhere: the wrist's motion will tell where")
+    parser.add_argument(
+        "--gauges",
+        metavar="FILE.yaml",
+        help="which columns are dial gauges or inclinometers, with their points and directions",
+    )
     parser.flag("--overwrite", "replace an existing recording")
 
 
@@ -61,10 +72,13 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.overwrite,
         Progress("rows"),
         INSTRUMENT_FRAME if arguments.register else BASE_FRAME,
+        arguments.gauges,
     )
+    days = found.seconds / 86400.0
+    doubt = f" ({days:.3g} days: are the times in ms?)" if days > LONG_DAYS else ""
     lines = [
-        f"{found.path}: {found.rows} rows in {found.seconds:g} s, {found.measured} with a measured "
-        "value"
+        f"{found.path}: {found.rows} rows in {found.seconds:g} s{doubt}, {found.measured} with a "
+        "measured value"
     ]
     for what, names in (
         ("temperatures of", found.temperatures),

@@ -33,6 +33,7 @@ from wrist_stiffness.sessions.reading.csv_columns import (
     seconds,
     writer_of,
 )
+from wrist_stiffness.sessions.reading.gauge_readings import gauge_track
 from wrist_stiffness.sessions.reading.machine_signals import machine_signals
 from wrist_stiffness.sessions.reading.pose_track import (
     base_transform,
@@ -131,7 +132,13 @@ def export_csv(
     known = frames_of(source, remaps or {}, settings.frames)
     try:
         machine = machine_signals(samples, known.frames)
-        time_ns, measured, names, markers = _measured(samples, known.frames)
+        if len(samples.poses.time_ns) or len(samples.markers.time_ns):
+            time_ns, measured, names, markers = _measured(samples, known.frames)
+            gauges: tuple[str, ...] = ()
+        else:
+            track, names, markers = gauge_track(samples.gauges, notes), (), 0
+            time_ns, measured = track.time_ns, track.values
+            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in track.gauges)
     except FrameError as error:
         raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error
     usable, unknown = machine.usable(time_ns, settings.load_age_limit_s)
@@ -153,11 +160,12 @@ def export_csv(
         markers,
         {component: f"T_{component}_degC" for component in sorted(block.temperatures)},
         {name: column_of(name) for name in sorted(block.covariates)},
+        gauges,
     )
     values = {
         **dict(zip(MOTORS, block.theta.T, strict=True)),
         **dict(zip(LOAD, load.T, strict=True)),
-        **dict(zip(names or marker_columns(markers), seen.T, strict=True)),
+        **dict(zip(names or gauges or marker_columns(markers), seen.T, strict=True)),
         **{columns.temperatures[name]: value for name, value in block.temperatures.items()},
         **{columns.covariates[name]: value for name, value in block.covariates.items()},
     }
@@ -167,6 +175,8 @@ def export_csv(
     )
     if source.damage:
         remarks = (f"the recording is damaged: {source.damage}", *remarks)
+    if gauges:
+        remarks = (*remarks, "points and directions of the gauges have no columns")
     if len(samples.frame_poses.time_ns):
         remarks = (*remarks, "the frame's poses have no columns: its motion stays in")
     return Exported(output, len(pose_ns), len(time_ns) - len(pose_ns), remarks)

@@ -38,6 +38,7 @@ from wrist_stiffness.recording.messages import (
 )
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
 from wrist_stiffness.sessions.reading.csv_columns import (
+    GAUGE_FACTORS,
     LOAD,
     MOTORS,
     POSITION,
@@ -49,6 +50,8 @@ from wrist_stiffness.sessions.reading.csv_columns import (
     nanoseconds,
     reader_of,
 )
+from wrist_stiffness.sessions.reading.gauge_readings import GAUGES
+from wrist_stiffness.sessions.reading.gauges_file import gauge_of, read_gauges
 from wrist_stiffness.sessions.reading.marker_poses import LEAST_MARKERS
 from wrist_stiffness.topics import BASE_FRAME
 
@@ -108,6 +111,7 @@ def import_csv(
     overwrite: bool = False,
     progress: Progress = silent,
     frame: str = BASE_FRAME,
+    gauges_file: str | Path | None = None,
 ) -> Imported:
     """Write a table of measured poses as a recording.
 
@@ -125,6 +129,8 @@ def import_csv(
         Told rows done and in all.
     frame : str
         Of the measured poses.
+    gauges_file : path, optional
+        Which columns are dial gauges and inclinometers, and where these stand.
 
     Returns
     -------
@@ -141,8 +147,9 @@ def import_csv(
     """
     table = Path(table)
     form = _survey(table)
+    gauges = read_gauges(gauges_file) if gauges_file else {}
     try:
-        columns = _columns(form.header, unloaded)
+        columns = _columns(form.header, unloaded, tuple(gauges))
     except InputError as error:
         raise InputError(f"{table}: {error}") from error
     rows = measured = zero_ns = first_ns = stamp_ns = 0
@@ -150,7 +157,9 @@ def import_csv(
         for row in _rows(table, form, columns):
             if rows == 0:
                 zero_ns = _zero(row.time_ns)
-                facts: dict[str, str | int] = {"table": table.name, "time_zero_ns": zero_ns}
+                facts: dict[str, Any] = {"table": table.name, "time_zero_ns": zero_ns}
+                if gauges:
+                    facts[GAUGES] = [each.note for each in gauges.values()]
                 if unloaded:
                     facts["load_source"] = "constant"
                 note = String(json.dumps(facts, sort_keys=True))
@@ -204,7 +213,7 @@ class _Row:
         if columns.markers:
             points = np.reshape(self.of(marker_columns(columns.markers)), (-1, 3))
             return int(np.isfinite(points).all(axis=1).sum()) >= LEAST_MARKERS
-        return bool(np.isfinite(self.of(columns.pose)).any())
+        return bool(np.isfinite(self.of((*columns.pose, *columns.gauges))).any())
 
 
 def _survey(table: Path) -> _Form:
@@ -236,8 +245,8 @@ def _opened(table: Path) -> TextIOWrapper:
     return TextIOWrapper(open_input(table, InputError), "utf-8-sig", newline="")
 
 
-def _columns(header: list[str], unloaded: bool) -> Columns:
-    columns = columns_of(header)
+def _columns(header: list[str], unloaded: bool, gauges: tuple[str, ...]) -> Columns:
+    columns = columns_of(header, gauges)
     if unloaded and columns.loads:
         raise InputError("there are load columns, so it is not --unloaded")
     if not unloaded and not columns.loads:
@@ -252,6 +261,7 @@ def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
     """Read the rows one by one and check them."""
     header, mark = form.header, ""
     readers = {name: reader_of(name) for name in header if name != TIME}
+    readers |= {name: reader_of(name, GAUGE_FACTORS) for name in columns.gauges}
     required = {*MOTORS, *(LOAD if columns.loads else ())}
     before: tuple[int, str] | None = None
     zero_ns = 0
@@ -363,7 +373,10 @@ def _messages(
             yield topics.COVARIATES + covariate, Float64(row.values[name])
     motors = Header(stamp_ns, "")
     yield topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, tuple(row.of(MOTORS)))
-    if columns.markers:
+    if columns.gauges:
+        names = tuple(map(gauge_of, columns.gauges))
+        yield topics.GAUGE_READINGS, JointState(motors, names, tuple(row.of(columns.gauges)))
+    elif columns.markers:
         points = np.reshape(row.of(marker_columns(columns.markers)), (-1, 3))
         poses = tuple(Pose(Point(*point)) for point in points.tolist())
         yield topics.PLATFORM_MARKERS, PoseArray(Header(stamp_ns, frame), poses)

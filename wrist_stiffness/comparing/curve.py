@@ -46,7 +46,7 @@ class Curve:
     ----------
     quantity : Quantity
         What is shown.
-    direction : (3,) float
+    direction : (3,) float, of gauges (K,)
         Unit vector in F along which it goes most.
     names : tuple of str
         The condition, or both angles for a map.
@@ -85,6 +85,8 @@ class Curve:
         """The direction in words, as `extend --direction` takes it."""
         preposition = "along" if self.quantity.name == "s" else "about"
         axis = int(np.argmax(np.abs(self.direction)))
+        if self.quantity.name not in ("s", "phi"):
+            return f"at most at number {axis + 1} of the {self.quantity.name}"
         if abs(self.direction[axis]) >= ALONG_AXIS:
             return f"{preposition} {'+' if self.direction[axis] > 0.0 else '-'}{'xyz'[axis]}"
         return f"{preposition} ({', '.join(f'{value:.2f}' for value in self.direction)})"
@@ -101,7 +103,7 @@ class Curve:
             return f"{told}: {self._amount(weights)} {self.where}."
         low, high = sorted((int(np.argmin(self.mean)), int(np.argmax(self.mean))))
         weights[[low, high]] = -1.0, 1.0
-        moves = "moves" if self.quantity.name == "s" else "turns"
+        moves = "turns" if self.quantity.unit == "mdeg" else "moves"
         does = f"the platform {moves} by {self._amount(weights)} {self.where}."
         name, label = self.names[0], self.labels[0].partition(" [")[0]
         if name.startswith("approach"):
@@ -162,7 +164,7 @@ def curve_of(
     # Towards what it does for more of the condition; on a map, where it does most.
     turned = mean[np.argmax(np.abs(mean))] if len(names) == 2 else _rise(mean)
     sign = -1.0 if turned < 0.0 else 1.0
-    direction = np.zeros(3)
+    direction = np.zeros(len(quantity.components))
     direction[[quantity.components.index(c) for c in at]] = sign * ways[0]
     return Curve(
         quantity,

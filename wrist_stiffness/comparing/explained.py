@@ -18,6 +18,7 @@ from wrist_stiffness.inference.dependence import Dependences, dependences
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.point import Group, Point
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 BLOCKS = 10
@@ -233,7 +234,8 @@ class Explained:
         """Return what a group's columns do by themselves, (u, 6, k)."""
         group = self._group(number)
         units = np.eye(group.columns.shape[1])
-        return np.asarray(np.stack([group.change(unit) for unit in units], axis=2))
+        own = np.stack([group.change(unit) for unit in units], axis=2)
+        return without_mounting(self.observations, own)
 
     def _absorbed(self, change: Array) -> Array:
         """Return what the fit would have taken for changes (u, 6, k), (p, k)."""

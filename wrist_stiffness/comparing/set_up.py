@@ -19,7 +19,8 @@ from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.sessions.observing import Observed, predict_units, tabulate
+from wrist_stiffness.sessions.gauges import cleared
+from wrist_stiffness.sessions.observing import Observed, predict_units, tabulate, usual_wander
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 GROUPS = {
@@ -162,9 +163,7 @@ def without_set_up(
 def refitted_values(observed: Observed, set_ups: Sequence[SetUp]) -> Array:
     """Return what the set-ups leave of the units of the table, (u, 6) [m, rad]."""
     left = np.concatenate([each.residual for each in set_ups])
-    seen = np.concatenate(
-        [np.isfinite(np.concatenate([e.shift, e.turn], axis=1)) for e in observed.sessions]
-    )
+    seen = np.concatenate([np.isfinite(each.values) for each in observed.sessions])
     return np.asarray(left[(seen & np.isfinite(left)).any(axis=1)])
 
 
@@ -176,7 +175,8 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
     instrument, target = (np.eye(3), np.zeros(3)), (np.eye(3), np.zeros(3))
     zero, tare = np.zeros(2), np.zeros(6)
     taken = np.zeros(len(PLAUSIBLE))
-    pointed = np.isfinite(session.turn.sum(axis=1))
+    pointed = np.isfinite(session.turn.sum(axis=1)) | (session.readings is not None)
+    wander = usual_wander(session.quantities)
 
     def said() -> tuple[Array, Array]:
         """Rotation and shift of the platform as the instrument should see it."""
@@ -190,7 +190,14 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
         bow = _bow(mechanism, session, instrument, target, zero)
         error = exp_twist(np.hstack([np.zeros_like(shift), bow[:, 3:]]))[0] @ turn
         twist = log_motion(error @ np.swapaxes(home.platform, -1, -2), shift + bow[:, :3])
-        return session.residual(twist), turn, shift
+        return unmounted(session.residual(twist)), turn, shift
+
+    def unmounted(values: Array) -> Array:
+        return cleared(values, session.common, wander)
+
+    def shown(columns: Array) -> Array:
+        """Return what the instrument shows of columns and no mounting of gauges takes up."""
+        return unmounted(session.columns_seen(columns))
 
     def slopes(turn: Array, shift: Array) -> Array:
         """Change of the prediction by each unknown, in its `PLAUSIBLE`; 0 for what stays."""
@@ -209,7 +216,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
 
     for _ in range(ROUNDS):
         residual, turn, shift = left()
-        moved, weights = _solved(slopes(turn, shift), residual, taken / PLAUSIBLE)
+        moved, weights = _solved(shown(slopes(turn, shift)), residual, taken / PLAUSIBLE)
         step = PLAUSIBLE * moved
         taken += step
         instrument = _composed(exp_twist(step[:6]), instrument)
@@ -217,7 +224,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
         zero, tare = zero + step[12:14], tare + step[14:]
     values = np.concatenate([log_motion(*instrument), log_motion(*target), zero, tare])
     residual, turn, shift = left()
-    return SetUp(session.name, values, residual, -slopes(turn, shift), weights)
+    return SetUp(session.name, values, residual, -shown(slopes(turn, shift)), weights)
 
 
 def _bow(

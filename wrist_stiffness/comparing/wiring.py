@@ -18,6 +18,7 @@ from wrist_stiffness.comparing.set_up import without_set_up
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.gauges import Gauge
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import Observed
 from wrist_stiffness.sessions.unit_session import UnitSession
@@ -57,17 +58,25 @@ class Mistake:
         From the recorded signals to those without it.
     shift_factor : float
         The same for the measured positions.
+    gauge : str
+        Name of a gauge whose readings turn their sign without it.
     """
 
     without: str
     check: str
     block: Callable[[Block], Block] = lambda block: block
     shift_factor: float = 1.0
+    gauge: str = ""
 
     def put_right(self, session: UnitSession) -> UnitSession:
         """Return the session without the mistake."""
         cut = replace(session.cut, block=self.block(session.block))
-        return replace(session, cut=cut, shift=self.shift_factor * session.shift)
+        right = replace(session, cut=cut, shift=self.shift_factor * session.shift)
+        read = session.readings
+        if read is None or not self.gauge:
+            return right
+        sign = np.where([each.name == self.gauge for each in read.gauges], -1.0, 1.0)
+        return replace(right, readings=replace(read, values=sign * read.values))
 
     def measured_right(self, session: MeasuredSession) -> MeasuredSession:
         """Return a session as it was measured without the mistake."""
@@ -78,6 +87,9 @@ class Mistake:
     def concerns(self, session: UnitSession) -> bool:
         """Tell whether the session could have it: a measured rotation names its own motors."""
         same_angles = self.block(session.block).theta is session.block.theta
+        if session.readings is not None:
+            # Where the wrist moved, motors, units and signs were told when these were held to it.
+            return same_angles and self.shift_factor == 1.0 and not session.moves(self.gauge)
         return same_angles or not np.isfinite(session.turn).any()
 
 
@@ -114,6 +126,12 @@ MISTAKES = (
         shift_factor=1e3,
     ),
 )
+
+
+def _turned(gauge: Gauge) -> Mistake:
+    return Mistake(
+        f"the sign of gauge {gauge.name} turned", f"does it {gauge.counts_up}?", gauge=gauge.name
+    )
 
 
 @dataclass(frozen=True)
@@ -174,7 +192,8 @@ def suspected(
     if max(over.values(), default=0.0) < WORTH_ASKING:
         return None
     best = None
-    for mistake in mistakes:
+    read = observed.sessions[0].readings
+    for mistake in (*mistakes, *(map(_turned, read.gauges) if read is not None else ())):
         after = _without(mistake, model, observed, calibrated)
         if any(after[key] > LARGER * before[key] for key in after):
             continue

@@ -255,12 +255,13 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
 
 def _lost(table: Observations, columns: Array) -> Mask:
     """Return which units lie far from a base and every smooth law of the conditions, (u,)."""
+    common = np.empty((*table.values.shape, 0)) if table.common is None else table.common
     asked = [each.features(table.covariates) for each in questions(table.covariates)]
     found = [each for each in asked if each is not None]
     smooth = np.concatenate([np.zeros((table.n_units, 0)), *found], axis=1)
     spread = smooth[:, None, :, None] * np.eye(table.n_components)[:, None, :]
     beside = spread.reshape(*table.values.shape, -1)
-    return lost_units(table, np.concatenate([columns, beside], axis=2), OUTLIER_LIMIT)
+    return lost_units(table, np.concatenate([columns, beside, common], axis=2), OUTLIER_LIMIT)
 
 
 def has_walls(effect: Effect) -> bool:
@@ -342,7 +343,7 @@ def _columns(
     """
     of_bare = [n for n, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
     beyond = [n for n in range(len(z)) if n not in set(of_bare)]
-    columns = np.zeros((len(problem.table.values), 6, len(z))) if near is None else near.copy()
+    columns = np.zeros((*problem.table.values.shape, len(z))) if near is None else near.copy()
     asked = tuple(i for i, u in enumerate(bare.unknowns) if near is None or u.free >= usual)
     for of, own, places in ((bare, of_bare, asked), (problem, range(len(z)), tuple(beyond))):
         if places:
@@ -384,7 +385,7 @@ def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effec
 def _near(problem: FitProblem, start: BaseFit, usual: int) -> Array:
     """Return the columns of the base where another fit ended, (u, 6, p); those of effects as 0."""
     own = np.array([unknown.free < usual for unknown in problem.unknowns])
-    columns = np.zeros((len(problem.table.values), 6, len(own)))
+    columns = np.zeros((*problem.table.values.shape, len(own)))
     columns[:, :, own] = start.columns[:, :, start.of_base]
     return columns
 

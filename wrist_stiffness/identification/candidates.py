@@ -142,7 +142,7 @@ class Point:
         return frozenset(set.intersection(*names))
 
     def changes(self, trials: Sequence[Trial]) -> Array:
-        """Return the change of the predictions by each trial, (t, u, 6) [m, rad].
+        """Return the change of what the instrument shows by each trial, (t, u, m) [m, rad].
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class Point:
         for model, rows in zip(self.models, self.used, strict=True):
             sets = [_with(model.effects, *trial) for trial in trials]
             found = np.stack(model.changes(sets)) if sets else np.empty((0, len(rows), 6))
-            blocks.append(np.nan_to_num(found[:, rows]))
+            blocks.append(np.nan_to_num(model.session.seen(found)[:, rows]))
         return np.concatenate(blocks, axis=1)
 
     def mean(self, signal: Callable[[SessionModel], Array]) -> Array:

@@ -12,6 +12,7 @@ from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.inference.held_out import HeldOut, sealed_units
 from wrist_stiffness.inference.settings import HELD_OUT
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.observing import without_mounting
 
 ANOTHER_SESSION = "another session"
 THIS_SESSION = "the end of this session"
@@ -38,7 +39,7 @@ def unseen(fitted: BaseFit, parts: Parts, whole: BaseFit) -> HeldOut:
     fresh = [n for n, unknown in enumerate(problem.unknowns) if unknown.session in blank]
     z = fitted.z.copy()
     z[fresh] = [known[_key(fitted, n)] for n in fresh]
-    rows = np.repeat(parts.aside, 6)
+    rows = np.repeat(parts.aside, problem.table.n_components)
     residual = problem.residual(z)
     left = problem.whiten(residual)[rows]
     if fresh:
@@ -46,7 +47,7 @@ def unseen(fitted: BaseFit, parts: Parts, whole: BaseFit) -> HeldOut:
         white = problem.whiten(columns)[rows]
         step = np.linalg.lstsq(white, -left, rcond=1e-9)[0]
         residual, left = residual + columns @ step, left + white @ step
-    return HeldOut(residual[parts.aside], left)
+    return HeldOut(without_mounting(problem.table, residual)[parts.aside], left)
 
 
 def _key(fitted: BaseFit, number: int) -> tuple[str, str, int | None]:
@@ -76,5 +77,6 @@ class Judge:
         """Return what a model leaves of that part as it stands."""
         problem = FitProblem(model, self.parts.whole, ())
         residual = problem.residual(np.empty(0))
-        rows = np.repeat(self.parts.aside, 6)
-        return HeldOut(residual[self.parts.aside], problem.whiten(residual)[rows])
+        rows = np.repeat(self.parts.aside, problem.table.n_components)
+        shown = without_mounting(problem.table, residual)[self.parts.aside]
+        return HeldOut(shown, problem.whiten(residual)[rows])

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from wrist_stiffness.identification.problem import WANDER
 from wrist_stiffness.identification.questions import Conditions, alike, passing, questions
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT, Question, background, low_rank
 from wrist_stiffness.inference.evidence import Evidence
@@ -14,6 +13,7 @@ from wrist_stiffness.inference.observations import Labels, Observations
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.shared import Apart, component_factors, own_covariance
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.sessions.observing import usual_wander
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 DRIFT = 0.5
@@ -53,13 +53,15 @@ class WristTable:
         self.table: Observations = table
         stated = table.covariance
         self._noise_width = UNKNOWN if stated is None else KNOWN
-        own = own_covariance(table, np.diag(4.0 * WANDER**2) if stated is None else stated)
+        own = own_covariance(
+            table, np.diag(4.0 * usual_wander(table.quantities) ** 2) if stated is None else stated
+        )
         # A drift that is stated has columns of its own.
         slow = np.concatenate(
-            [np.broadcast_to(s.wander, (len(s), 6))[s.measured] for s in sessions]
+            [np.broadcast_to(s.wander, (len(s), len(s.wander)))[s.measured] for s in sessions]
         )
         if stated is not None:
-            own = own - slow[:, :, None] ** 2 * np.eye(6)
+            own = own - slow[:, :, None] ** 2 * np.eye(table.n_components)
         self._apart = Apart(table, component_factors(own, table.measured))
         self._rows = np.flatnonzero(table.measured.ravel())
         self.variance: Array = np.diagonal(own, axis1=1, axis2=2)
@@ -68,7 +70,7 @@ class WristTable:
             shared = np.sum(table.shared**2, axis=2) * (table.stand >= 0)[:, None]
             self._scatter = self.variance + shared
         scatter = np.sqrt(np.median(self.variance, axis=0))
-        each = [np.broadcast_to(s.white, (len(s), 6))[s.measured] for s in sessions]
+        each = [np.broadcast_to(s.white, (len(s), len(s.white)))[s.measured] for s in sessions]
         single = np.nan_to_num(np.median(np.concatenate(each), axis=0))
         single = np.where(single > 0.0, single, scatter)
         self.drift = np.maximum(DRIFT * single, slow.max(axis=0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,7 +38,5 @@ def parted(sessions: Sessions, aside: Mask) -> Parts:
         rows = np.flatnonzero(each.measured)
         own = rows[aside[start : start + len(rows)]]
         start += len(rows)
-        shift, turn = each.shift.copy(), each.turn.copy()
-        shift[own], turn[own] = np.nan, np.nan
-        parts.append(replace(each, shift=shift, turn=turn))
+        parts.append(each.without(own))
     return Parts(sessions, tuple(parts), aside)

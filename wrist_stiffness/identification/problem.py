@@ -18,7 +18,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.columns import SessionModel
-from wrist_stiffness.sessions.observing import Observed, tabulate
+from wrist_stiffness.sessions.observing import Observed, tabulate, usual_wander
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 NO_PRIOR = 1e-3
@@ -35,9 +35,6 @@ STEP = 1e-2
 
 MOST_POINTS = 4
 """So many points keep their columns."""
-
-WANDER = np.repeat([0.5e-6, 5e-6], 3)
-"""Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
 
 SILENT = 1e-6
 """Length, in standard deviations of the noise, of a column that is rounding: bases of columns are
@@ -285,9 +282,31 @@ class FitProblem:
         asked = list(range(len(self.unknowns)) if places is None else places)
         return self.rows([self._columns(number, z, asked) for number in range(len(self.sessions))])
 
+    def twists(self, z: Array) -> Array:
+        """Return by how much a step of each unknown turns and shifts the platform, (u, 6, p)."""
+        blocks = []
+        for number in range(len(self.sessions)):
+            path, trials, moved, step = self._trials(number, z, list(range(len(z))))
+            block = np.zeros((*path.shape, len(z)))
+            for place, twist in zip(moved, trials, strict=True):
+                block[:, :, place] = np.nan_to_num((twist - path) / step[place])
+            blocks.append(block)
+        return self.rows(blocks)
+
     def _columns(self, number: int, z: Array, asked: list[int]) -> Array:
-        """Return the columns of one session's units, (u, 6, number asked)."""
-        model, session = self._models[number], self.sessions[number]
+        """Return the columns of one session's units, (u, m, number asked)."""
+        path, twists, moved, step = self._trials(number, z, asked)
+        first, *others = self.sessions[number].residual(np.stack([path, *twists]))
+        block = np.zeros((*first.shape, len(z)))
+        for place, other in zip(moved, others, strict=True):
+            block[:, :, place] = np.nan_to_num((other - first) / step[place])
+        return block[:, :, asked]
+
+    def _trials(
+        self, number: int, z: Array, asked: list[int]
+    ) -> tuple[Array, list[Array], list[int], Array]:
+        """Return a session's predicted twists (u, 6), those with a step of some unknowns, both."""
+        model = self._models[number]
 
         values = self._values(z, number)
         effects = self._with_values(values)
@@ -310,11 +329,7 @@ class FitProblem:
             path + twist - (path if on_path else quick)
             for on_path, twist in zip(by_path, changed, strict=True)
         ]
-        first, *others = session.residual(np.stack([path, *twists]))
-        block = np.zeros((*first.shape, len(z)))
-        for place, other in zip(moved, others, strict=True):
-            block[:, :, place] = np.nan_to_num((other - first) / step[place])
-        return block[:, :, asked]
+        return path, twists, moved, step
 
     def same_as(self, other: FitProblem) -> bool:
         """Tell whether another problem asks the same, so that what is known of it may be used."""
@@ -346,10 +361,10 @@ class FitProblem:
 
     @cached_property
     def _apart(self) -> Apart:
-        stated = self.table.covariance
+        stated, wander = self.table.covariance, usual_wander(self.table.quantities)
         if stated is None:
-            stated = np.diag(4.0 * WANDER**2)
-        own = own_covariance(self.table, stated) + np.diag(WANDER**2)
+            stated = np.diag(4.0 * wander**2)
+        own = own_covariance(self.table, stated) + np.diag(wander**2)
         return Apart(self.table, np.linalg.inv(np.linalg.cholesky(own)))
 
     def whiten(self, values: Array) -> Array:

@@ -202,7 +202,9 @@ class _Library:
         self._forms = forms(self._signals)
         self._carried = self._carriers(problem)
         numbers = fit.table.table.values.size
-        self._white = fit.table.whiten(np.eye(numbers).reshape(-1, 6, numbers))
+        self._white = fit.table.whiten(
+            np.eye(numbers).reshape(-1, fit.table.table.n_components, numbers)
+        )
         self._points: list[tuple[Form, Shape]] = []
         rows, among = [], []
         for form in self._forms:
@@ -231,7 +233,7 @@ class _Library:
         return row if row.std() > 1e-6 * (np.abs(row).max() + 1e-300) else None
 
     def _carriers(self, problem: WristProblem) -> Array:
-        """Return what a typical screw does to each unit, by place and axis, (p, 6, u, 6)."""
+        """Return what a typical screw does to each unit, by place and axis, (p, 6, u, m)."""
         trials = []
         for name in PLACES:
             for axis in range(6):
@@ -367,9 +369,9 @@ class _Beyond:
         columns, _ = at.point.beside(at.background)
         mixed, gram = columns.T @ white, white.T @ white
         ((information, slope),) = at.scores(mixed, white.T @ at.point.left, [gram])
-        units = carried.shape[2]
-        self._information = information.reshape(units, 6, units, 6)
-        self._slope, self._carried = -slope.reshape(units, 6), carried
+        shape = carried.shape[2:]
+        self._information = information.reshape(*shape, *shape)
+        self._slope, self._carried = -slope.reshape(shape), carried
         self._known: dict[tuple[int, int, int], Array] = {}
 
     def _pair(self, place: int, one: int, two: int) -> Array:

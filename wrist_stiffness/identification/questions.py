@@ -43,7 +43,9 @@ def _speed(conditions: Conditions) -> Array:
     return centred(speed * 0.5 * (1.0 + pose_kernel(conditions)))
 
 
-def _at_rest(conditions: Conditions) -> Array:
+def _at_rest(conditions: Conditions) -> Array | None:
+    if np.ptp(conditions["held_s"]) == 0.0:  # poses measured one by one: the load alone is left
+        return None
     held = bell(scaled(np.log1p(np.maximum(conditions["held_s"], 0.0))[:, None]))
     return centred(held * 0.5 * (1.0 + straight(_columns(conditions, *LOAD))))
 

@@ -15,6 +15,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.sessions.observing import without_mounting
 
 EXCITED = 0.7
 """A parameter is excited if its uncertainty falls below this share of its prior's."""
@@ -156,7 +157,8 @@ class Fit:
     @property
     def observations(self) -> Observations:
         """The units with their residuals [m, rad]."""
-        return self.problem.table.with_values(self.fit.base.residual)
+        table = self.problem.table
+        return table.with_values(without_mounting(table, self.fit.base.residual))
 
     @property
     def arrived(self) -> bool:
@@ -206,6 +208,9 @@ class Fit:
     def joint(self) -> JointUncertainty:
         """What the uncertainties of all parameters make of a prediction together."""
         rows, measured = self.columns, self.problem.table.measured
+        if any(each.readings is not None for each in self.problem.sessions):
+            rows = self.problem.twists(self.z)
+            measured = np.ones(rows.shape[:2], dtype=bool)
         variance = np.einsum("uij,jk,uik->ui", rows, self.covariance, rows)
         mean = (variance * measured).sum(axis=0) / np.maximum(measured.sum(axis=0), 1)
         names = tuple(free.effect.name for free in self.problem.free)

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.identification.base_fit import BaseFit
-from wrist_stiffness.sessions.observing import QUANTITIES
+from wrist_stiffness.sessions.gauges import GAUGES, TILTS
+from wrist_stiffness.sessions.observing import without_mounting
+from wrist_stiffness.sessions.unit_session import QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class TakenUp:
     @property
     def sentence(self) -> str:
         """One line for a person."""
-        units = {q.name: q.unit for q in QUANTITIES}
+        units = {q.name: q.unit for q in (*QUANTITIES, GAUGES, TILTS)}
         sizes = ", ".join(
             f"{size:.2f} {units[name]} of {name}" for name, size in self.moved.items()
         )
@@ -74,9 +76,9 @@ def taken_up(base: BaseFit, sessions: Sequence[str]) -> tuple[TakenUp, ...]:
 
 
 def _one(base: BaseFit, name: str, places: list[int]) -> TakenUp:
-    twist = base.columns[:, :, places] @ base.z[places]
     table = base.problem.table
-    sizes = table.rms(twist**2)
+    change = without_mounting(table, base.columns[:, :, places] @ base.z[places])
+    sizes = table.rms(change**2)
     moved = {q.name: sizes[q.key] for q in table.reported}
     known = [place for place in places if np.isfinite(base.prior_std[place])]
     if not known:

@@ -37,6 +37,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.refitted import TOLERATED
 from wrist_stiffness.sessions.unit_session import UnitSession, as_units
 
@@ -84,7 +85,8 @@ class WristDiagnosis:
     @property
     def observations(self) -> Observations:
         """What the nominal model leaves of each unit."""
-        return self.nominal.problem.table.with_values(self.nominal.residual)
+        table = self.nominal.problem.table
+        return table.with_values(without_mounting(table, self.nominal.residual))
 
     def change_by(self, name: str) -> Array:
         """Return what the best set with a rival explains of each unit, (u, 6) [m, rad].
@@ -100,7 +102,8 @@ class WristDiagnosis:
                 f"{name}: was not fitted; slopes alone told that it explains too little"
             )
         best = max(states, key=lambda each: each.log)
-        return np.asarray(self.nominal.residual - best.fit.base.residual)
+        change = self.nominal.residual - best.fit.base.residual
+        return without_mounting(self.nominal.problem.table, change)
 
 
 def diagnose_sessions(
@@ -208,7 +211,7 @@ def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
     if not sessions:
         raise InputError("no session to diagnose")
     for session in sessions:
-        if not (np.isfinite(session.shift).any() or np.isfinite(session.rotation).any()):
+        if not session.measured.any():
             raise InputError(f"{session.name}: no measured pose in the whole session")
 
 
@@ -262,7 +265,7 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
         buys = {q.key: bought(before, judge.stages[-1], q) for q in quantities}
     normal = fit.base.problem.model.table.mechanism
     theta = np.concatenate([s.still.theta[s.measured] for s in fit.base.problem.sessions])
-    points = turns_normal(fit.change(found.name)[:, :, None], normal.normal(normal.forward(theta)))
+    points = turns_normal(fit.twist(found.name)[:, :, None], normal.normal(normal.forward(theta)))
     explained = 1.0 - found.left
     return Finding(
         tuple((*_law_and_place(name), share) for name, share in found.members.items()),

@@ -57,6 +57,16 @@ class WristFit:
         at = self.places[name]
         return np.asarray(-self.base.columns[:, :, at] @ self.base.z[at])
 
+    def twist(self, name: str) -> Array:
+        """Return the twists (u, 6) at O by which an effect of the set changes the predictions."""
+        base, found = self.base, []
+        for number, session in enumerate(base.problem.sessions):
+            own = base.model(number)
+            others = tuple(each for each in own.effects if each.name != name)
+            here, without = own.along([own.effects, others])
+            found.append((here - without)[session.measured])
+        return np.concatenate(found)
+
     @cached_property
     def places(self) -> dict[str, NDArray[np.intp]]:
         """Places of the unknowns of each effect."""

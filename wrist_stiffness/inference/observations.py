@@ -72,6 +72,9 @@ class Observations:
         Units with the same label >= 0 share a part of their scatter.
     shared : (n, m, s) array, optional
         That part: what each of s standard normal numbers does to a unit; `covariance` holds it.
+    common : (n, m, q) array, optional
+        What each of q standard normal numbers does to all units: something of the instrument that
+        nobody knows.  `covariance` does not hold it.
     """
 
     values: Array
@@ -85,6 +88,7 @@ class Observations:
     row: Labels | None = None
     stand: Labels | None = None
     shared: Array | None = None
+    common: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse tables whose columns do not belong together."""
@@ -199,6 +203,7 @@ class Observations:
             self.rows[rows],
             some(self.stand),
             some(self.shared),
+            some(self.common),
         )
 
     def with_values(self, values: Array) -> "Observations":

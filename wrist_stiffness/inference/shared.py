@@ -8,7 +8,7 @@ counts would both drown what a load does and make the mean look too good.
 import numpy as np
 from scipy.sparse import csr_array
 
-from wrist_stiffness.inference.observations import Array, Mask, Observations
+from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations
 
 
 def own_covariance(observations: Observations, covariance: Array) -> Array:
@@ -33,7 +33,7 @@ class Apart:
     """Brings columns to unit scatter that the units of a stand no longer share.
 
     The covariance of a stand is that of independent units plus few directions; its inverse root
-    differs from theirs in these directions alone.
+    differs from theirs in these directions alone.  So it is with what all units have in common.
 
     Parameters
     ----------
@@ -45,14 +45,20 @@ class Apart:
 
     def __init__(self, observations: Observations, factors: Array) -> None:
         self._factors = factors
-        self._shrink = np.empty((0, 1))
-        if observations.shared is None or observations.stand is None:
-            return
-        loadings = factors @ (observations.shared * observations.measured[:, :, None])
+        self._parts: list[tuple[csr_array | Array, Array]] = []
+        if observations.shared is not None and observations.stand is not None:
+            self._add_stands(observations, observations.shared, observations.stand)
+        if observations.common is not None:
+            tall = self(observations.common * observations.measured[:, :, None])
+            left, size, _ = np.linalg.svd(tall.reshape(-1, tall.shape[2]), full_matrices=False)
+            self._parts.append((left, _shrink(size)))
+
+    def _add_stands(self, observations: Observations, shared: Array, stands: Labels) -> None:
+        loadings = self._factors @ (shared * observations.measured[:, :, None])
         numbers = np.arange(observations.values.size).reshape(observations.values.shape)
         entries, sizes, count = [], [np.empty(0)], 0
-        for stand in np.unique(observations.stand[observations.stand >= 0]):
-            units = observations.stand == stand
+        for stand in np.unique(stands[stands >= 0]):
+            units = stands == stand
             tall = loadings[units].reshape(-1, loadings.shape[2])
             left, size, _ = np.linalg.svd(tall, full_matrices=False)
             rows, columns = np.meshgrid(numbers[units], count + np.arange(len(size)), indexing="ij")
@@ -60,18 +66,23 @@ class Apart:
             sizes.append(size)
             count += len(size)
         if count:
-            self._shrink = 1.0 - 1.0 / np.sqrt(1.0 + np.concatenate(sizes)[:, None] ** 2)
             value, row, column = np.concatenate(entries, axis=1)
             at = (row.astype(int), column.astype(int))
-            self._directions = csr_array((value, at), shape=(observations.values.size, count))
+            directions = csr_array((value, at), shape=(observations.values.size, count))
+            self._parts.append((directions, _shrink(np.concatenate(sizes))))
 
     def __call__(self, columns: Array) -> Array:
         """Return columns (n, m, k), zero where not measured, of unit scatter, (n, m, k)."""
         white = np.asarray(self._factors @ columns)
-        if len(self._shrink):
-            flat = white.reshape(len(white) * white.shape[1], white.shape[2])
-            flat -= self._directions @ (self._shrink * (self._directions.T @ flat))
+        flat = white.reshape(len(white) * white.shape[1], white.shape[2])
+        for directions, shrink in self._parts:
+            flat -= directions @ (shrink * (directions.T @ flat))
         return white
+
+
+def _shrink(size: Array) -> Array:
+    """Return by how much directions shrink in which there is so much scatter more, (k, 1)."""
+    return np.asarray(1.0 - 1.0 / np.sqrt(1.0 + size[:, None] ** 2))
 
 
 def stated_covariance(observations: Observations) -> Array:

@@ -45,6 +45,7 @@ Extract = Callable[[Batch], Rows | str]
 IGNORED = "names none of the joints"
 _MISSING_JOINT = "joint missing"
 _MARKER_COUNT = "other number of markers than at first"
+_OTHER_GAUGES = "other gauges than at first"
 
 
 def _stack(batch: Batch, *paths: str) -> FloatArray:
@@ -123,6 +124,22 @@ def marker_rows() -> Extract:
             return {"position": np.empty((batch.indices.size, 0, 3))}
         paths = [_xyz(f"poses.{marker}.position") for marker in range(count)]
         return {"position": np.stack([_stack(batch, *path) for path in paths], axis=1)}
+
+    return extract
+
+
+def gauge_rows() -> Extract:
+    """Return the extraction of readings (m, k) [m, rad] by name; the first message sets names."""
+    expected: list[tuple[str, ...]] = []
+
+    def extract(batch: Batch) -> Rows | str:
+        message = batch.first
+        assert isinstance(message, JointState)  # the collector decodes this type only
+        expected.append(message.name)
+        if message.name != expected[0] or len(message.position) != len(message.name):
+            return _OTHER_GAUGES
+        names = np.tile(np.array(message.name, np.str_), (batch.indices.size, 1))
+        return {"value": batch.columns["position"], "names": names}
 
     return extract
 

@@ -25,6 +25,7 @@ from wrist_stiffness.recording.collector import (
     Rows,
     TimeArray,
     float_rows,
+    gauge_rows,
     joint_rows,
     marker_rows,
     pose_rows,
@@ -98,6 +99,17 @@ class MarkerSamples:
 
 
 @dataclass(frozen=True)
+class GaugeSamples:
+    """Readings (n, k) [m, rad] by the names (n, k) of what was read; NaN = not read."""
+
+    time_ns: TimeArray
+    log_time_ns: TimeArray
+    frame_id: TextArray
+    value: FloatArray
+    names: TextArray
+
+
+@dataclass(frozen=True)
 class ScalarSamples:
     """Numbers (n,) of one sensor; a message without a header has its log time as stamp."""
 
@@ -120,6 +132,7 @@ class Samples:
     poses: PoseSamples
     frame_poses: PoseSamples
     markers: MarkerSamples
+    gauges: GaugeSamples
     temperatures: Mapping[str, ScalarSamples]
     covariates: Mapping[str, ScalarSamples]
     notes: tuple[str, ...]
@@ -197,6 +210,7 @@ def read_samples(
         poses=_pose_samples(of(names.PLATFORM_POSE)),
         frame_poses=_pose_samples(of(names.FRAME_POSE)),
         markers=_made(MarkerSamples, of(names.PLATFORM_MARKERS), position=(0, 3)),
+        gauges=_made(GaugeSamples, of(names.GAUGE_READINGS), value=(0,), names=(0,)),
         temperatures={
             component: _made(ScalarSamples, rows, value=())
             for component, rows in group(names.TEMPERATURES).items()
@@ -270,6 +284,7 @@ def _collectors_of(
         names.MOTOR_COMMANDS: [(JointState, joint_rows(joints), ("position",))],
         names.LOAD_ESTIMATE: [(WrenchStamped, wrench_rows, ("wrench",))],
         names.PLATFORM_MARKERS: [(PoseArray, marker_rows(), ())],
+        names.GAUGE_READINGS: [(JointState, gauge_rows(), ())],
         names.TEMPERATURES: [(Temperature, temperature_rows, ("value",))],
         names.RECORDING_NOTES: [(String, text_rows, ())],
     }

@@ -15,6 +15,10 @@ Values = dict[str, Any]
 Rows: TypeAlias = "Sequence[FleetRow[Values]]"
 
 
+POSE = ("s_um", "phi_mdeg")
+"""Quantities of poses, which have columns."""
+
+
 def compared_lines(rows: Rows) -> list[str]:
     """Return the last model against each recording, from what `compare` gives for a program."""
     models = {row.result["models"][-1]["model"] for row in rows if row.result is not None}
@@ -27,7 +31,7 @@ def compared_lines(rows: Rows) -> list[str]:
 
 def diagnosed_lines(rows: Rows) -> list[str]:
     """Return what is missing in each recording, from what `diagnose` gives for a program."""
-    titles = "".join(f"{title:>22}{'noise':>8}" for title in TITLES.values()) + "  missing"
+    titles = "".join(f"{TITLES[key]:>22}{'noise':>8}" for key in POSE) + "  missing"
     return [
         "held-out RMS, before and after what is missing is added, and instrument noise",
         *_table(
@@ -78,7 +82,7 @@ def _comparison(values: Values) -> str:
 
 def _diagnosis(values: Values) -> str:
     out = ""
-    for key in TITLES:
+    for key in POSE:
         before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
         noise = values["noise"].get(key)
         fall = "-" if before is None else f"{before:.3g} -> {after:.3g}"

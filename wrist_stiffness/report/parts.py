@@ -20,7 +20,12 @@ SIGNS = {" um": " µm", "+-": "±", "degC": "°C", " deg/s": " °/s"}
 """What a terminal writes in ASCII."""
 
 
-TITLES = {"s_um": "s [um]", "phi_mdeg": "phi [mdeg]"}
+TITLES = {
+    "s_um": "s [um]",
+    "phi_mdeg": "phi [mdeg]",
+    "gauges_um": "gauges [um]",
+    "tilts_mdeg": "tilts [mdeg]",
+}
 """Of columns, by the key of the quantity."""
 
 

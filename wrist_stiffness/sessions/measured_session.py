@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.sessions.gauges import Readings
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +43,8 @@ class MeasuredSession:
     clock_offset_s : (float, float), optional
         Pose sensor's clock minus the joint states', estimate and one standard uncertainty, where
         the motion tells it [s].
+    readings : Readings, optional
+        Of dial gauges and inclinometers, (n, K), in place of poses.
 
     Raises
     ------
@@ -57,6 +60,7 @@ class MeasuredSession:
     notes: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     clock_offset_s: tuple[float, float] | None = None
+    readings: Readings | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes."""
@@ -74,7 +78,9 @@ class MeasuredSession:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which of the six components of each pose error were measured, (n, 6)."""
+        """Which of the six components of each pose error, or readings, there are, (n, m)."""
+        if self.readings is not None:
+            return np.isfinite(self.readings.values)
         turned = np.isfinite(self.rotation.sum(axis=(1, 2)))
         return np.hstack([np.isfinite(self.shift), np.repeat(turned[:, None], 3, axis=1)])
 
@@ -85,4 +91,5 @@ class MeasuredSession:
             block=self.block.take(rows),
             shift=self.shift[rows],
             rotation=self.rotation[rows],
+            readings=self.readings and self.readings.take(rows),
         )

@@ -11,15 +11,14 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.gauges import cleared
 from wrist_stiffness.sessions.hidden_counts import hidden_counts, stands_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import UnitSession, as_units
 from wrist_stiffness.sessions.units import Labels
 
-QUANTITIES = (
-    Quantity("s", "um", (0, 1, 2), 1e6),
-    Quantity("phi", "mdeg", (3, 4, 5), 180e3 / np.pi),
-)
+WANDER = {"um": 0.5e-6, "mdeg": 5e-6}
+"""Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
 
 SAME_POSE_COUNTS, SAME_LOAD = 2.5, 0.02
 """Two dwells repeat one condition within so many encoder counts and this share of the load."""
@@ -45,6 +44,21 @@ class Observed:
     predicted: Array
     observations: Observations
     unit: tuple[Labels, ...]
+
+
+def usual_wander(quantities: Sequence[Quantity]) -> Array:
+    """Return that scatter of each component, (m,) [m, rad]."""
+    out = np.zeros(1 + max(max(each.components) for each in quantities))
+    for each in quantities:
+        out[list(each.components)] = WANDER[each.unit]
+    return out
+
+
+def without_mounting(table: Observations, values: Array) -> Array:
+    """Return values of a table, (u, m) or (u, m, k), without what a mounting of gauges does."""
+    if table.common is None:
+        return values
+    return cleared(values, table.common, usual_wander(table.quantities))
 
 
 def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
@@ -94,8 +108,9 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     Raises
     ------
     InputError
-        If no unit was measured.
+        If no unit was measured, or not all by instruments of one kind.
     """
+    _require_alike(sessions)
     units = [len(each) for each in sessions]
     ends = np.cumsum(units)
     parts = np.split(predicted, ends[:-1])
@@ -107,7 +122,14 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         raise InputError("no unit of the sessions was measured: every pose is blank")
     theta = np.concatenate([each.mean(each.block.theta) for each in sessions])
     cuts = [each.cut for each in sessions]
-    counts = hidden_counts(model.table, cuts, theta)
+    counts = np.concatenate(
+        [
+            each.columns_seen(part)
+            for each, part in zip(
+                sessions, np.split(hidden_counts(model.table, cuts, theta), ends[:-1]), strict=True
+            )
+        ]
+    )
     covariance = _covariance(sessions, counts)
     observations = Observations(
         values,
@@ -117,9 +139,10 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         np.repeat(np.arange(len(sessions)), units),
         _replicates(model, sessions, theta),
         np.concatenate([each.samples for each in sessions]),
-        QUANTITIES,
+        sessions[0].quantities,
         stand=stands_of(model.table, cuts),
         shared=None if covariance is None else counts,
+        common=_common(sessions),
     )
     row = np.where(used, np.cumsum(used) - 1, -1)
     starts = ends - units
@@ -129,6 +152,31 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     )
     kept = replace(observations.take(used), row=None)
     return Observed(sessions, predicted, kept, labels)
+
+
+def _require_alike(sessions: Sequence[UnitSession]) -> None:
+    """Refuse sessions whose numbers are not of one kind."""
+    first = sessions[0]
+    for other in sessions[1:]:
+        if other.instruments != first.instruments:
+            raise InputError(
+                f"{first.name} was measured by {first.instruments}, {other.name} by "
+                f"{other.instruments}: ask of them one after the other"
+            )
+
+
+def _common(sessions: Sequence[UnitSession]) -> Array | None:
+    """Return what the mountings of all sessions' gauges do to the units, (u, m, q)."""
+    own = [each.common for each in sessions]
+    total, first = sum(each.shape[2] for each in own), 0
+    if not total:
+        return None
+    out = []
+    for each in own:
+        last = first + each.shape[2]
+        out.append(np.pad(each, ((0, 0), (0, 0), (first, total - last))))
+        first = last
+    return np.concatenate(out)
 
 
 def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
@@ -158,7 +206,7 @@ def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
 def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | None:
     """Return the covariance of each unit on its own: white noise and the hidden encoder count."""
     white = np.stack([each.white for each in sessions])
-    seen = np.concatenate([np.concatenate([e.shift, e.turn], axis=1) for e in sessions])
+    seen = np.concatenate([each.values for each in sessions])
     if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():
         return None
     variance = np.nan_to_num(white, nan=1.0) ** 2
@@ -168,7 +216,7 @@ def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | Non
             for own, each in zip(variance, sessions, strict=True)
         ]
     )
-    return np.asarray(counts @ np.swapaxes(counts, -1, -2) + own[:, :, None] * np.eye(6))
+    return np.asarray(counts @ np.swapaxes(counts, -1, -2) + own[:, :, None] * np.eye(own.shape[1]))
 
 
 def _replicates(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Labels:

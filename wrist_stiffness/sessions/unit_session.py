@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,15 +11,23 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.inference.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.sessions.gauges import Readings
 from wrist_stiffness.sessions.in_pieces import in_pieces
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.table_range import beyond_range
 from wrist_stiffness.sessions.units import Cut, Labels, Mask, cut
+
+QUANTITIES = (
+    Quantity("s", "um", (0, 1, 2), 1e6),
+    Quantity("phi", "mdeg", (3, 4, 5), 180e3 / np.pi),
+)
+"""Of poses: which components are reported as one length."""
 
 LOST = 8.0
 """Robust standard deviations from its dwell's median at which one measurement is a lost beam."""
@@ -55,11 +63,15 @@ class UnitSession:
         Measurements in each mean.
     lost : int
         Measurements left out as lost beams.
-    white : (6,) float
+    white : (m,) float
         Scatter of one measurement, NaN where it is not known [m, rad].
-    wander : (6,) float
+    wander : (m,) float
         Slow scatter beside it, which no mean over a dwell makes smaller: what the instrument states
         beyond the white scatter, or what its digits hide where they hide that one [m, rad].
+    readings : Readings, optional
+        Mean readings of gauges, (u, K), in place of `shift` and `turn`: then m is K, else 6.
+    rigid : (u, 3, 3) float, optional
+        Rotation U -> F of the rigid wrist, where gauges read it.
     """
 
     name: str
@@ -70,16 +82,81 @@ class UnitSession:
     lost: int
     white: Array
     wander: Array
+    readings: Readings | None = None
+    rigid: Array | None = None
 
     def __len__(self) -> int:
         """Return the number of units."""
         return len(self.cut.dwell)
 
+    @property
+    def values(self) -> Array:
+        """What was measured of each unit, (u, m): shift and turn, or readings."""
+        if self.readings is not None:
+            return self.readings.values
+        return np.concatenate([self.shift, self.turn], axis=1)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Which of these are reported as one length."""
+        return QUANTITIES if self.readings is None else self.readings.quantities
+
+    @property
+    def instruments(self) -> str:
+        """What measured it, for a person."""
+        if self.readings is None:
+            return "poses"
+        return f"gauges ({', '.join(each.name for each in self.readings.gauges)})"
+
     @cached_property
     def measured(self) -> Mask:
         """Units of which anything was measured, (u,); only these are in the table."""
-        seen = np.isfinite(self.shift).any(axis=1) | np.isfinite(self.turn).any(axis=1)
-        return np.asarray(seen)
+        return np.asarray(np.isfinite(self.values).any(axis=1))
+
+    def without(self, units: Labels) -> UnitSession:
+        """Return the session with nothing measured in some of its units."""
+        blank = [self.shift.copy(), self.turn.copy()]
+        read = self.readings
+        if read is not None:
+            blank.append(read.values.copy())
+        for each in blank:
+            each[units] = np.nan
+        read = read and replace(read, values=blank[-1])
+        return replace(self, shift=blank[0], turn=blank[1], readings=read)
+
+    def seen(self, twist: Array) -> Array:
+        """Return what the instrument shows of small twists at O, (..., u, 6) -> (..., u, m)."""
+        if self.readings is None:
+            return twist
+        return np.asarray((self._rows @ twist[..., None])[..., 0])
+
+    def columns_seen(self, twists: Array) -> Array:
+        """Return the same of columns of twists, (u, 6, k) -> (u, m, k)."""
+        return twists if self.readings is None else np.asarray(self._rows @ twists)
+
+    @property
+    def common(self) -> Array:
+        """What standard deviations of the gauges' mountings do to the units, (u, m, q)."""
+        if self.readings is None or self.rigid is None:
+            return np.empty((len(self), 6, 0))
+        return self.readings.common(self.rigid)
+
+    def moves(self, gauge: str) -> bool:
+        """Tell whether a gauge of this name followed motions of the rigid wrist."""
+        read, rigid = self.readings, self.rigid
+        if read is None or rigid is None:
+            return False
+        return any(
+            each.name == gauge and each.follows(each.reading(np.zeros(3), rigid, read.up))
+            for each in read.gauges
+        )
+
+    @cached_property
+    def _rows(self) -> Array:
+        """By how much a twist changes each reading, (u, m, 6)."""
+        if self.readings is None or self.rigid is None:
+            return np.broadcast_to(np.eye(6), (len(self), 6, 6))
+        return self.readings.rows(self.rigid)
 
     @property
     def block(self) -> Block:
@@ -130,7 +207,14 @@ class UnitSession:
         ----------
         twist : (..., u, 6) float
             Predicted pose error of each unit [m, rad].
+
+        Returns
+        -------
+        (..., u, m) float
+            Of gauges what they read less what they should.
         """
+        if self.readings is not None and self.rigid is not None:
+            return self.readings.values - self.readings.predicted(twist, self.rigid)
         rotation, shift = exp_twist(twist)
         known, measured = self._turned
         # Without a measured rotation the predicted one stands in: then s is compared with s.
@@ -171,25 +255,34 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         session.block.theta,
         session.rotation,
     )
-    values = np.concatenate([session.shift, turn], axis=1)
+    read = session.readings
+    values = np.concatenate([session.shift, turn], axis=1) if read is None else read.values
     units = len(parts.dwell)
     lost = _lost(values, parts)
-    stated = np.zeros(6) if session.covariance is None else np.diag(session.covariance)
+    stated = np.zeros(values.shape[1])
+    if session.covariance is not None:
+        stated = np.diag(session.covariance)
     label = np.where(lost, -1, parts.label)
     mean, count = _means(values, label, units)
     steps = _steps(values, label, parts)
     white = _white(steps, stated)
     beside = np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0))
-    return UnitSession(
+    none = np.full((units, 3), np.nan)
+    quantities = QUANTITIES if read is None else read.quantities
+    found = UnitSession(
         session.name,
         parts,
-        mean[:, :3],
-        mean[:, 3:],
+        mean[:, :3] if read is None else none,
+        mean[:, 3:] if read is None else none,
         np.maximum(count.max(axis=1), 1.0),
         int(lost.sum()),
         white,
-        np.maximum(beside, np.where(white == 0.0, _rounding(steps), 0.0)),
+        np.maximum(beside, np.where(white == 0.0, _rounding(steps, quantities), 0.0)),
+        read and replace(read, values=mean),
     )
+    if read is None:
+        return found
+    return replace(found, rigid=in_pieces(rigid, found.mean(found.block.theta)))
 
 
 def _means(values: Array, label: Labels, units: int) -> tuple[Array, Array]:
@@ -249,11 +342,13 @@ def _white(steps: Sequence[Array], stated: Array) -> Array:
     return white
 
 
-def _rounding(steps: Sequence[Array]) -> Array:
-    """Return the scatter of what digits hide, by the smallest steps that they show, (6,).
+def _rounding(steps: Sequence[Array], quantities: Sequence[Quantity]) -> Array:
+    """Return the scatter of what digits hide, by the smallest steps that they show, (m,).
 
     Shifts share their digits, and so do turns: in a component that never changes none shows.
     """
     smallest = [np.min(each, initial=np.inf, where=each > 0.0) for each in steps]
     digit = np.where(np.isfinite(smallest), np.maximum(smallest, FINEST), FINEST)
-    return np.repeat(digit.reshape(2, 3).max(axis=1), 3) / np.sqrt(12.0)
+    for at in (list(each.components) for each in quantities):
+        digit[at] = digit[at].max()
+    return digit / np.sqrt(12.0)

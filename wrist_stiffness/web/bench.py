@@ -278,6 +278,10 @@ class Bench:
         self._tell(f"planning an experiment between {' and '.join(rivals)}")
         table = analysis.model.table
         noise = answer.diagnosis.noise
+        if not {"s_um", "phi_mdeg"} <= noise.keys():
+            raise InputError(
+                "a plan needs the noise of whole poses, and these recordings have none"
+            )
         floor = 1e-6 * noise["s_um"], float(np.radians(1e-3 * noise["phi_mdeg"]))
         weight = Weight(f"{grams:g} g", 1e-3 * grams, table.geometry.load_point, HANG_S)
         conditions = Conditions(

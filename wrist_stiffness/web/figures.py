@@ -23,7 +23,7 @@ AXES = ("x", "y", "z")
 DRAWN = 3000
 """Points from which a picture is drawn by the graphics card: an hour of motion at half a second."""
 
-SYMBOL = {"s": "s", "phi": "φ"}
+SYMBOL = {"s": "s", "phi": "φ", "gauges": "gauges", "tilts": "tilts"}
 MAP = "Cividis"
 """Perceptually even, and the same to people of any colour vision."""
 
@@ -81,6 +81,8 @@ class Shown:
     @property
     def part_label(self) -> str:
         """Of an axis of a picture."""
+        if self.quantity.name not in ("s", "phi"):
+            return f"{self.quantity.name}, number {self.axis + 1} [{self.unit}]"
         word = "along" if self.quantity.name == "s" else "about"
         return f"{SYMBOL[self.quantity.name]} {word} {AXES[self.axis]} [{self.unit}]"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from decimal import Context, Decimal, InvalidOperation, Overflow
@@ -27,6 +27,12 @@ UNIT_ONE = "_1"
 EXACT = Context(prec=60)
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 FACTORS = {"deg": PI / 180, "mm": Decimal("0.001")}
+GAUGE_FACTORS = {
+    **FACTORS,
+    "um": Decimal("1e-6"),
+    "in": Decimal("0.0254"),
+    "mdeg": FACTORS["deg"] / 1000,
+}
 SIGNIFICANT = (15, 16, 17)
 """Digits tried; seventeen tell any double, and what somebody typed mostly has fewer."""
 
@@ -65,6 +71,8 @@ class Columns:
         Number of markers; 0 for a table of poses.
     temperatures, covariates : dict of str to str
         Column by component; by name.
+    gauges : tuple of str
+        Columns of dial gauges and inclinometers.
     """
 
     loads: bool
@@ -72,6 +80,7 @@ class Columns:
     markers: int
     temperatures: dict[str, str]
     covariates: dict[str, str]
+    gauges: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -82,6 +91,7 @@ class Columns:
             *(LOAD if self.loads else ()),
             *self.pose,
             *marker_columns(self.markers),
+            *self.gauges,
             *self.temperatures.values(),
             *self.covariates.values(),
         )
@@ -92,13 +102,15 @@ def marker_columns(count: int) -> tuple[str, ...]:
     return tuple(f"p{i}{axis}_mm" for i in range(1, count + 1) for axis in "xyz")
 
 
-def columns_of(header: Sequence[str]) -> Columns:
+def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
     """Sort the columns of a table by what they mean.
 
     Parameters
     ----------
     header : sequence of str
         Names in any order.
+    gauges : sequence of str
+        Columns that are readings of dial gauges and inclinometers.
 
     Returns
     -------
@@ -131,12 +143,19 @@ def columns_of(header: Sequence[str]) -> Columns:
     markers = _markers(header)
     if pose and markers:
         raise InputError(f"columns {pose[0]} and p1x_mm: a pose and markers exclude each other")
-    if not pose and not markers:
+    if missing := [name for name in gauges if name not in header]:
+        raise InputError(f"column {', '.join(missing)} of the gauges is missing")
+    if gauges and (pose or markers):
+        raise InputError(
+            f"columns {gauges[0]} and {(*pose, 'p1x_mm')[0]}: gauges and a pose exclude each other "
+            "(z_mm is that of a gauge with point_mm [0, 0, 0])"
+        )
+    if not pose and not markers and not gauges:
         raise InputError(
             f"nothing measured: none of {', '.join((*POSITION, *QUATERNION))} or p1x_mm ... "
             f"among {', '.join(header)}"
         )
-    known = {TIME, *MOTORS, *LOAD, *pose, *marker_columns(markers)}
+    known = {TIME, *MOTORS, *LOAD, *pose, *marker_columns(markers), *gauges}
     temperatures, covariates = {}, {}
     for name in header:
         if name in known:
@@ -152,7 +171,7 @@ def columns_of(header: Sequence[str]) -> Columns:
             covariates[covariate_of(name)] = name
         else:
             raise InputError(f"column {name!r} is not known and no NAME_UNIT of a covariate")
-    return Columns(bool(loads), pose, markers, temperatures, covariates)
+    return Columns(bool(loads), pose, markers, temperatures, covariates, tuple(gauges))
 
 
 def covariate_of(column: str) -> str:
@@ -176,13 +195,13 @@ def _markers(header: Sequence[str]) -> int:
     return count
 
 
-def reader_of(column: str) -> Callable[[str], float]:
+def reader_of(column: str, factors: Mapping[str, Decimal] = FACTORS) -> Callable[[str], float]:
     """Return the function from the text of a column to its number in SI, rounded once.
 
     It raises ValueError where the text is no finite number, or one that cannot be.
     """
     unit = column.rpartition("_")[2]
-    factor = FACTORS.get(unit)
+    factor = factors.get(unit)
     lower, upper = _possible(column)
 
     def read(text: str) -> float:

@@ -17,6 +17,7 @@ from wrist_stiffness.sessions.reading.registration import agreement, put_right
 from wrist_stiffness.sessions.reading.signals import Stamps
 from wrist_stiffness.topics import (
     BASE_FRAME,
+    GAUGE_READINGS,
     JOINT_STATES,
     LOAD_ESTIMATE,
     PLATFORM_MARKERS,
@@ -38,8 +39,9 @@ def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, 
     needed = {
         (JOINT_STATES,): len(samples.joints.time_ns),
         (LOAD_ESTIMATE,): len(samples.loads.time_ns),
-        (PLATFORM_POSE, PLATFORM_MARKERS): len(samples.poses.time_ns)
-        + len(samples.markers.time_ns),
+        (PLATFORM_POSE, PLATFORM_MARKERS, GAUGE_READINGS): sum(
+            len(each.time_ns) for each in (samples.poses, samples.markers, samples.gauges)
+        ),
     }
     for topics, count in needed.items():
         if count:

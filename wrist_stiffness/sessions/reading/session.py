@@ -30,6 +30,7 @@ from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
+from wrist_stiffness.sessions.reading.gauge_readings import GaugeTrack, gauge_track, held_to
 from wrist_stiffness.sessions.reading.instrument import registered
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
@@ -123,9 +124,14 @@ def read_session(
     known = frames_of(recording, remaps or {}, frames or Frames())
     try:
         machine = machine_signals(samples, known.frames)
-        markers = table.geometry.platform.readout_points
-        track = pose_track(samples, markers, known.frames)
-        session = session_of(recording.path.name, machine, track, table, load_age_limit_s)
+        own = recording.path.name, machine
+        if len(samples.poses.time_ns) or len(samples.markers.time_ns):
+            markers = table.geometry.platform.readout_points
+            track = pose_track(samples, markers, known.frames)
+            session = session_of(*own, track, table, load_age_limit_s)
+        else:
+            read = gauge_track(samples.gauges, notes)
+            session = gauge_session(*own, read, table, load_age_limit_s)
     except (FrameError, InputError, RecordingError) as error:
         hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
@@ -210,22 +216,74 @@ def session_of(
         remarks.append(
             "the load never changes: what the load does and what is always there look the same"
         )
+    pair = None if offset is None else (offset.seconds, offset.sigma)
+    session = MeasuredSession(
+        name, block, shift, rotation, covariance, remarks=tuple(remarks), clock_offset_s=pair
+    )
+    session = _with_path(session, machine, time_ns, table, load_age_limit_s)
+    require_enough(session, len(track))
+    return session
+
+
+def gauge_session(
+    name: str,
+    machine: MachineSignals,
+    track: GaugeTrack,
+    table: Table,
+    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+) -> MeasuredSession:
+    """Put the signals of a recording with gauges together; parameters as for `session_of`."""
+    require_overlap(machine.angles.time_ns, track.time_ns)
+    usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
+    usable[usable] = in_pieces(
+        table.mechanism.reachable, machine.angles.interpolated(track.time_ns[usable])
+    )
+    remarks, time_ns = [*machine.remarks, *reasons], track.time_ns[usable]
+    if len(time_ns) == 0:
+        raise InputError(f"no reading can be used: {'; '.join(remarks)}")
+    block = machine.at(time_ns)
+    rigid = rigid_rotation(table, block.theta)
+    readings, said = held_to(table, track.gauges, track.values[usable], rigid)
+    remarks += [*said, *beyond_range(table, block)]
+    none = np.full((len(time_ns), 3), np.nan)
+    session = MeasuredSession(
+        name,
+        block,
+        none,
+        np.full((len(time_ns), 3, 3), np.nan),
+        remarks=tuple(remarks),
+        readings=readings,
+    )
+    session = _with_path(session, machine, time_ns, table, load_age_limit_s)
+    require_enough(session, len(track.time_ns))
+    return session
+
+
+def _with_path(
+    session: MeasuredSession,
+    machine: MachineSignals,
+    time_ns: Stamps,
+    table: Table,
+    load_age_limit_s: float,
+) -> MeasuredSession:
+    """Return a session (n,) with rows that tell the way between measurements far apart."""
     path_ns = path_stamps(machine, time_ns, table, load_age_limit_s)
     place = np.searchsorted(time_ns, path_ns)
     new = time_ns[np.minimum(place, len(time_ns) - 1)] != path_ns
+    if not new.any():
+        return session
     all_ns = np.insert(time_ns, place[new], path_ns[new])
     rows = np.searchsorted(all_ns, time_ns)
-    session = MeasuredSession(
-        name,
-        block if len(all_ns) == len(block) else machine.at(all_ns),
-        _spread(shift, rows, len(all_ns)),
-        _spread(rotation, rows, len(all_ns)),
-        covariance,
-        remarks=tuple(remarks),
-        clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
+    readings = session.readings
+    if readings is not None:
+        readings = replace(readings, values=_spread(readings.values, rows, len(all_ns)))
+    return replace(
+        session,
+        block=machine.at(all_ns),
+        shift=_spread(session.shift, rows, len(all_ns)),
+        rotation=_spread(session.rotation, rows, len(all_ns)),
+        readings=readings,
     )
-    require_enough(session, len(track))
-    return session
 
 
 def path_stamps(
@@ -262,8 +320,6 @@ def path_stamps(
 
 def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
     """Return values (n, ...) at their rows among so many, NaN at the others."""
-    if count == len(values):
-        return values
     out = np.full((count, *values.shape[1:]), np.nan)
     out[rows] = values
     return out

@@ -1,0 +1,211 @@
+"""Dial gauges and inclinometers: rows of the error twist, imported, held to the wrist, compared."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.commands.import_csv import import_csv
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.gauges import Gauge
+from wrist_stiffness.sessions.observing import observe, without_mounting
+from wrist_stiffness.sessions.reading.session import read_session
+
+UP = np.array([0.0, 0.0, 1.0])
+NONE = np.zeros(3)
+GAUGES_YAML = """\
+schema: 1
+gauges:
+  - {column: a_um, point_mm: [25, 0, -12], direction: [0, 0, 1]}
+  - {column: b_um, point_mm: [-12, 22, -12], direction: [0, 0, 1]}
+  - {column: c_um, point_mm: [-12, -22, -12], direction: [0, 0, 1]}
+  - {column: d_um, point_mm: [0, 0, -30], direction: [1, 0, 0]}
+  - {column: e_um, point_mm: [0, 0, -30], direction: [0, 2, 0]}
+  - {column: level_mdeg, direction: [1, 0, 0]}
+"""
+GAUGES = (
+    Gauge("a", UP, np.array([0.025, 0.0, -0.012])),
+    Gauge("b", UP, np.array([-0.012, 0.022, -0.012])),
+    Gauge("c", UP, np.array([-0.012, -0.022, -0.012])),
+    Gauge("d", np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -0.03])),
+    Gauge("e", np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -0.03])),
+    Gauge("level", np.array([1.0, 0.0, 0.0])),
+)
+PER_SI = np.array([1e6] * 5 + [np.degrees(1e3)])
+NOISE = np.array([0.5e-6] * 5 + [np.radians(1e-3)])
+SETTINGS = "time_s,motor_1_deg,motor_2_deg,fx_N,fy_N,fz_N,mx_Nm,my_Nm,mz_Nm"
+ZEROS = np.array([1e-3, -2e-3, 0.0, 5e-4, 3e-3, 2e-3])
+
+
+def conditions(count=90, seed=2):
+    """Poses measured one by one, 5 s apart, each under a load of its own."""
+    rng = np.random.default_rng(seed)
+    theta = np.radians(np.round(rng.uniform(-25.0, 25.0, (count, 2)), 2))
+    load = np.round(rng.normal(size=(count, 6)) * np.repeat([0.5, 0.01], 3), 4)
+    return Block(5.0 * np.arange(count), theta, load)
+
+
+def readings_of(model, block, gauges=GAUGES, zeros=ZEROS, seed=3):
+    """What gauges read of a wrist that is the model, (n, K) [m, rad]."""
+    rotation, shift = exp_twist(model.batch(block).measured)
+    rotation = rotation @ model.table.mechanism.platform_rotation(block.theta)
+    read = np.stack([each.reading(shift, rotation, UP) for each in gauges], axis=1)
+    return read + zeros + NOISE * np.random.default_rng(seed).normal(size=read.shape)
+
+
+def imported(folder, block, readings, header="a_um,b_um,c_um,d_um,e_um,level_mdeg"):
+    """Return the recording of the table that a technician would have written."""
+    cells = np.column_stack(
+        [block.time, np.degrees(block.theta), block.load, np.round(readings * PER_SI, 2)]
+    )
+    table, gauges = folder / "gauges.csv", folder / "gauges.yaml"
+    lines = (",".join(f"{cell:.10g}" for cell in row) for row in cells)
+    table.write_text("\n".join([f"{SETTINGS},{header}", *lines, ""]))
+    gauges.write_text(GAUGES_YAML)
+    return import_csv(table, folder / "bag.mcap", gauges_file=gauges).path
+
+
+@pytest.mark.parametrize("gauge", GAUGES, ids=[each.name for each in GAUGES])
+def test_the_row_is_the_slope_of_the_reading_by_a_twist_of_the_platform(gauge, table):
+    block = conditions(7)
+    nominal = table.mechanism.platform_rotation(block.theta)
+    row = gauge.row(nominal, UP)
+    for axis, step in zip(np.eye(6), np.repeat([1e-6, 1e-5], 3), strict=True):
+        ends = []
+        for sign in (-1.0, 1.0):
+            rotation, shift = exp_twist(np.tile(sign * step * axis, (7, 1)))
+            ends.append(gauge.reading(shift, rotation @ nominal, UP))
+        assert np.allclose((ends[1] - ends[0]) / (2.0 * step), row @ axis, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("gauge", GAUGES, ids=[each.name for each in GAUGES])
+def test_mounting_columns_are_the_slopes_by_another_mounting(gauge, table):
+    nominal = table.mechanism.platform_rotation(conditions(7).theta)
+    columns = gauge.mounting(nominal, UP)
+
+    def read(step):
+        own, zero = gauge.mounted(step)
+        return zero + own.reading(NONE, nominal, UP)
+
+    for number, unit in enumerate(1e-3 * np.eye(columns.shape[1])):
+        slope = (read(unit) - read(-unit)) / 2e-3
+        assert np.allclose(slope, columns[:, number], rtol=1e-4, atol=1e-9)
+
+
+def test_a_gauge_is_the_projected_pose_of_a_tracker(tmp_path, model, table):
+    """What is left of readings is what is left of poses along each gauge, but for its mounting."""
+    block = conditions()
+    session = read_session(imported(tmp_path, block, readings_of(model, block)), table)
+    seen = observe(model, [session])
+    left = without_mounting(seen.observations, seen.observations.values)
+    assert left.shape == (len(block), len(GAUGES))
+    # Digits of the table beside the noise; mountings take up six numbers of each gauge.
+    assert np.all(left.std(axis=0) < 1.3 * np.hypot(NOISE, 0.01 / np.sqrt(12.0) / PER_SI))
+    assert [q.key for q in seen.observations.reported] == ["gauges_um", "tilts_mdeg"]
+
+
+def test_a_mounting_off_by_millimetres_and_degrees_is_found_and_said(tmp_path, model, table):
+    """To first order alone it would leave tens of micrometres."""
+    block, rng = conditions(), np.random.default_rng(8)
+    true = tuple(
+        Gauge(
+            each.name,
+            Rotation.from_rotvec(np.radians(2.0) * rng.normal(size=3)).apply(each.direction),
+            None if each.point is None else each.point + 1e-3 * rng.normal(size=3),
+        )
+        for each in GAUGES
+    )
+    path = imported(tmp_path, block, readings_of(model, block, true))
+    session = read_session(path, table)
+    assert any("mm from its point" in remark for remark in session.remarks)
+    seen = observe(model, [session])
+    left = without_mounting(seen.observations, seen.observations.values)
+    assert np.all(left.std(axis=0) < 1.3 * np.hypot(NOISE, 0.01 / np.sqrt(12.0) / PER_SI))
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "told"),
+    [
+        (0, -1.0, "gauge a.*times -1 .*count up when the ball moves"),
+        (3, 1e-3, "gauge d.*times 1000 .*in m where mm belong"),
+        (3, 1.0 / 25.4, "gauge d.*times 25.4 .*in inches where mm belong"),
+        (4, 1e3, "gauge e.*times 0.001 .*in um where mm belong"),
+        (5, -1.0, "gauge level.*times -1 .*count up when the arrow moves"),
+        (5, np.pi / 180.0, "gauge level.*in rad where deg belong"),
+    ],
+)
+def test_a_wrong_sign_or_unit_is_told(tmp_path, model, table, column, factor, told):
+    block = conditions(30)
+    readings = readings_of(model, block)
+    readings[:, column] *= factor
+    with pytest.raises(InputError, match=told):
+        read_session(imported(tmp_path, block, readings), table)
+
+
+def test_a_wrong_sign_at_a_single_pose_is_told_by_the_loads(tmp_path, model, table):
+    block = conditions(60)
+    block = replace(block, theta=np.tile(np.radians([12.0, -7.0]), (60, 1)))
+    readings = readings_of(model, block)
+    readings[:, 1] *= -1.0
+    session = read_session(imported(tmp_path, block, readings), table)
+    found = compare_models([("nominal", model)], [session])
+    assert "with the sign of gauge b turned the error falls" in found.mistake
+
+
+def test_two_columns_that_changed_places_are_told(tmp_path, model, table):
+    block = conditions(30)
+    readings = readings_of(model, block)[:, [1, 0, 2, 3, 4, 5]]
+    with pytest.raises(InputError, match="gauge a reads as if .* from its point"):
+        read_session(imported(tmp_path, block, readings), table)
+
+
+def test_readings_one_after_the_other_tell_the_same(tmp_path, model, table):
+    """One gauge a row, blanks for the others: as in a workshop with a single one."""
+    block = conditions(180)
+    readings = readings_of(model, block)
+    rows, columns = np.indices(readings.shape)
+    readings[rows % len(GAUGES) != columns] = np.nan
+    session = read_session(imported(tmp_path, block, readings), table)
+    assert np.all(session.measured.sum(axis=1) <= 1)
+    assert session.measured.sum() == len(block)
+    seen = observe(model, [session]).observations
+    left = without_mounting(seen, seen.values)
+    assert np.nanstd(left[:, 0]) < 2.0 * NOISE[0]
+
+
+def test_a_soft_link_is_calibrated_with_gauges(tmp_path, model, table):
+    soft = Effect(find_law("link_stiffness"), "link_1").with_values({"flexibility_percent": 60.0})
+    block = conditions(200)
+    path = imported(tmp_path, block, readings_of(model.with_effects(soft), block))
+    found = calibrate(model, [read_session(path, table)])
+    (own,) = (p for p in found.parameters if p.effect == soft.name)
+    assert abs(own.value - 60.0) < 4.0 * own.sigma
+    assert own.sigma < 15.0
+    assert found.after["gauges_um"] < 0.5 * found.before["gauges_um"]
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "told"),
+    [
+        ("a_um, point_mm: [25, 0, -12]", "a_um", "a dial gauge needs a point_mm"),
+        ("level_mdeg", "level_mdeg, point_mm: [0, 0, 1]", "an inclinometer has no point_mm"),
+        ("[0, 2, 0]", "[0, 0, 0]", "is no direction"),
+        ("a_um", "a_furlong", "no name with its unit"),
+        ("b_um", "a_mm", "'a' is there twice"),
+        ("a_um", "f_um", "column f_um of the gauges is missing"),
+    ],
+)
+def test_a_wrong_description_is_refused(tmp_path, was, now, told):
+    gauges = tmp_path / "gauges.yaml"
+    gauges.write_text(GAUGES_YAML.replace(was, now))
+    table = tmp_path / "t.csv"
+    table.write_text(f"{SETTINGS},a_um,b_um,c_um,d_um,e_um,level_mdeg\n")
+    with pytest.raises(InputError, match=told):
+        import_csv(table, tmp_path / "bag.mcap", gauges_file=gauges)

@@ -1,0 +1,206 @@
+"""Dial gauges and inclinometers: what each reads of the platform's pose, and what of its error.
+
+A gauge reads one number of a pose.  To first order an error twist (t, phi) at O changes it by one
+row h of numbers, h @ (t, phi): the gauge's direction and its lever, the inclinometer's axis.  A
+tracker is the special case in which the rows are those of the identity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wrist_stiffness.inference import Quantity
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
+
+GAUGES = Quantity("gauges", "um", (), 1e6)
+TILTS = Quantity("tilts", "mdeg", (), 180e3 / np.pi)
+
+MOVES_M, MOVES_RAD = 5e-5, 1e-3
+"""Motion of the rigid wrist, RMS, from which a wrong sign or unit shows in it: far above what
+elasticity and faults do."""
+
+ZERO_M, ZERO_RAD = 0.02, 0.1
+"""Standard deviation of a zero: of no account, since nobody knows where a dial was set to 0."""
+
+POINT_M, DIRECTION_RAD = 1e-3, np.radians(2.0)
+"""Standard deviations with which a ball's place and a direction are known, as a ruler and a square
+tell them (assumed)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """One instrument that reads one number of the platform's pose.
+
+    Parameters
+    ----------
+    name : str
+        Column of the table without its unit.
+    direction : (3,) float
+        Unit vector along which the reading grows.  Of a dial gauge in F: it stands on the base, its
+        flat tip on a ball.  Of an inclinometer in U: an arrow on the platform, whose angle above
+        the horizontal it reads.
+    point : (3,) float, optional
+        Centre of the ball in U from O [m]; None for an inclinometer.
+    """
+
+    name: str
+    direction: Array
+    point: Array | None = None
+
+    @classmethod
+    def of_note(cls, facts: Mapping[str, Any]) -> Gauge:
+        """Return the instrument that a recording's note describes (inverse of `note`)."""
+        point = facts.get("point_m")
+        along = np.array(facts["direction"], dtype=float)
+        return cls(facts["name"], along, None if point is None else np.array(point, dtype=float))
+
+    @property
+    def note(self) -> dict[str, Any]:
+        """As it stands in a recording's notes."""
+        point = {} if self.point is None else {"point_m": self.point.tolist()}
+        return {"name": self.name, "direction": self.direction.tolist(), **point}
+
+    @property
+    def counts_up(self) -> str:
+        """When the reading grows, after "does it"."""
+        what = "arrow" if self.point is None else "ball"
+        return f"count up when the {what} moves along its direction"
+
+    def follows(self, rigid: Array) -> bool:
+        """Tell whether the rigid wrist moves so much that signs and units show in readings (n,)."""
+        return bool(np.std(rigid) >= (MOVES_RAD if self.point is None else MOVES_M))
+
+    def reading(self, shift: Array, rotation: Array, up: Array) -> Array:
+        """Return what it reads of poses but for its zero, (..., n) [m] or [rad].
+
+        Parameters
+        ----------
+        shift : (..., n, 3) or (3,) float
+            Position of O in F [m].
+        rotation : (..., n, 3, 3) float
+            U -> F.
+        up : (3,) float
+            Unit vector against gravity in F.
+        """
+        if self.point is None:
+            return np.asarray(np.arcsin(np.clip(rotation @ self.direction @ up, -1.0, 1.0)))
+        return np.asarray((rotation @ self.point + shift) @ self.direction)
+
+    def row(self, rotation: Array, up: Array) -> Array:
+        """Return by how much a twist at O in F changes the reading, (n, 6)."""
+        if self.point is None:
+            arrow = rotation @ self.direction
+            slope = np.sqrt(np.maximum(1.0 - (arrow @ up) ** 2, 1e-6))
+            turned = np.cross(arrow, up) / slope[:, None]
+            return np.concatenate([np.zeros_like(turned), turned], axis=1)
+        lever = np.cross(rotation @ self.point, self.direction)
+        return np.concatenate([np.tile(self.direction, (len(lever), 1)), lever], axis=1)
+
+    def mounting(self, rotation: Array, up: Array) -> Array:
+        """Return what a standard deviation of its zero, place and directions does, (n, q)."""
+        aside = np.linalg.svd(self.direction[None])[2][1:] * DIRECTION_RAD
+        if self.point is None:
+            slope = np.sqrt(np.maximum(1.0 - (rotation @ self.direction @ up) ** 2, 1e-6))
+            turned = (rotation @ aside.T).transpose(0, 2, 1) @ up / slope[:, None]
+            return np.concatenate([np.full((len(rotation), 1), ZERO_RAD), turned], axis=1)
+        zero = np.full((len(rotation), 1), ZERO_M)
+        moved = POINT_M * np.swapaxes(rotation, 1, 2) @ self.direction
+        return np.concatenate([zero, moved, rotation @ self.point @ aside.T], axis=1)
+
+    def mounted(self, step: Array) -> tuple[Gauge, float]:
+        """Return it with another mounting, (q,) standard deviations away, and its zero."""
+        aside = np.linalg.svd(self.direction[None])[2][1:] * DIRECTION_RAD
+        along = self.direction + step[-2:] @ aside
+        along = along / np.linalg.norm(along)
+        if self.point is None:
+            return Gauge(self.name, along), ZERO_RAD * float(step[0])
+        return Gauge(self.name, along, self.point + POINT_M * step[1:4]), ZERO_M * float(step[0])
+
+
+def quantities_of(gauges: Sequence[Gauge]) -> tuple[Quantity, ...]:
+    """Return what is reported as one length: dial gauges together, and inclinometers."""
+    tilts = tuple(n for n, each in enumerate(gauges) if each.point is None)
+    lengths = tuple(n for n in range(len(gauges)) if n not in tilts)
+    pairs = ((GAUGES, lengths), (TILTS, tilts))
+    return tuple(Quantity(q.name, q.unit, own, q.per_si) for q, own in pairs if own)
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """What gauges read of n samples.
+
+    Parameters
+    ----------
+    gauges : tuple of Gauge
+        K of them, as they stand.
+    up : (3,) float
+        Unit vector against gravity in F.
+    values : (n, K) float
+        Readings less those of the rigid wrist [m] or [rad]; NaN = not read.
+    """
+
+    gauges: tuple[Gauge, ...]
+    up: Array
+    values: Array
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is reported as one length."""
+        return quantities_of(self.gauges)
+
+    def take(self, rows: slice | NDArray[np.bool_]) -> Readings:
+        """Return those of some samples, in their order."""
+        return replace(self, values=self.values[rows])
+
+    def predicted(self, twist: Array, rigid: Array) -> Array:
+        """Return by how much twists (..., n, 6) at O of rigid poses change them, (..., n, K)."""
+        rotation, shift = exp_twist(twist)
+        rotation = rotation @ rigid
+        changes = [
+            each.reading(shift, rotation, self.up) - each.reading(np.zeros(3), rigid, self.up)
+            for each in self.gauges
+        ]
+        return np.stack(changes, axis=-1)
+
+    def rows(self, rotation: Array) -> Array:
+        """Return by how much a twist at O in F changes the readings, (n, K, 6)."""
+        return np.stack([each.row(rotation, self.up) for each in self.gauges], axis=1)
+
+    def common(self, rotation: Array) -> Array:
+        """Return what standard deviations of all mountings do to the readings, (n, K, q)."""
+        own = [each.mounting(rotation, self.up) for each in self.gauges]
+        ends = np.cumsum([each.shape[1] for each in own])
+        out = np.zeros((len(rotation), len(own), ends[-1]))
+        for number, (each, end) in enumerate(zip(own, ends, strict=True)):
+            out[:, number, end - each.shape[1] : end] = each
+        return out
+
+
+def cleared(values: Array, common: Array, sigma: Array) -> Array:
+    """Return values (n, m) or (n, m, k) without what they have in common, NaN where they have it.
+
+    Parameters
+    ----------
+    values : (n, m) or (n, m, k) float
+        Left by a model.
+    common : (n, m, q) float
+        What a standard deviation of each unknown does to them.
+    sigma : (m,) float
+        Their scatter: what is less than that is not taken out.
+    """
+    if not common.shape[2]:
+        return values
+    columns = values if values.ndim == 3 else values[:, :, None]
+    known = np.isfinite(columns)
+    white = np.where(known[:, :, :1], common, 0.0) / sigma[:, None]
+    flat = white.reshape(-1, common.shape[2])
+    target = (np.where(known, columns, 0.0) / sigma[:, None]).reshape(len(flat), -1)
+    taken = np.linalg.solve(flat.T @ flat + np.eye(flat.shape[1]), flat.T @ target)
+    return np.asarray((columns - common @ taken).reshape(values.shape))
