@@ -21,8 +21,8 @@ from wrist_stiffness.identification.proposal import Proposal, Proposals, in_unit
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import MEMBER, NAMING
-from wrist_stiffness.inference.evidence import OFF, TAIL, Evidence, evidence
-from wrist_stiffness.inference.point import OUTSIDE, Background
+from wrist_stiffness.inference.evidence import TAIL, Evidence, evidence
+from wrist_stiffness.inference.point import OUTSIDE
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.formula_law import MOTION, TEMPERATURE, WRENCH, FormulaLaw
@@ -105,7 +105,7 @@ def propose(
     for number in range(MOST_TERMS):
         tell("asking for a law" if number == 0 else "asking for a second law beside it")
         library = _Library(problem, fit)
-        base = library.start()
+        base = fit.evidence
         found = library.judged(base, "proposed")
         if not found:
             break
@@ -242,19 +242,6 @@ class _Library:
         changes = problem.about(self._fit).changes(trials)
         return changes.reshape(len(PLACES), 6, *changes.shape[1:])
 
-    def start(self) -> Evidence:
-        """Return the evidence of the fit, with what of the discrepancy is there."""
-        whole = self._fit.evidence
-        ground = whole.background
-        on = np.flatnonzero(~ground.optional | (whole.amplitude > OFF))
-        kept = Background(
-            tuple(ground.groups[n] for n in on),
-            ground.noise_width,
-            int(np.count_nonzero(ground.optional)),
-        )
-        point = replace(whole.point, _beside={})
-        return Evidence(point, kept, whole.amplitude[on], whole.excess)
-
     def judged(self, state: Evidence, name: str) -> list[_Judged]:
         """Return the leading laws beside a state, the most probable first."""
         beyond = _Beyond(state.without_discrepancy(), self._white, self._carried)
@@ -335,20 +322,11 @@ class _Library:
         size, table, point = float(row.std()), self._table, state.point
         parts = self._carried[law.place, list(law.free)] * (row / size)[None, :, None]
         change = np.einsum("i,iua->ua", law.z, parts)
-        places = np.arange(len(point.z), len(point.z) + len(law.free))
+        left = point.left - table.whiten(change)
+        columns = -table.whiten(np.moveaxis(parts, 0, -1))
         varied = table.varied(change)
-        grown = replace(
-            point,
-            left=point.left - table.whiten(change),
-            columns=np.hstack([point.columns, -table.whiten(np.moveaxis(parts, 0, -1))]),
-            z=np.concatenate([point.z, law.z]),
-            weight=np.concatenate([point.weight, np.ones(len(law.free))]),
-            effects={**point.effects, name: places},
-            inexact=np.hstack([point.inexact, FormulaLaw.inexactness * varied]),
-            varied={**point.varied, name: varied},
-            linear=True,
-            _beside={},
-        )
+        grown = point.with_effect(name, left, columns, law.z, varied, FormulaLaw.inexactness)
+        places = grown.effects[name]
         found = evidence(grown, state.background, state)
         price += self._price - np.log(2.0 * (6.0 if len(law.free) == 1 else 2.0))
         z = found.point.z[places] + found.step[places]

@@ -29,15 +29,17 @@ from wrist_stiffness.identification.own_law import Beyond
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.evidence import evidence
-from wrist_stiffness.inference.point import Background
-from wrist_stiffness.inference.search import FALLS, Ranked, Trial, ranked
+from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.search import Ranked, Trial, ranked
+from wrist_stiffness.model.columns import SMALL
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.unit_session import UnitSession
 
-LEAVES_MUCH = 1.5
-"""Variance of what is left, in units of the noise, from which a fit is begun from the drawing too:
-tolerances that gave way to a large effect may not find back."""
+LEAVES_MUCH, HELPS = 1.5, 0.8
+"""Variance of what an effect leaves, in units of the noise, and share of the cost without it, at
+which its fit is tried again: from the drawing, for tolerances that gave way to a large effect may
+not find back, and with walls little by little."""
 
 
 class WristProblem:
@@ -62,6 +64,7 @@ class WristProblem:
         self._sessions = self._first.problem.sessions
         self.table = WristTable(self._first.problem.table, self._sessions)
         self._extended: tuple[WristFit, Effect, WristFit] | None = None
+        self._starts: dict[WristCandidate, Effect] = {}
         self._asked: dict[int, tuple[BaseFit, WristPoint, dict[str, WristCandidate]]] = {}
 
     def asks(self, model: ErrorModel, base: Base) -> bool:
@@ -89,6 +92,68 @@ class WristProblem:
             for shape in candidate.shapes
         ]
         return Trial(candidate.name, candidate.law.smooth, tuple(blocks))
+
+    def tangent(self, fit: WristFit, ranked: Ranked) -> Point | None:
+        """Return a fit with one effect more: the effect by its own law, all else to first order.
+
+        None where its law goes from wall to wall: only a whole fit tells what that does.
+        """
+        at, candidates = self._catalogue(fit)
+        candidate = candidates[ranked.trial.name]
+        try:
+            own = self._begun(fit, ranked, at, candidate)
+        except WristError:
+            return None
+        if has_walls(own):
+            return None
+        if candidate.law.smooth:
+            z, columns = ranked.z, candidate.at(ranked.shape) * candidate.usual
+            change = columns @ z
+        else:
+            values = {key: each.value for key, each in own.estimates.items()}
+            asked = [
+                p
+                for p in own.parameters
+                if p.key not in candidate.recipe.idle and np.isfinite(p.scale)
+            ]
+            trials = [values]
+            for p in asked:
+                step = SMALL * p.scale
+                trials.append(
+                    values
+                    | {p.key: values[p.key] + (step if values[p.key] + step <= p.upper else -step)}
+                )
+            found = at.changes([(candidate.law, candidate.place, each) for each in trials])
+            change = found[0]
+            steps = np.array(
+                [
+                    (t[p.key] - values[p.key]) / p.scale
+                    for t, p in zip(trials[1:], asked, strict=True)
+                ]
+            )
+            columns = np.moveaxis((found[1:] - change) / steps[:, None, None], 0, -1)
+            z = np.array([(values[p.key] - p.mean) / p.scale for p in asked])
+        point = fit.point
+        left = point.left - self.table.whiten(change)
+        varied = self.table.varied(change)
+        return point.with_effect(
+            candidate.name, left, -self.table.whiten(columns), z, varied, candidate.law.inexactness
+        )
+
+    def _begun(
+        self, fit: WristFit, ranked: Ranked, point: WristPoint, candidate: WristCandidate
+    ) -> Effect:
+        """Return an effect with the values with which a whole fit begins; they are kept."""
+        if candidate not in self._starts:
+            factors = [each.factor.name for each in candidate.recipe.columns(ranked.shape)]
+            values = (ranked.z * candidate.usual).tolist()
+            own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
+            if has_walls(own):
+                own = own.with_values({p.key: p.mean or p.scale for p in own.parameters})
+            elif not candidate.law.smooth:
+                own = Beyond(fit.base, point).fitted(candidate, own)
+            self._starts[candidate] = own
+        return self._starts[candidate]
 
     def added(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
         """Return the best fit with one effect more; None where its law finds no equilibrium."""
@@ -126,20 +191,14 @@ class WristProblem:
     def _added(
         self, fit: WristFit, ranked: Ranked, point: WristPoint, candidate: WristCandidate
     ) -> WristFit | None:
-        factors = [each.factor.name for each in candidate.recipe.columns(ranked.shape)]
-        values = (ranked.z * candidate.usual).tolist()
-        own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
         try:
-            if not candidate.law.smooth:
-                own = Beyond(fit.base, point).fitted(candidate, own)
+            own = self._begun(fit, ranked, point, candidate)
             extras = [*fit.base.beyond().values(), own]
             found = self._fitted(extras, fit.base)
-            if found.variance > LEAVES_MUCH and found.cost < FALLS * fit.base.cost:
+            if found.variance > LEAVES_MUCH and found.cost < HELPS * fit.base.cost:
                 found = min(found, self._fitted(extras, None), key=_cost)
-            if found.variance > LEAVES_MUCH and has_walls(own):
-                usual = {p.key: p.mean or p.scale for p in own.parameters}
-                gradual = [*fit.base.beyond().values(), own.with_values(usual)]
-                found = min(found, self._gradual(gradual, fit.base), key=_cost)
+                if has_walls(own):
+                    found = min(found, self._gradual(extras, fit.base), key=_cost)
         except WristError:
             return None
         return WristFit(found, self.table)
@@ -163,6 +222,7 @@ class WristProblem:
             absent = {each.name for each in self._model.effects} | set(fit.names)
             found = {each.name: each for each in wrist_candidates(point, searched(absent))}
             self._asked = {id(fit.base): (fit.base, point, found)}
+            self._starts = {}
             known = self._asked[id(fit.base)]
         return known[1], known[2]
 

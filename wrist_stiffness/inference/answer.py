@@ -134,9 +134,10 @@ def probabilities(search: Search) -> dict[Names, float]:
     does not count.  What slopes only promise is never more probable than the best fit.
     """
     logs = {names: state.log for names, state in search.states.items()}
-    for name, promise in search.promised.items():
-        if promise > search.base.evidence.log:
-            logs.setdefault(frozenset((name,)), min(promise - search.price, search.best.log))
+    for name, gain in search.promised.items():
+        if gain > 0.0:
+            log = search.base.log + gain - search.price
+            logs.setdefault(frozenset((name,)), min(log, search.best.log))
     values = np.array(list(logs.values()))
     weights = np.exp(values - values.max())
     return dict(zip(logs, (weights / weights.sum()).tolist(), strict=True))
@@ -256,7 +257,7 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
             fitted[name] = max(gain, fitted.get(name, gain))
     found = []
     for name in {**fitted, **search.promised}:
-        gain = fitted[name] if name in fitted else search.promised[name] - nominal
+        gain = fitted[name] if name in fitted else search.promised[name]
         probability = chance.get(name, 0.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
         if name not in fitted and gain >= CHANCE and not search.in_time:

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.inference.answer import MEMBER
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT
@@ -19,19 +18,16 @@ from wrist_stiffness.inference.evidence import (
     OFF,
     Array,
     Evidence,
-    evidence,
-    log_amplitude,
+    further,
+    settled,
 )
-from wrist_stiffness.inference.point import Background, Group, Point
+from wrist_stiffness.inference.point import Background, Point
 
 HELD = 3.0
 """Log evidence that a group may gain when the amplitudes of the others follow."""
 
 HOPELESS = 10.0
 """Log evidence below the best at which a set is not searched further."""
-
-AMPLITUDES = np.geomspace(0.02, 1e4, 60)
-"""Sizes of a group, in scatters of a unit, among which the best is sought first."""
 
 Chosen = frozenset[int]
 
@@ -163,19 +159,8 @@ class _Sets:
         self._point, self._all = point, background
         self._known: dict[Chosen, tuple[float, Array, float]] = {}
         self._logs: dict[Chosen, float] = {}
-        self._rows = np.column_stack([point.columns, background.columns, point.left])
-        self._gram = self._rows.T @ self._rows
-        ends = point.columns.shape[1] + np.cumsum(background.sizes)
-        self._named = np.arange(point.columns.shape[1])
-        self._places = [
-            np.arange(end - size, end) for end, size in zip(ends, background.sizes, strict=True)
-        ]
         self.always: Chosen = self.of(SLOW_DRIFT)
         self._optional: Chosen = frozenset(np.flatnonzero(background.optional).tolist())
-
-    def _at(self, chosen: Chosen) -> NDArray[np.intp]:
-        """Return the places of the columns of a set."""
-        return np.concatenate([np.zeros(0, dtype=int), *(self._places[n] for n in sorted(chosen))])
 
     def name(self, number: int) -> str:
         """Return the question of a group."""
@@ -208,30 +193,23 @@ class _Sets:
         if chosen in self._known:
             return self._evidence(chosen, *self._known[chosen][1:])
         begun = np.array([(start or {}).get(number, 1.0) for number in sorted(chosen)])
-        near = self._evidence(chosen, begun, excess)
-        found = evidence(near.point, near.background, near, drop=False)
+        found = settled(self._evidence(chosen, begun, excess))
         # With a group that is off it is the smaller set once more.
         log = found.log if (found.amplitude > OFF).all() else -np.inf
         self._known[chosen] = log, found.amplitude, found.excess
         return found
 
     def _evidence(self, chosen: Chosen, amplitude: Array, excess: float) -> Evidence:
-        """Return a set at given amplitudes, its columns and their products taken from the whole."""
-        groups = tuple(self._all.groups[number] for number in sorted(chosen))
-        asked = int(np.count_nonzero(self._all.optional))
-        ground = replace(self._all, groups=groups, asked=asked)
-        at = np.concatenate([self._named, self._at(chosen)])
-        known = {id(ground): (self._rows[:, at], self._gram[np.ix_(at, at)])}
-        return Evidence(replace(self._point, _beside=known), ground, amplitude, excess)
+        return Evidence(self._point, self._all.part(chosen), amplitude, excess)
 
     def climbed(self, chosen: Chosen, barred: Chosen = frozenset()) -> None:
         """Add to a set what helps most for as long as that pays."""
         at = self.state(chosen)
         while True:
-            log, further, amplitude = self._promising(at, chosen, barred)
+            log, more, amplitude = self._promising(at, chosen, barred)
             if log < at.log - HELD:
                 break
-            there = self._added(at, chosen, further, amplitude)
+            there = self._added(at, chosen, more, amplitude)
             reached = self.state(there)
             if reached.log <= at.log:
                 break
@@ -242,46 +220,24 @@ class _Sets:
         at, rest, barred = self.state(best), best - self.of(name), self.of(name)
         kept = [place for place, number in enumerate(sorted(best)) if number in rest]
         held = self._evidence(rest, at.amplitude[kept], at.excess)
-        log, further, amplitude = self._promising(held, rest, barred)
+        log, more, amplitude = self._promising(held, rest, barred)
         self.state(rest, dict(zip(sorted(rest), held.amplitude, strict=True)), at.excess)
         if log > at.log - HOPELESS:
-            self.climbed(self._added(held, rest, further, amplitude), barred)
+            self.climbed(self._added(held, rest, more, amplitude), barred)
 
-    def _added(self, at: Evidence, chosen: Chosen, further: int, amplitude: float) -> Chosen:
+    def _added(self, at: Evidence, chosen: Chosen, more: int, amplitude: float) -> Chosen:
         """Return what is there of a set with one group more."""
         known = dict(zip(sorted(chosen), at.amplitude.tolist(), strict=True))
-        both = chosen | {further}
-        reached = self.state(both, {**known, further: amplitude}, at.excess)
+        both = chosen | {more}
+        reached = self.state(both, {**known, more: amplitude}, at.excess)
         on = zip(sorted(both), reached.amplitude, strict=True)
         return frozenset(number for number, size in on if size > OFF)
 
     def _promising(self, at: Evidence, chosen: Chosen, barred: Chosen) -> tuple[float, int, float]:
         """Return which group adds most, all else held: log evidence, group and amplitude."""
-        absent = [n for n in range(len(self._all.groups)) if n not in chosen | barred]
         found = [(-np.inf, -1, 0.0)]
-        if not absent:
-            return found[0]
-        further, known = (
-            self._at(frozenset(absent)),
-            np.concatenate([self._named, self._at(chosen)]),
-        )
-        blocks = [self._gram[np.ix_(self._places[n], self._places[n])] for n in absent]
-        mixed = self._gram[np.ix_(known, further)]
-        scores = at.scores(mixed, self._gram[further, -1], blocks)
-        for n, (information, slope) in zip(absent, scores, strict=True):
-            gain, amplitude = _gain(information, slope, self._all.groups[n])
-            log = at.log + gain + (self._all.log_odds if n in self._optional else 0.0)
-            self._logs[chosen | {n}] = log
-            found.append((log, n, amplitude))
+        for number, (gain, amplitude) in further(at, self._all).items():
+            if number not in barred:
+                self._logs[chosen | {number}] = at.log + gain
+                found.append((at.log + gain, number, amplitude))
         return max(found)
-
-
-def _gain(information: Array, slope: Array, group: Group) -> tuple[float, float]:
-    """Return what a group adds to the log evidence at its best amplitude, and that."""
-    sizes, vectors = np.linalg.eigh(information)
-    along, sizes = (vectors.T @ slope) ** 2, np.maximum(sizes, 0.0)
-    squares = AMPLITUDES[:, None] ** 2
-    found = 0.5 * np.sum(squares * along / (1.0 + squares * sizes) - np.log1p(squares * sizes), 1)
-    found += [log_amplitude(float(each), group, len(slope)) for each in AMPLITUDES]
-    best = int(np.argmax(found))
-    return float(found[best]), float(AMPLITUDES[best])

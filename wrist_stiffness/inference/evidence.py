@@ -13,7 +13,7 @@ integrated (Laplace's method, exact where a law is linear).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -47,6 +47,9 @@ OFF = 1e-3
 LAST_STEPS = 3
 """Steps to the most probable unknowns where slopes hold everywhere; only the tails of the priors
 ask for more than one."""
+
+AMPLITUDES = np.geomspace(0.02, 1e4, 60)
+"""Sizes of a group, in scatters of a unit, among which the best is sought first."""
 
 MOST_STEPS, ENOUGH = 15, 0.1
 """Steps of the search for the amplitudes, and the gain of log evidence below which it ends."""
@@ -418,48 +421,113 @@ def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array
 
 def known_noise(point: Point, background: Background) -> Evidence:
     """Return a fitted set beside noise and drift as they are known, and nothing else."""
-    usual = np.array([each.expected or OFF for each in background.groups], dtype=float)
     exact = replace(point, inexact=OFF * point.inexact, _beside={})
-    return Evidence(exact, background, usual, 1.0)
+    return _usual(exact, background)
 
 
-def evidence(
-    point: Point, background: Background, near: Evidence | None = None, drop: bool = True
-) -> Evidence:
+def evidence(point: Point, background: Background, near: Evidence | None = None) -> Evidence:
     """Return a fitted set at the amplitudes of its largest evidence.
+
+    Groups of the discrepancy that do not pay are not there.
 
     Parameters
     ----------
     point : Point
         Where its fit ended.
     background : Background
-        Of the table.
+        Of the table; of a part no further groups are asked.
     near : Evidence, optional
-        Of a set like it: where the search for the amplitudes begins.
-    drop : bool
-        Whether groups of the discrepancy that do not pay are left out.
+        Of a set like it, beside the same background: where the search for the amplitudes begins.
     """
-    if near is None:
-        amplitude = np.array([each.expected or 1.0 for each in background.groups], dtype=float)
-        best = Evidence(point, background, amplitude, 1.0)
-    else:
-        # What is absent there may be there here.
-        best = Evidence(point, background, np.maximum(near.amplitude, 0.03), near.excess)
+    at = _usual(point, background) if near is None else settled(replace(near, point=point))
+    while background.whole is None:
+        asked = {n: size for n, (gain, size) in further(at, background).items() if gain > 0.0}
+        tried = _pruned(settled(_beside(at, {**_sizes(at), **asked}))) if asked else at
+        if tried.log < at.log + ENOUGH:
+            break
+        at = tried
+    at = _pruned(settled(at))
+    for _ in range(LAST_STEPS if point.linear else 0):
+        at = replace(at, point=at.point.moved(at.step))
+    return at
+
+
+def settled(at: Evidence) -> Evidence:
+    """Return a set at the best amplitudes of the groups that are there."""
     for _ in range(MOST_STEPS):
-        trial = _improved(best)
-        gained = trial.log - best.log
-        best = trial if gained > 0.0 else best
+        trial = _improved(at)
+        gained = trial.log - at.log
+        at = trial if gained > 0.0 else at
         if gained < ENOUGH:
             break
-    there = background.optional & (best.amplitude > OFF)
-    for number in np.flatnonzero(there) if drop else ():
-        amplitude = best.amplitude.copy()
-        amplitude[number] = OFF
-        absent = replace(best, amplitude=amplitude)
-        best = absent if absent.log > best.log else best
-    for _ in range(LAST_STEPS if point.linear else 0):
-        best = replace(best, point=best.point.moved(best.step))
-    return best
+    return at
+
+
+def further(at: Evidence, background: Background) -> dict[int, tuple[float, float]]:
+    """Return what groups that are not there would add, all else held.
+
+    Parameters
+    ----------
+    at : Evidence
+        Of a set beside a part of the background.
+    background : Background
+        The whole.
+
+    Returns
+    -------
+    dict of int to (float, float)
+        By the place of each absent group: gain of log evidence at its best amplitude, and that.
+    """
+    absent = background.part(set(range(len(background.groups))) - set(at.background.numbers))
+    if not absent.groups:
+        return {}
+    scores = at.scores(*at.point.scores(at.background, absent))
+    found = {}
+    for number, group, score in zip(absent.numbers, absent.groups, scores, strict=True):
+        gain, size = _group_gain(*score, group)
+        found[number] = gain + (0.0 if group.expected else background.log_odds), size
+    return found
+
+
+def _group_gain(information: Array, slope: Array, group: Group) -> tuple[float, float]:
+    """Return what a group adds to the log evidence at its best amplitude, and that."""
+    sizes, vectors = np.linalg.eigh(information)
+    along, sizes = (vectors.T @ slope) ** 2, np.maximum(sizes, 0.0)
+    squares = AMPLITUDES[:, None] ** 2
+    found = 0.5 * np.sum(squares * along / (1.0 + squares * sizes) - np.log1p(squares * sizes), 1)
+    found += [log_amplitude(float(each), group, len(slope)) for each in AMPLITUDES]
+    best = int(np.argmax(found))
+    return float(found[best]), float(AMPLITUDES[best])
+
+
+def _usual(point: Point, background: Background) -> Evidence:
+    drift = background.part(background.always)
+    return Evidence(point, drift, np.array([each.expected for each in drift.groups]), 1.0)
+
+
+def _sizes(at: Evidence) -> dict[int, float]:
+    """Return the amplitudes of the groups that are there by their places in the whole."""
+    return dict(zip(at.background.numbers, at.amplitude.tolist(), strict=True))
+
+
+def _beside(at: Evidence, sizes: Mapping[int, float]) -> Evidence:
+    """Return a set beside other groups of the whole, at these amplitudes."""
+    ground = (at.background.whole or at.background).part(sizes)
+    amplitude = np.array([sizes[number] for number in ground.numbers])
+    return replace(at, background=ground, amplitude=amplitude)
+
+
+def _pruned(at: Evidence) -> Evidence:
+    """Return a set without the groups of the discrepancy that do not pay."""
+    sizes = _sizes(at)
+    for number, group in zip(at.background.numbers, at.background.groups, strict=True):
+        if group.expected:
+            continue
+        absent = _beside(at, {n: size for n, size in sizes.items() if n != number})
+        if absent.log > at.log:
+            at = absent
+            del sizes[number]
+    return at
 
 
 def _improved(at: Evidence) -> Evidence:

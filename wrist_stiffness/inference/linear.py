@@ -171,6 +171,9 @@ class LinearProblem:
         """Return the candidates that are not in a set."""
         return [each for each in self._trials if each.name not in fit.terms]
 
+    def tangent(self, fit: LinearFit, ranked: Ranked) -> None:
+        """Return nothing: a whole fit costs no more."""
+
     def added(self, fit: LinearFit, ranked: Ranked) -> LinearFit | None:
         """Return the best fit with one effect more; None where its bounds leave nothing of it."""
         name = ranked.trial.name

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,16 +68,44 @@ class Background:
         Standard deviation of the logarithm of the noise's variance about the known one.
     asked : int
         Groups of the discrepancy that might have been there; 0 for those that are listed.
+    whole : Background, optional
+        Of which it is a part.
+    numbers : tuple of int
+        Places of its groups there.
     """
 
     groups: tuple[Group, ...]
     noise_width: float
     asked: int = 0
+    whole: Background | None = None
+    numbers: tuple[int, ...] = ()
+    _parts: dict[tuple[int, ...], Background] = field(default_factory=dict, repr=False)
+
+    def part(self, numbers: Iterable[int]) -> Background:
+        """Return some of the groups, by their places; what is known of all serves them too."""
+        key = tuple(sorted(numbers))
+        if key not in self._parts:
+            groups = tuple(self.groups[number] for number in key)
+            asked = self.asked or int(np.count_nonzero(self.optional))
+            self._parts[key] = Background(groups, self.noise_width, asked, self, key)
+        return self._parts[key]
+
+    @property
+    def always(self) -> frozenset[int]:
+        """Places of the groups that are always there: the drift."""
+        return frozenset(np.flatnonzero(~self.optional).tolist())
 
     @cached_property
     def columns(self) -> Array:
         """Columns of all groups, (N, q)."""
         return np.concatenate([each.columns for each in self.groups], axis=1)
+
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Places of the columns of a part in those of the whole, (q,)."""
+        if self.whole is None:
+            return np.arange(int(self.sizes.sum()))
+        return np.flatnonzero(np.isin(self.whole.group, self.numbers))
 
     @cached_property
     def group(self) -> NDArray[np.intp]:
@@ -104,6 +133,8 @@ class Background:
         """Products of all columns, (q, q)."""
         if not self.groups:
             return np.zeros((0, 0))
+        if self.whole is not None:
+            return self.whole.gram[np.ix_(self.places, self.places)]
         return np.asarray(self.columns.T @ self.columns)
 
 
@@ -142,7 +173,7 @@ class Point:
     varied: Mapping[str, Array] = field(default_factory=dict)
     linear: bool = False
     numbers: int = 0
-    _beside: dict[int, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+    _beside: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def count(self) -> int:
@@ -153,17 +184,65 @@ class Point:
         """Return the point a step (p,) further on, as the slopes tell."""
         return replace(self, left=self.left + self.columns @ step, z=self.z + step)
 
+    def with_effect(
+        self, name: str, left: Array, columns: Array, z: Array, varied: Array, inexactness: float
+    ) -> Point:
+        """Return the point with one effect more, everything followed to first order.
+
+        Parameters
+        ----------
+        name : str
+            Of the effect.
+        left : (N,) float
+            What is left with it, whitened.
+        columns : (N, k) float
+            Change of that by its unknowns.
+        z : (k,) float
+            These.
+        varied : (N, l) float
+            What it would add if its size changed with the conditions by its own size.
+        inexactness : float
+            Share of that by which its law may be wrong.
+        """
+        places = np.arange(len(self.z), len(self.z) + len(z))
+        return replace(
+            self,
+            left=left,
+            columns=np.hstack([self.columns, columns]),
+            z=np.concatenate([self.z, z]),
+            weight=np.concatenate([self.weight, np.ones(len(z))]),
+            effects={**self.effects, name: places},
+            inexact=np.hstack([self.inexact, inexactness * varied]),
+            varied={**self.varied, name: varied},
+            linear=True,
+            _beside={},
+        )
+
     def beside(self, ground: Background) -> tuple[Array, Array]:
         """Return all columns, those of a background last, and their products; worked out once."""
         if id(ground) not in self._beside:
             named = np.concatenate([self.columns, self.inexact], axis=1)
             beside = ground.columns if ground.groups else named[:, :0]
             columns = np.concatenate([named, beside], axis=1)
-            own = named.shape[1]
-            gram = np.empty((columns.shape[1], columns.shape[1]))
-            gram[:own, :own] = named.T @ named
-            gram[:own, own:] = named.T @ beside
-            gram[own:, :own] = gram[:own, own:].T
-            gram[own:, own:] = ground.gram
+            mixed = self._with(ground)
+            gram = np.block([[named.T @ named, mixed], [mixed.T, ground.gram]])
             self._beside[id(ground)] = columns, gram
-        return self._beside[id(ground)]
+        known: tuple[Array, Array] = self._beside[id(ground)]
+        return known
+
+    def scores(self, there: Background, absent: Background) -> tuple[Array, Array, list[Array]]:
+        """Return what `Evidence.scores` takes of groups that are not there."""
+        whole = absent.whole or absent
+        mixed = np.vstack([self._with(absent), whole.gram[np.ix_(there.places, absent.places)]])
+        blocks = [each.columns.T @ each.columns for each in absent.groups]
+        return mixed, absent.columns.T @ self.left, blocks
+
+    def _with(self, ground: Background) -> Array:
+        """Return the products of the set's columns with those of a background, (p + l, q)."""
+        whole = ground if ground.whole is None else ground.whole
+        key = "mixed", id(whole)
+        if key not in self._beside:
+            named = np.concatenate([self.columns, self.inexact], axis=1)
+            beside = whole.columns if whole.groups else named[:, :0]
+            self._beside[key] = named.T @ beside
+        return np.asarray(self._beside[key][:, ground.places])

@@ -23,16 +23,10 @@ LEADERS = 6
 NEGLIGIBLE = 3.0
 """Log odds against a set, beside the best one so far, below which it is not fitted: 1 in 20."""
 
-CLOSE = 0.6
-"""Share of the gain to first order that the best fit kept, below which a candidate whose slopes
-show what it does is not fitted; and none at all once a fit leaves no more than noise."""
-
-FALLS = 0.8
-"""Share of what was left before that an effect may leave if the search is to go on beside it: what
-explains less than a fifth stands in for something that nobody named."""
-
 MOST_EFFECTS = 3
-"""Effects of a set: more are hardly told apart in one recording."""
+"""Effects of a set: more are hardly told apart in one recording.  If all of n more are in the
+catalogue, the largest explains an nth of what is left; where the best candidate explains less, the
+search does not go on beside it."""
 
 MOST_FITS = 48
 """Whole fits of a search; most end after a dozen."""
@@ -107,6 +101,9 @@ class Problem(Protocol):
     def trials(self, fit: Any) -> Sequence[Trial]:
         """Return the candidates about a fit."""
 
+    def tangent(self, fit: Any, ranked: Ranked) -> Point | None:
+        """Return the fit with one effect more to first order; None where only a fit can tell."""
+
     def added(self, fit: Any, ranked: Ranked) -> Any:
         """Return the best fit with one effect more."""
 
@@ -156,14 +153,13 @@ class Search:
         Told what is being done.
     most_effects : int, optional
         Most effects of a set.
-    falls : float, optional
-        Share of what was left that an effect may leave if the search is to go on beside it;
-        infinite where fits cost so little that it always may.
+    costly : bool, optional
+        Whether a whole fit costs so much that few are made.
 
     Attributes
     ----------
     promised : dict of str to float
-        Log evidence that each candidate has to first order beside the nominal model.
+        Log evidence that each candidate adds to the nominal model's, to first order.
     strength : dict of str to float
         Standard deviations that a typical size of each would leave beside it.
     in_time : bool
@@ -176,16 +172,16 @@ class Search:
         seconds: float = np.inf,
         tell: Callable[[str], None] = lambda text: None,
         most_effects: int = MOST_EFFECTS,
-        falls: float = FALLS,
+        costly: bool = True,
     ) -> None:
         self._problem, self._tell, self._most = problem, tell, most_effects
-        self._falls, self._costly = falls, falls < np.inf
+        self._costly = costly
         self._end = time.monotonic() + seconds
         self.states: dict[Names, State] = {}
         self.promised: dict[str, float] = {}
         self.strength: dict[str, float] = {}
         self.in_time = True
-        self._grown_from: dict[Names, State] = {}
+        self._asked: dict[Names, tuple[float, dict[str, float]]] = {}
         self._fits = 0
         self._catalogue = 0
         tell("fitting the nominal model with its tolerances")
@@ -197,12 +193,27 @@ class Search:
         for _ in range(self._most):
             for name in sorted(best.names):
                 less = self._less(best, name)
-                if self._grown_from.get(less.names) is not less:
+                if self._may_lead_further(less, best):
                     self._grown(less, best.names)
             better = self.best
             if better.log <= best.log:
                 break
             best = self._deepened(better)
+
+    def _may_lead_further(self, less: State, best: State) -> bool:
+        """Tell whether something else in place of an effect might be as probable as the best set.
+
+        Known already of a set that was asked before, but for what its fit has gained since then.
+        """
+        if less.names not in self._asked:
+            return True
+        before, logs = self._asked[less.names]
+        others = [log for name, log in logs.items() if name not in best.names]
+        hope = max(others, default=-np.inf) + less.evidence.log - before
+        return (
+            hope - self.price * len(best.names) > best.log - NEGLIGIBLE
+            and less.evidence.log > before
+        )
 
     @property
     def price(self) -> float:
@@ -224,7 +235,8 @@ class Search:
             # Those that cannot be told apart share what one of them would gain.
             if np.logaddexp.reduce([each.log for each in found]) <= state.log:
                 break
-            fell = best.evidence.unexplained < self._falls * state.evidence.unexplained
+            more = self._most - len(state.names)
+            fell = best.evidence.unexplained < (1.0 - 1.0 / more) * state.evidence.unexplained
             state = best
             if self._costly and not (fell and best.rough):
                 break
@@ -233,7 +245,6 @@ class Search:
     def _grown(self, state: State, not_again: Collection[str] = ()) -> list[State]:
         """Return the sets with one effect more that were worth a fit."""
         self._tell(f"asking every candidate{_beside(state.names)}")
-        self._grown_from[state.names] = state
         trials = [each for each in self._problem.trials(state.fit) if each.name not in not_again]
         self._catalogue = max(self._catalogue, len(trials) + len(state.names))
         as_noise = ranked(state.evidence.without_discrepancy(), trials)
@@ -246,30 +257,53 @@ class Search:
             self.promised = {}
             for each in (*beyond, *as_noise):
                 known = self.promised.get(each.trial.name, -np.inf)
-                self.promised[each.trial.name] = max(known, state.evidence.log + each.gain)
-        chosen = self._worth_a_fit(state, as_noise, beyond)
+                self.promised[each.trial.name] = max(known, each.gain)
         found: list[State] = []
-        settled, kept = False, 0.0
-        for each in chosen:
+        best, reach = state.evidence.log + self.price, 0.0
+        nearest = self._nearest(state, self._worth_a_fit(state, as_noise, beyond))
+        logs = {each.trial.name: log for log, each in nearest}
+        self._asked[state.names] = state.evidence.log, logs
+        for log, each in nearest:
             if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
                 self.in_time = False
                 break
-            self._fits += 1
-            far_behind = each.gain < CLOSE * kept
-            if far_behind and (settled or (each.trial.smooth and self._costly)):
+            if log + reach < best - NEGLIGIBLE:
                 continue
+            self._fits += 1
             self._tell(f"fitting {each.trial.name}{_beside(state.names)}")
             fit = self._problem.added(state.fit, each)
             if fit is None:
+                logs[each.trial.name] = -np.inf
                 if not state.names:
                     # What slopes promised, no fit allows.
-                    self.promised[each.trial.name] = state.evidence.log
+                    self.promised[each.trial.name] = 0.0
                 continue
             found.append(self._known(fit, state))
-            # Slopes may promise more than a fit keeps.
-            kept = max(kept, min(each.gain, found[-1].evidence.log - state.evidence.log))
-            settled = settled or not found[-1].rough
+            logs[each.trial.name] = found[-1].evidence.log
+            best = max(best, logs[each.trial.name])
+            # Whole fits may reach further than their first order, all of them alike.
+            reach = max(reach, logs[each.trial.name] - log) if log < np.inf else reach
         return found
+
+    def _nearest(self, state: State, chosen: Sequence[Ranked]) -> list[tuple[float, Ranked]]:
+        """Return candidates with their evidence to first order, largest first.
+
+        Everything follows them, amplitudes included; infinite where only a whole fit can tell.
+        """
+        found: list[tuple[float, Ranked]] = []
+        for each in chosen:
+            if time.monotonic() > self._end:
+                self.in_time = False
+                break
+            point = self._problem.tangent(state.fit, each)
+            log = np.inf
+            if point is not None:
+                log = evidence(point, self._problem.background, state.evidence).log
+                log -= _of_shape(each.shape, point)
+                if not state.names:
+                    self.promised[each.trial.name] = log - state.evidence.log
+            found.append((log, each))
+        return sorted(found, key=lambda pair: -pair[0])
 
     def _worth_a_fit(
         self, state: State, as_noise: Sequence[Ranked], beyond: Sequence[Ranked]
@@ -311,6 +345,11 @@ def _beside(names: Collection[str]) -> str:
     return f" beside {', '.join(sorted(names))}" if names else ""
 
 
+def _of_shape(shape: tuple[float, ...], point: Point) -> float:
+    """Return what a shape costs that was chosen among others (Schwarz 1978)."""
+    return 0.5 * len(shape) * float(np.log(len(point.left)))
+
+
 def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     """Return what each trial gains at its best shape, largest first."""
     flat = [(each, shape, columns) for each in trials for shape, columns in each.blocks]
@@ -318,10 +357,8 @@ def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     if not flat:
         return []
     gains = at.gains([columns for _, _, columns in flat])
-    rows = len(at.point.left)
     for (trial, shape, _), (gain, z) in zip(flat, gains, strict=True):
-        # The shape was chosen among others (Schwarz 1978).
-        gain -= 0.5 * len(shape) * float(np.log(rows))
+        gain -= _of_shape(shape, at.point)
         if trial.name not in best or best[trial.name].gain < gain:
             best[trial.name] = Ranked(trial, gain, shape, z)
     return sorted(best.values(), key=lambda each: -each.gain)

@@ -126,7 +126,7 @@ def diagnose(
     seen = whole.take(~aside) if aside.any() else whole
     tell("looking at the table")
     problem = linear_problem(seen, candidates, nuisances, ordered)
-    search = Search(problem, seconds, tell, MOST_EFFECTS, np.inf)
+    search = Search(problem, seconds, tell, MOST_EFFECTS, costly=False)
     search.run()
     reading = read(search, naming)
     tell("judging by what was held out")
