@@ -107,7 +107,7 @@ class BaseFit:
     def of_base(self) -> Mask:
         """Which unknowns belong to the base, (p,) bool."""
         usual = len(self.bare.free)
-        return np.array([unknown.free < usual for unknown in self.problem.unknowns])
+        return np.array([unknown.free < usual for unknown in self.problem.unknowns], dtype=bool)
 
     def beyond(self) -> dict[str, Effect]:
         """Return the extras by their names, of those on top of the base only what is on top."""
@@ -384,7 +384,7 @@ def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effec
 
 def _near(problem: FitProblem, start: BaseFit, usual: int) -> Array:
     """Return the columns of the base where another fit ended, (u, 6, p); those of effects as 0."""
-    own = np.array([unknown.free < usual for unknown in problem.unknowns])
+    own = np.array([unknown.free < usual for unknown in problem.unknowns], dtype=bool)
     columns = np.zeros((*problem.table.values.shape, len(own)))
     columns[:, :, own] = start.columns[:, :, start.of_base]
     return columns

@@ -225,6 +225,7 @@ class _Judged:
         if len(whole) > len(nominal.problem.sessions):
             nominal, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
         self._model, self._judge = model, Judge(nominal)
+        self._near: BaseFit = reading.state.fit.base
         self.scope = self._judge.by
         effects = list(reading.state.fit.base.beyond().values())
         self.stages = [self._left(effects[:count]) for count in range(len(effects) + 1)]
@@ -232,7 +233,9 @@ class _Judged:
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""
         judge = self._judge
-        return judge.left(fit_base(self._model, judge.parts.seen, effects, judge.whole))
+        # A pin that rests where it does leads back there; from the nominal model it may not.
+        near = self._near if effects else judge.whole
+        return judge.left(fit_base(self._model, judge.parts.seen, effects, near))
 
     def kept(self, search: Search, reading: Reading) -> Reading:
         """Return a reading without what makes the held-out part worse: it is not handed over."""

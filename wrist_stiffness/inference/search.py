@@ -250,40 +250,50 @@ class Search:
         as_noise = ranked(state.evidence.without_discrepancy(), trials)
         beyond = ranked(state.evidence, trials)
         if not state.names:
-            strength = state.evidence.strength
-            self.strength = {
-                each.name: max(strength(columns) for _, columns in each.blocks) for each in trials
-            }
-            self.promised = {}
-            for each in (*beyond, *as_noise):
-                known = self.promised.get(each.trial.name, -np.inf)
-                self.promised[each.trial.name] = max(known, each.gain)
+            self._promise(state, trials, (*beyond, *as_noise))
+        leaders = self._leaders(as_noise, beyond)
+        others = _one_of_each_law(as_noise, leaders) if state.rough else []
         found: list[State] = []
-        best, reach = state.evidence.log + self.price, 0.0
-        nearest = self._nearest(state, self._worth_a_fit(state, as_noise, beyond))
-        logs = {each.trial.name: log for log, each in nearest}
+        logs: dict[str, float] = {}
         self._asked[state.names] = state.evidence.log, logs
-        for log, each in nearest:
-            if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
-                self.in_time = False
+        best, reach = state.evidence.log + self.price, 0.0
+        for asked in (leaders, others):
+            if not all(each.rough for each in found):
                 break
-            if log + reach < best - NEGLIGIBLE:
-                continue
-            self._fits += 1
-            self._tell(f"fitting {each.trial.name}{_beside(state.names)}")
-            fit = self._problem.added(state.fit, each)
-            if fit is None:
-                logs[each.trial.name] = -np.inf
-                if not state.names:
-                    # What slopes promised, no fit allows.
-                    self.promised[each.trial.name] = 0.0
-                continue
-            found.append(self._known(fit, state))
-            logs[each.trial.name] = found[-1].evidence.log
-            best = max(best, logs[each.trial.name])
-            # Whole fits may reach further than their first order, all of them alike.
-            reach = max(reach, logs[each.trial.name] - log) if log < np.inf else reach
+            for log, each in self._nearest(state, asked):
+                name = each.trial.name
+                logs[name] = log
+                if log + reach < best - NEGLIGIBLE:
+                    continue
+                if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
+                    self.in_time = False
+                    break
+                self._fits += 1
+                self._tell(f"fitting {name}{_beside(state.names)}")
+                fit = self._problem.added(state.fit, each)
+                if fit is None:
+                    logs[name] = -np.inf
+                    if not state.names:
+                        # What slopes promised, no fit allows.
+                        self.promised[name] = 0.0
+                    continue
+                found.append(self._known(fit, state))
+                logs[name] = found[-1].evidence.log
+                best = max(best, logs[name])
+                # Whole fits may reach further than their first order, all of them alike.
+                reach = max(reach, logs[name] - log) if log < np.inf else reach
         return found
+
+    def _promise(self, base: State, trials: Sequence[Trial], ranking: Sequence[Ranked]) -> None:
+        """Note what each candidate adds beside the nominal model, and how much of it would show."""
+        strength = base.evidence.strength
+        self.strength = {
+            each.name: max(strength(columns) for _, columns in each.blocks) for each in trials
+        }
+        self.promised = {}
+        for each in ranking:
+            known = self.promised.get(each.trial.name, -np.inf)
+            self.promised[each.trial.name] = max(known, each.gain)
 
     def _nearest(self, state: State, chosen: Sequence[Ranked]) -> list[tuple[float, Ranked]]:
         """Return candidates with their evidence to first order, largest first.
@@ -305,25 +315,15 @@ class Search:
             found.append((log, each))
         return sorted(found, key=lambda pair: -pair[0])
 
-    def _worth_a_fit(
-        self, state: State, as_noise: Sequence[Ranked], beyond: Sequence[Ranked]
-    ) -> list[Ranked]:
+    def _leaders(self, *rankings: Sequence[Ranked]) -> list[Ranked]:
+        """Return the first ones of some rankings that are not negligible, largest first."""
         chosen: dict[str, Ranked] = {}
         least = self.price - NEGLIGIBLE
-        for ranking in (as_noise, beyond):
-            for each in ranking[:LEADERS]:
-                known = chosen.get(each.trial.name)
-                if each.gain > least and (known is None or known.gain < each.gain):
-                    chosen[each.trial.name] = each
-        found = sorted(chosen.values(), key=lambda each: -each.gain)
-        if state.rough:
-            laws = set()
-            for each in as_noise:
-                law = each.trial.name.partition("@")[0]
-                if not each.trial.smooth and law not in laws:
-                    laws.add(law)
-                    found += [each] if each.trial.name not in chosen else []
-        return found
+        for each in (each for ranking in rankings for each in ranking[:LEADERS]):
+            known = chosen.get(each.trial.name)
+            if each.gain > least and (known is None or known.gain < each.gain):
+                chosen[each.trial.name] = each
+        return sorted(chosen.values(), key=lambda each: -each.gain)
 
     def _less(self, state: State, name: str) -> State:
         """Return the set with one effect less, fitted from where this one ended."""
@@ -343,6 +343,16 @@ class Search:
 
 def _beside(names: Collection[str]) -> str:
     return f" beside {', '.join(sorted(names))}" if names else ""
+
+
+def _one_of_each_law(ranking: Sequence[Ranked], but: Sequence[Ranked]) -> list[Ranked]:
+    """Return the first place of each law whose slopes do not show what it does, but for some."""
+    laws: dict[str, Ranked] = {}
+    for each in ranking:
+        if not each.trial.smooth:
+            laws.setdefault(each.trial.name.partition("@")[0], each)
+    known = {each.trial.name for each in but}
+    return [each for each in laws.values() if each.trial.name not in known]
 
 
 def _of_shape(shape: tuple[float, ...], point: Point) -> float:
