@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.export_csv import export_csv
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
@@ -232,6 +233,9 @@ def changed(row, column, value):
         (table_of(",x_mm", lambda i: ',"' + "1" * 200_000 + '"'), "row 2: field larger than"),
         (f"{MACHINE},{'x' * 200_000}", "row 1 has more than 131072 characters"),
         (changed(1, "x_mm", "x_m"), "column x_m is neither of the load nor of the pose.*x_mm"),
+        (changed(1, "x_mm", "x_in"), "column x_in is neither of the load nor.*check its unit"),
+        (changed(1, "fz_N", "fz_lbf"), "column fz_N of the load is missing"),
+        (changed(1, "time_s", "time_ms"), r"column time_s is missing \(found: time_ms"),
         (changed(1, "z_mm", "Z_mm"), "column Z_mm is neither of the load nor of the pose"),
         (changed(1, "spindle_1", "fx_kN"), "column fx_kN is neither of the load nor of the pose"),
         (changed(7, "time_s", "1e9"), r"row 7, column time_s: 1e9 s is a stamp outside 0 to 21474"),
@@ -245,6 +249,15 @@ def test_a_wrong_table_is_one_error_with_its_place(tmp_path, text, reason):
         import_csv(written(tmp_path / "in.csv", text), tmp_path / "bag")
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.parametrize(("factor", "asked"), [(1, False), (1000, True)])
+def test_times_in_ms_are_asked_about(tmp_path, capsys, factor, asked):
+    rows = [f"{30 * i * factor},0,{i},0.1" for i in range(6)]
+    text = "\n".join(["time_s,motor_1_deg,motor_2_deg,z_mm", *rows, ""])
+    path = written(tmp_path / "in.csv", text)
+    assert main(["import", str(path), "-o", str(tmp_path / "bag"), "--unloaded"]) == 0
+    assert ("are the times in ms?" in capsys.readouterr().out) is asked
 
 
 def test_a_table_that_is_no_text_is_said(tmp_path):

@@ -10,6 +10,7 @@ from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
@@ -17,6 +18,8 @@ from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.gauges import Gauge
 from wrist_stiffness.sessions.observing import observe, without_mounting
 from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 
 UP = np.array([0.0, 0.0, 1.0])
 NONE = np.zeros(3)
@@ -63,12 +66,18 @@ def readings_of(model, block, gauges=GAUGES, zeros=ZEROS, seed=3):
 def imported(folder, block, readings, header="a_um,b_um,c_um,d_um,e_um,level_mdeg"):
     """Return the recording of the table that a technician would have written."""
     cells = np.column_stack(
-        [block.time, np.degrees(block.theta), block.load, np.round(readings * PER_SI, 2)]
+        [
+            block.time,
+            np.degrees(block.theta),
+            block.load,
+            np.round(readings * PER_SI[: readings.shape[1]], 2),
+        ]
     )
     table, gauges = folder / "gauges.csv", folder / "gauges.yaml"
     lines = (",".join(f"{cell:.10g}" for cell in row) for row in cells)
     table.write_text("\n".join([f"{SETTINGS},{header}", *lines, ""]))
-    gauges.write_text(GAUGES_YAML)
+    described = GAUGES_YAML.splitlines(keepends=True)
+    gauges.write_text("".join(described[: 2 + readings.shape[1]]))
     return import_csv(table, folder / "bag.mcap", gauges_file=gauges).path
 
 
@@ -189,6 +198,31 @@ def test_a_soft_link_is_calibrated_with_gauges(tmp_path, model, table):
     assert abs(own.value - 60.0) < 4.0 * own.sigma
     assert own.sigma < 15.0
     assert found.after["gauges_um"] < 0.5 * found.before["gauges_um"]
+
+
+@pytest.mark.slow
+def test_five_gauges_name_the_backlash_of_a_virtual_wrist_and_its_size(tmp_path, model, table):
+    """The cell knows nothing of the model's laws, its wrist deviates within its tolerances."""
+    hidden = HiddenEffect("backlash", "motor_2", "single", 1e-3, 5)
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=60.0, program_seed=41, hidden=(hidden,), base="wrong"
+    )
+    cell = VirtualCell(table, settings, np.random.default_rng(3))
+    time = 0.1 * np.arange(600)
+    sample = cell.run(time, cell.desired(time))
+    five = GAUGES[:5]
+    own = [each.reading(sample.pose_shift, sample.pose_rotation, UP) for each in five]
+    noise = NOISE[:5] * np.random.default_rng(1).normal(size=(600, 5))
+    readings = np.stack(own, axis=1) + ZEROS[:5] + noise
+    block = Block(time, sample.encoder, sample.wrench)
+    path = imported(tmp_path, block, readings, "a_um,b_um,c_um,d_um,e_um")
+    found = diagnose_sessions(model, [read_session(path, table)]).diagnosis
+    assert [each.name for each in found.findings] == ["backlash@motor_2"]
+    value, sigma = found.findings[0].parameters["width_mdeg"]
+    assert abs(value - np.degrees(1e-3) * 1e3) < 3.0 * sigma
+    assert sigma < 6.0
+    assert found.after["gauges_um"] < 1.3 * found.noise["gauges_um"]
+    assert found.before["gauges_um"] > 3.0 * found.after["gauges_um"]
 
 
 @pytest.mark.parametrize(
