@@ -85,7 +85,7 @@ def test_rounded_walls_lead_past_the_pins_that_turn_over(model, in_the_cell):
     )
     settings = CellSettings(
         rate_hz=10.0,
-        program_seconds=40.0,
+        program_seconds=20.0,
         program_seed=101,
         base="wrong",
         base_seed=1003,
