@@ -314,4 +314,6 @@ def explain(
     white = table.whiten(left.values)
     prior = np.ones(len(z)) if prior is None else prior
     point = Point(white, table.whiten(columns), z, prior, {}, np.zeros((len(white), 0)))
-    return Explained(left, table, point, columns, weights)
+    # What is shown lacks what a mounting of gauges does; the point knows of it by its whitening.
+    shown = left.with_values(without_mounting(left, left.values))
+    return Explained(shown, table, point, without_mounting(left, columns), weights)
