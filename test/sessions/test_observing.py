@@ -12,7 +12,7 @@ from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.hidden_counts import counts_known
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.observing import observe, predict_units
 from wrist_stiffness.sessions.unit_session import as_units
 
 POSES_DEG = ((0, 0), (20, 10), (-15, 25), (20, 10))
@@ -48,6 +48,21 @@ def test_the_residual_is_the_twist_between_measured_and_predicted(model, session
     values = observe(model, [session]).observations.values
     # Both are means over the same moments; turns do not add up beyond the first order.
     assert values == pytest.approx(np.tile(ADDED, (len(values), 1)), abs=1e-9)
+
+
+def test_a_few_of_the_units_are_the_same_on_the_same_path(model, session):
+    whole = as_units(model, session)
+    few = whole.thinned(3)
+    times, own = (each.mean(each.block.time) for each in (whole, few))
+    rows = np.searchsorted(times, own)
+    measured = np.flatnonzero(whole.measured)
+    assert (rows[0], len(rows), rows[-1]) == (measured[0], 3, measured[-1])
+    np.testing.assert_array_equal(times[rows], own)
+    for name in ("shift", "turn", "samples"):
+        np.testing.assert_array_equal(getattr(few, name), getattr(whole, name)[rows])
+    assert few.block is whole.block
+    assert predict_units(model, few).tolist() == predict_units(model, whole)[rows].tolist()
+    assert whole.thinned(len(whole)) is whole
 
 
 def test_one_dial_gauge_gives_one_component(model, session):

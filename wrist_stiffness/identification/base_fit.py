@@ -42,6 +42,10 @@ ENOUGH, NEARLY = 3e-3, 3e-2
 
 SMALLEST_STEP = 1.0 / 16.0
 
+BEGUN_WITH = 60
+"""Measured units of each session, evenly spread, with which a fit begins: registrations are far off
+at first, and few units bring them near."""
+
 MOST_CLEANINGS = 3
 """Fits after which lost beams are looked for."""
 
@@ -234,7 +238,7 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     int
         How many there were.
     """
-    z, total = np.zeros(len(problem.unknowns)) if start is None else start, 0
+    z, total = _begun(problem) if start is None else start, 0
     usual = len(problem.free)
     z, residual, columns, arrived = _descended(problem, problem, z, usual)
     for _ in range(MOST_CLEANINGS):
@@ -251,6 +255,12 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
         z, residual, columns, arrived = _descended(problem, problem, z, usual, near=known)
     cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
     return BaseFit(problem, z, residual, (), cost, problem, problem, arrived, columns), total
+
+
+def _begun(problem: FitProblem) -> Array:
+    """Return where a fit to a few units of each session ends, from the means of the priors."""
+    few = replace(problem, sessions=tuple(each.thinned(BEGUN_WITH) for each in problem.sessions))
+    return _descended(few, few, np.zeros(len(few.unknowns)), len(few.free), NEARLY)[0]
 
 
 def _lost(table: Observations, columns: Array) -> Mask:

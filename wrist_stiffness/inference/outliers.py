@@ -8,7 +8,8 @@ from wrist_stiffness.inference.projection import leading_directions
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
 
-ROUNDS = 15
+ROUNDS, SETTLED = 15, 1e-3
+"""Rounds at most, and the change of every unit's weight below which they end."""
 
 LEAST = 1e-3
 """Directions weaker than this share of the strongest could follow a single lost beam."""
@@ -67,5 +68,7 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> Mask
         residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
         scaled = np.where(measured, residual / robust_scale(residual), 0.0)
         distance = np.sqrt(np.sum(scaled**2, axis=1) / np.maximum(measured.sum(axis=1), 1))
-        weight = np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
+        before, weight = weight, np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
+        if np.abs(weight - before).max() < SETTLED:
+            break
     return distance > limit

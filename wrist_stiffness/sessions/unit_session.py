@@ -186,6 +186,22 @@ class UnitSession:
         """
         return {}
 
+    def thinned(self, most: int) -> UnitSession:
+        """Return the session with at most so many of its measured units, evenly spread."""
+        rows = np.flatnonzero(self.measured)
+        if len(rows) <= most:
+            return self
+        own = rows[np.linspace(0, len(rows) - 1, most).astype(int)]
+        return replace(
+            self,
+            cut=self.cut.of_units(own),
+            shift=self.shift[own],
+            turn=self.turn[own],
+            samples=self.samples[own],
+            readings=self.readings and replace(self.readings, values=self.readings.values[own]),
+            rigid=None if self.rigid is None else self.rigid[own],
+        )
+
     def mean(self, values: Array) -> Array:
         """Return the means over units (u, ...) of values at the kept moments (k, ...)."""
         flat = values.reshape(len(values), -1)

@@ -105,6 +105,13 @@ class Cut:
             mean_speed=self.mean_speed[used],
         )
 
+    def of_units(self, chosen: Labels) -> Cut:
+        """Return some of the units (c,) in their order; moments of the others tell the path."""
+        number = np.full(len(self.dwell) + 1, -1)
+        number[chosen] = np.arange(len(chosen))
+        label, unit = number[self.label], number[self.unit]
+        return replace(self, label=label, dwell=self.dwell[chosen], unit=unit)
+
 
 def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     """Find the units of a session, at a cost linear in its samples.

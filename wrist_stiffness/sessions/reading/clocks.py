@@ -23,6 +23,10 @@ STEPS = 1200
 
 STAMPS_USED = 1000
 
+SCANNED, LIKELY = 200, 100
+"""Of these stamps, evenly spread, so many try every offset; the offsets that suit them best are
+tried with all."""
+
 SPAN_S = 0.3
 """Time over which the turned angle is taken; long enough to stand out of a tracker's noise [s]."""
 
@@ -102,7 +106,9 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
         return float(np.mean((turned[rows][inside] - _angle(*at)) ** 2))
 
     tried = np.linspace(-SEARCHED_S, SEARCHED_S, 2 * STEPS + 1)
-    best = float(tried[np.argmin([misfit(offset) for offset in tried])])
+    scan = slice(None, None, -(-len(first) // SCANNED))
+    likely = tried[np.argsort([misfit(offset, scan) for offset in tried])[:LIKELY]]
+    best = float(likely[np.argmin([misfit(offset) for offset in likely])])
     if not np.isfinite(misfit(best)):
         return None
     step = SEARCHED_S / STEPS
