@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import wrist_stiffness.analysis as analysis_module
 from wrist_stiffness.analysis import Analysis, Cancelled
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
@@ -38,8 +39,22 @@ def sessions(model):
     return found
 
 
+@pytest.fixture
+def fitted(monkeypatch):
+    """Problems whose base was fitted."""
+    found = []
+
+    class Counted(analysis_module.WristProblem):
+        def __init__(self, *told):
+            found.append(self)
+            super().__init__(*told)
+
+    monkeypatch.setattr(analysis_module, "WristProblem", Counted)
+    return found
+
+
 @pytest.mark.slow
-def test_the_error_falls_with_what_is_found_and_added(model, sessions):
+def test_the_error_falls_with_what_is_found_and_added(model, sessions, fitted):
     heard = []
     analysis = Analysis(model, sessions, tell=heard.append)
     assert analysis.versions[0].held_out["s_um"] > 100.0
@@ -53,19 +68,27 @@ def test_the_error_falls_with_what_is_found_and_added(model, sessions):
     assert seen.log_gain > wrong.log_gain + 20.0
     before, after = seen.explains["phi_mdeg"]
     assert after < 0.7 * before
-    assert seen.change.shape == analysis.residual.values.shape
+    # What a calibration found of the base is no knowledge: no fit is made anew for it.
+    assert len(fitted) == 1
     # A preview adds nothing.
     assert [each.name for each in analysis.versions] == ["as given", "calibrated"]
     added = analysis.add(PLAY)
     assert added.held_out["phi_mdeg"] < 0.7 * calibrated.held_out["phi_mdeg"]
     assert added.added.estimates["width_mdeg"].value == pytest.approx(60.0, rel=0.15)
     assert PLAY in {each.name for each in analysis.model.effects}
+    assert len(fitted) == 1
     compared = analysis.compare()
     errors = [each.after["phi_mdeg"].rms for each in compared.models]
     assert errors[2] < 0.7 * errors[1]
     with pytest.raises(InputError, match="the model has it already"):
         analysis.add(PLAY)
     assert len(analysis.versions) == 3
+    # Another model is asked anew, and the one before it as it was.
+    beside = analysis.preview("backlash@motor_1")
+    assert len(fitted) == 2
+    assert beside.log_gain < wrong.log_gain - 5.0
+    views = [analysis.view(number) for number in range(3)]
+    assert len({each.left.values.shape for each in views} | {seen.change.shape}) == 1
     before, after = analysis.view(1), analysis.view()
     turned = [np.sqrt(np.nanmean(each.left.values[:, 3:] ** 2)) for each in (before, after)]
     assert turned[1] < 0.3 * turned[0]
@@ -74,6 +97,8 @@ def test_the_error_falls_with_what_is_found_and_added(model, sessions):
     assert after.noise["phi_mdeg"] == pytest.approx(5.0, rel=0.2)
     assert analysis.undo() is calibrated
     assert analysis.model is calibrated.model
+    assert analysis.preview("backlash@motor_1").log_gain == wrong.log_gain
+    assert len(fitted) == 2
 
 
 def test_contents_say_what_a_recording_holds(model, sessions):
@@ -108,7 +133,7 @@ def test_wrong_use_is_one_clear_line(model, sessions):
     analysis = Analysis(model, sessions[:1])
     with pytest.raises(InputError, match="nothing to undo"):
         analysis.undo()
-    with pytest.raises(InputError, match="write law@component"):
+    with pytest.raises(InputError, match="write NAME@COMPONENT"):
         analysis.preview("backlash")
     with pytest.raises(IndexError):
         analysis.view(1)

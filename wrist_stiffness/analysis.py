@@ -17,20 +17,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Event
+from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.comparison import Comparison
 from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.identification.base_fit import BaseFit, free_base
 from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.result import Fit
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
+from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.observations import Observations
@@ -38,11 +42,12 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.lineage import Step
-from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.planning.earlier import as_experiment
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.planning.question import between
 from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.contents import Contents, contents_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import as_units
@@ -127,42 +132,6 @@ class View:
         return np.asarray(self.left.values + self.predicted)
 
 
-@dataclass(frozen=True, eq=False)
-class Contents:
-    """What one recording holds.
-
-    Parameters
-    ----------
-    name, instrument : str
-        Of the recording, and of its pose sensor.
-    duration_s, rate_hz : float
-        Duration [s], and measured poses in a second [Hz].
-    measured, dwells : int
-        Measured poses, and poses that were held.
-    angles : (2, 2) float
-        Lowest and highest angle of each motor [rad].
-    speed, force : (float, float)
-        Lowest and highest [rad/s], [N].
-    signals : tuple of str
-        What was recorded beside angles, load and pose.
-    registered : dict of str to float
-        Remaining error once it is known where instrument and target stand, RMS by the key of the
-        quantity.
-    """
-
-    name: str
-    instrument: str
-    duration_s: float
-    rate_hz: float
-    measured: int
-    dwells: int
-    angles: Array
-    speed: tuple[float, float]
-    force: tuple[float, float]
-    signals: tuple[str, ...]
-    registered: Mapping[str, float]
-
-
 class Analysis:
     """Models of one wrist against its recordings.
 
@@ -176,6 +145,9 @@ class Analysis:
         Told steps done and in all.
     tell : callable, optional
         Told in words what is being done.
+    again : bool
+        Whether the model was fitted to one of these sessions before: then what it found of the base
+        is no knowledge to begin with.
 
     Raises
     ------
@@ -189,17 +161,18 @@ class Analysis:
         sessions: Sequence[MeasuredSession],
         progress: Progress = silent,
         tell: Callable[[str], None] = lambda text: None,
+        again: bool = False,
     ) -> None:
         if not sessions:
             raise InputError("an analysis needs a session")
         self.sessions = tuple(sessions)
         self._progress, self._tell = progress, tell
-        self._stop = Event()
-        self._problems: dict[int, WristProblem] = {}
+        self._stop, self._again = Event(), again
+        self._units = tuple(as_units(model, each) for each in sessions)
+        self._problems: list[WristProblem] = []
         self._versions = [Version("as given", model, {})]
-        base = self._problem().begin().base
-        error = Judge(base).of_model(model)
-        held_out = {q.key: error.rmse(q) for q in base.problem.table.reported}
+        error = Judge(self._problem().begin().base).of_model(model)
+        held_out = {q.key: error.rmse(q) for q in self._shown.table.reported}
         self._versions = [replace(self._versions[0], held_out=held_out)]
 
     @property
@@ -225,45 +198,21 @@ class Analysis:
         number : int
             Place among the versions, the newest by default.
         """
-        version = self._versions[number]
-        # What the version was fitted with is known; only the model as given needs a fit for this.
-        fit = self._problem(number).begin() if version.fit is None else version.fit.fit
-        base, predicted = fit.base, []
-        for n, session in enumerate(base.problem.sessions):
-            model = base.model(n)
+        fit, shown, predicted = self._fit(number), self._shown, []
+        for n, session in enumerate(shown.sessions):
+            model = fit.base.model(n)
             own = tuple(each for each in model.effects if each.name not in names_of(SET_UP))
             predicted.append(model.predicted([own])[0][session.measured])
-        left = base.problem.table.with_values(base.residual)
+        left = shown.table.with_values(self._left(fit.base))
         return View(left, np.concatenate(predicted), fit.table.noise_and_drift(fit.evidence))
 
     def contents(self) -> tuple[Contents, ...]:
         """Return what each recording holds, the instrument registered by the model as given."""
         base = self._problem(0).begin().base
-        table, found = base.problem.table, []
-        squares = np.nan_to_num(base.residual) ** 2
-        for n, (session, units) in enumerate(
-            zip(self.sessions, base.problem.sessions, strict=True)
-        ):
-            block, cut, warm = session.block, units.cut, len(session.block.temperatures)
-            seconds, measured = float(np.ptp(block.time)), int(session.measured.any(axis=1).sum())
-            speed = np.abs(cut.mean_speed).max(axis=1)
-            force = np.linalg.norm(block.load[:, :3], axis=1)
+        table, squares, found = base.problem.table, np.nan_to_num(base.residual) ** 2, []
+        for n, each in enumerate(zip(self.sessions, base.problem.sessions, strict=True)):
             own = table.sessions == n
-            found.append(
-                Contents(
-                    session.name,
-                    str(session.notes.get("pose_sensor", "not told")),
-                    seconds,
-                    measured / seconds if seconds > 0.0 else 0.0,
-                    measured,
-                    int(cut.dwell[units.measured].sum()),
-                    np.stack([block.theta.min(axis=0), block.theta.max(axis=0)], axis=1),
-                    (float(speed.min()), float(speed.max())),
-                    (float(force.min()), float(force.max())),
-                    (*block.covariates, *([f"{warm} temperatures"] if warm else ())),
-                    table.take(own).rms(squares[own]),
-                )
-            )
+            found.append(contents_of(*each, table.take(own).rms(squares[own])))
         return tuple(found)
 
     def cancel(self) -> None:
@@ -273,16 +222,13 @@ class Analysis:
     def compare(self) -> Comparison:
         """Say how far every version is off, where and under which condition."""
         models = [(each.name, each.model) for each in self._versions]
-        return compare_models(models, self.sessions, self._watched())
+        return compare_models(models, self.sessions, self._watched(self._progress))
 
     def calibrate(self) -> Version:
         """Fit set-up and tolerances of the newest model; it becomes a version."""
-        now = self._versions[-1]
-        known = self._known()
-        found = calibrate(known, self.sessions, self._watched())
+        found = calibrate(self._known(), self.sessions, self._watched(self._progress))
         step = Step("calibrate", "", "", {})
-        child = replace(found.model, lineage=(*now.model.lineage, step))
-        return self._became(Version("calibrated", child, found.after, found.fit))
+        return self._became("calibrated", found.model, step, found.after, found.fit)
 
     def rank(self, naming: float = NAMING, seconds: float = np.inf) -> WristDiagnosis:
         """Ask which effect the newest model misses.
@@ -299,7 +245,7 @@ class Analysis:
         WristDiagnosis
             Findings, and in `diagnosis.standings` every candidate with its probability.
         """
-        tell = self._watched_words()
+        tell = self._watched(self._tell)
         return diagnose_sessions(self._known(), self.sessions, naming, seconds, tell)
 
     def propose(self, naming: float = NAMING) -> Proposals:
@@ -316,7 +262,7 @@ class Analysis:
             Each of its `terms` has a `sentence`, a `formula`, and an `effect()` for `add`.
         """
         problem = self._problem()
-        return propose(problem, problem.begin(), naming, self._watched_words())
+        return propose(problem, problem.begin(), naming, self._watched(self._tell))
 
     def preview(self, candidate: str | Effect) -> Preview:
         """Return what a candidate would explain, without adding it.
@@ -331,12 +277,12 @@ class Analysis:
         InputError
             If there is no such law or component, or it finds no equilibrium here.
         """
-        self._watched()(0, 1)
+        self._watched(self._progress)(0, 1)
         problem, effect = self._problem(), _effect(candidate)
         begun = problem.begin()
         grown = problem.extended(begun, effect)
-        before, after = begun.base.residual, grown.base.residual
-        table = problem.table.table
+        table = self._shown.table
+        before, after = (self._left(each.base) for each in (begun, grown))
         errors = [table.rms(np.nan_to_num(each) ** 2) for each in (before, after)]
         return Preview(
             grown.base.beyond()[effect.name],
@@ -358,15 +304,13 @@ class Analysis:
         InputError
             If the model has it already, or the recordings lack a signal that it needs.
         """
-        now, effect = self._versions[-1], _effect(candidate)
-        watched, known = self._watched(), self._problem()
+        effect, watched, known = _effect(candidate), self._watched(self._progress), self._problem()
         found = extend(self._known(), effect, self.sessions, watched, known)
         step = Step("extend", "", "", {}, added=effect.name)
-        child = replace(found.model, lineage=(*now.model.lineage, step))
         held_out = {q.key: found.after.rmse(q) for q in found.quantities}
-        own = next(each for each in child.effects if each.name == effect.name)
-        name = f"+ {effect.name}"
-        return self._became(Version(name, child, held_out, found.fit, own, found.warnings))
+        own = next(each for each in found.model.effects if each.name == effect.name)
+        told = held_out, found.fit, own, found.warnings
+        return self._became(f"+ {effect.name}", found.model, step, *told)
 
     def undo(self) -> Version:
         """Take the newest version back, and return the one before it.
@@ -379,7 +323,6 @@ class Analysis:
         if len(self._versions) == 1:
             raise InputError("nothing to undo: this is the model as it was given")
         self._versions.pop()
-        self._problems.pop(len(self._versions), None)
         return self._versions[-1]
 
     def plan(self, rivals: Sequence[str | Effect], conditions: Conditions) -> Plan:
@@ -392,63 +335,61 @@ class Analysis:
         conditions : Conditions
             Loads, durations, noise.
         """
-        question = between(
-            [[_effect(each) for each in rivals]], (), np.random.default_rng(conditions.seed)
-        )
+        asked = [_effect(each) for each in rivals]
+        question = between([asked], (), np.random.default_rng(conditions.seed))
         earlier = [as_experiment(self.model, each) for each in self.sessions]
-        return plan(self.model, question, conditions, earlier, self._watched())
+        return plan(self.model, question, conditions, earlier, self._watched(self._progress))
 
-    def _became(self, version: Version) -> Version:
-        self._versions.append(version)
-        return version
+    def _became(self, name: str, model: ErrorModel, step: Step, *told: Any) -> Version:
+        child = replace(model, lineage=(*self.model.lineage, step))
+        self._versions.append(Version(name, child, *told))
+        return self._versions[-1]
 
     def _known(self, number: int = -1) -> ErrorModel:
         """Return a version's model without what fits to these recordings found of its base."""
         last = range(len(self._versions))[number]
         model = self._versions[last].model
-        fitted = any(each.fit is not None for each in self._versions[: last + 1])
+        fitted = self._again or any(each.fit is not None for each in self._versions[: last + 1])
         return unfitted(model) if fitted else model
 
     def _problem(self, number: int = -1) -> WristProblem:
-        """Return the problem of a version, fitted once."""
-        key = range(len(self._versions))[number]
-        if key not in self._problems:
-            known, fit = self._known(key), self._versions[key].fit
-            if fit is None:
-                units = tuple(as_units(known, each) for each in self.sessions)
-            else:
-                units = fit.problem.sessions
-            self._problems[key] = WristProblem(known, units)
-        return self._problems[key]
+        """Return the problem of a version; what asks the same is fitted once."""
+        known = self._known(number)
+        base = free_base(known)
+        for each in self._problems:
+            if each.asks(known, base):
+                return each
+        self._problems.append(WristProblem(known, self._units, base))
+        return self._problems[-1]
 
-    def _watched(self) -> Progress:
-        """Return the progress, which ends what is being done once that was cancelled."""
+    def _fit(self, number: int = -1) -> WristFit:
+        """Return what a version was fitted with; only the model as given needs a fit for it."""
+        fit = self._versions[number].fit
+        return self._problem(number).begin() if fit is None else fit.fit
+
+    @property
+    def _shown(self) -> FitProblem:
+        """The model as given on the units that are shown, which another fit may take for lost."""
+        return self._problem(0).begin().base.problem
+
+    def _left(self, fitted: BaseFit) -> Array:
+        """Return what a fit leaves of the units that are shown, (u, 6) [m, rad]."""
+        pairs = zip(self._shown.sessions, fitted.problem.sessions, strict=True)
+        if all(np.array_equal(one.measured, two.measured) for one, two in pairs):
+            return fitted.residual
+        return replace(fitted.problem, sessions=self._shown.sessions).residual(fitted.z)
+
+    def _watched(self, hears: Callable[..., None]) -> Callable[..., None]:
+        """Return who is told, so that what is being done ends once that was cancelled."""
         self._stop.clear()
 
-        def told(done: int, total: int) -> None:
-            self._check()
-            self._progress(done, total)
+        def told(*said: object) -> None:
+            if self._stop.is_set():
+                raise Cancelled("cancelled")
+            hears(*said)
 
         return told
-
-    def _watched_words(self) -> Callable[[str], None]:
-        self._stop.clear()
-
-        def told(text: str) -> None:
-            self._check()
-            self._tell(text)
-
-        return told
-
-    def _check(self) -> None:
-        if self._stop.is_set():
-            raise Cancelled("cancelled")
 
 
 def _effect(candidate: str | Effect) -> Effect:
-    if isinstance(candidate, Effect):
-        return candidate
-    law, _, place = candidate.rpartition("@")
-    if not law or not place:
-        raise InputError(f"effect {candidate!r}: write law@component, such as backlash@motor_2")
-    return Effect(find_law(law), place)
+    return candidate if isinstance(candidate, Effect) else effect_named(candidate)

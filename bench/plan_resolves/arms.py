@@ -10,6 +10,7 @@ from twins import Case, Catalogue
 from wrist import LOADS, MODEL, NOISE, PACE, TABLE, WORKSPACE, left_by, once_each, performance
 
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.planning import plan as planning
 from wrist_stiffness.planning import pool
 from wrist_stiffness.planning.information import (
@@ -24,7 +25,7 @@ from wrist_stiffness.planning.information import (
 )
 from wrist_stiffness.planning.plan import Conditions, plan
 from wrist_stiffness.planning.pool import draw_settings
-from wrist_stiffness.planning.question import SESSION, TARE, WRIST, between, effect_named
+from wrist_stiffness.planning.question import SESSION, TARE, WRIST, between
 from wrist_stiffness.planning.refit import Measured, fitted
 from wrist_stiffness.planning.signatures import signatures
 from wrist_stiffness.planning.timeline import Visit

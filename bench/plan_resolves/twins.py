@@ -10,7 +10,7 @@ from wrist import MODEL, NOISE, TABLE, left_by, paper_design
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.registry import catalogue
+from wrist_stiffness.model.registry import catalogue, effect_named
 from wrist_stiffness.planning.information import (
     CHARGE,
     FREE,
@@ -21,7 +21,7 @@ from wrist_stiffness.planning.information import (
     discrimination,
     information,
 )
-from wrist_stiffness.planning.question import SESSION, WRIST, drawn, effect_named
+from wrist_stiffness.planning.question import SESSION, WRIST, drawn
 from wrist_stiffness.planning.signatures import Signature, signatures
 from wrist_stiffness.planning.timeline import Timeline
 from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, places

@@ -8,6 +8,7 @@ from scipy.linalg import block_diag
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.planning.earlier import as_experiment
 from wrist_stiffness.planning.information import (
     CHARGE,
@@ -28,7 +29,6 @@ from wrist_stiffness.planning.question import (
     SESSION,
     between,
     commissioning,
-    effect_named,
 )
 from wrist_stiffness.planning.rivals import LEAST_WHITE, Rivals
 from wrist_stiffness.planning.signatures import plausible, signatures

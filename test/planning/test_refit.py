@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.planning import pool
 from wrist_stiffness.planning.information import (
     RESOLVED,
@@ -17,7 +18,7 @@ from wrist_stiffness.planning.information import (
 )
 from wrist_stiffness.planning.loads_file import AppliedLoad, Weight
 from wrist_stiffness.planning.plan import Conditions, plan
-from wrist_stiffness.planning.question import SESSION, between, effect_named
+from wrist_stiffness.planning.question import SESSION, between
 from wrist_stiffness.planning.refit import Measured, fitted, rivals_alike
 from wrist_stiffness.planning.signatures import signatures
 from wrist_stiffness.planning.timeline import Pace, Visit, run_through

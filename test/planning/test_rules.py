@@ -7,14 +7,14 @@ from wrist_stiffness.errors import InputError, LoadRangeError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.backlash import Backlash
 from wrist_stiffness.model.parameters import Estimate
-from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.model.registry import effect_named, find_law
 from wrist_stiffness.planning import plan as planning
 from wrist_stiffness.planning import pool
 from wrist_stiffness.planning import question as design_question
 from wrist_stiffness.planning.information import MeasurementNoise
 from wrist_stiffness.planning.loads_file import Actuator, Weight
 from wrist_stiffness.planning.plan import Conditions, plan
-from wrist_stiffness.planning.question import between, effect_named
+from wrist_stiffness.planning.question import between
 from wrist_stiffness.planning.timeline import PEAK, Pace, Visit, run_through
 
 WEIGHT = Weight("brass", 0.1, np.array([0.02, 0.0, -0.018]), 10.0)

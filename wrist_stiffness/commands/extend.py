@@ -23,7 +23,7 @@ from wrist_stiffness.model.formula import names_in
 from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate, has_unit
-from wrist_stiffness.model.registry import find_law, law_from_file
+from wrist_stiffness.model.registry import at_component, effect_named, law_from_file
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
@@ -47,8 +47,7 @@ class CatalogueEffect:
 
     def effect(self, covariates: Sequence[str]) -> Effect:
         """Return the effect at its component."""
-        law, component = at_component(self.name)
-        return Effect(find_law(law), component)
+        return effect_named(self.name)
 
 
 @dataclass(frozen=True)
@@ -157,23 +156,6 @@ def direction_of(words: Sequence[str]) -> list[float]:
             "'along +z', 'about (-0.38, -0.88, 0.29)'"
         )
     return three
-
-
-def at_component(text: str) -> tuple[str, str]:
-    """Split `NAME@COMPONENT`.
-
-    Raises
-    ------
-    InputError
-        If one of them is missing.
-    """
-    name, _, component = text.rpartition("@")
-    if not name or not component:
-        raise InputError(
-            f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2 or, of your own, "
-            "laws.py:Twist@platform"
-        )
-    return name, component
 
 
 @dataclass(frozen=True, eq=False)

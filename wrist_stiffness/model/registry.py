@@ -11,7 +11,7 @@ from pkgutil import iter_modules
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model import effects
-from wrist_stiffness.model.effect import effect_at
+from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import STAGES, Law, require_id
 
 ENTRY_POINTS = "wrist_stiffness.effects"
@@ -55,6 +55,35 @@ def find_law(name: str) -> Law:
     if name not in laws:
         raise InputError(f"unknown effect {name!r}; known are {', '.join(sorted(laws))}")
     return laws[name]
+
+
+def effect_named(name: str) -> Effect:
+    """Return the effect of the catalogue that `NAME@COMPONENT` names, with its usual values.
+
+    Raises
+    ------
+    InputError
+        If it is no such name, or there is no such law.
+    """
+    law, component = at_component(name)
+    return Effect(find_law(law), component)
+
+
+def at_component(text: str) -> tuple[str, str]:
+    """Split `NAME@COMPONENT`.
+
+    Raises
+    ------
+    InputError
+        If one of them is missing.
+    """
+    name, _, component = text.rpartition("@")
+    if not name or not component:
+        raise InputError(
+            f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2 or, of your own, "
+            "laws.py:Twist@platform"
+        )
+    return name, component
 
 
 def laws_in(module: object) -> list[Law]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.registry import catalogue, find_law
+from wrist_stiffness.model.registry import catalogue, effect_named
 from wrist_stiffness.planning.information import Goal
 from wrist_stiffness.planning.signatures import plausible
 from wrist_stiffness.sessions.refitted import BUILT, SET_UP, names_of
@@ -59,12 +59,6 @@ class Question:
             goals = tuple(g for g in goals if g.truth not in names and g.rival not in names)
         effects = tuple(sets for sets in self.effects if sets[0].name not in names)
         return replace(self, effects=effects, goals=goals)
-
-
-def effect_named(name: str) -> Effect:
-    """Return `law@component` of the catalogue at its prior means."""
-    law, _, component = name.partition("@")
-    return Effect(find_law(law), component)
 
 
 def drawn(effect: Effect, rng: np.random.Generator) -> tuple[Effect, ...]:
