@@ -17,7 +17,7 @@ import numpy as np
 from wrist_stiffness.analysis import Analysis, Version
 from wrist_stiffness.commands.extend import FormulaEffect
 from wrist_stiffness.commands.import_csv import import_csv
-from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
+from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.comparing.sentences import sentences
@@ -84,8 +84,6 @@ class Seen:
         `law@component`, what it does, and what to check on the machine.
     change : (u, 6) float
         What it takes away of each unit [m, rad].
-    explains : dict of str to (float, float)
-        RMS before and after by the key of the quantity.
     parameters : dict of str to float
         As fitted.
     """
@@ -94,7 +92,6 @@ class Seen:
     sentence: str
     check: str
     change: Array
-    explains: Mapping[str, tuple[float, float]]
     parameters: Mapping[str, float]
 
 
@@ -189,7 +186,8 @@ class Bench:
         loaded = load_model(model)
         sessions = read_sessions(Recordings(paths, {}), [loaded], self._progress)
         self._tell("finding where the instrument stands")
-        self._analysis = Analysis(loaded, list(sessions.values()), self._progress, self._tell)
+        told, again = (self._progress, self._tell), was_fitted_to(loaded, sessions)
+        self._analysis = Analysis(loaded, list(sessions.values()), *told, again)
         self._answer, self._model, self._paths = None, model, list(sessions)
         self._options = []
         shared = [set(each.block.covariates) for each in sessions.values()]
@@ -255,7 +253,6 @@ class Bench:
             sentence,
             effect.law.check.replace("{place}", effect.component),
             seen.change,
-            seen.explains,
             values,
         )
         return {"seen": Seen(*told), "version": len(self._opened.versions) - 1}

@@ -120,7 +120,7 @@ class MissingPanel:
     def _chosen(self) -> None:
         """Say what the chosen candidate would explain, and how to be sure of it."""
         tab, seen, shown = self._tab, self._tab.seen, self._tab.shown
-        if seen is None or shown is None:
+        if seen is None or shown is None or shown.after is None:
             return
         box = ui.column().classes("w-full gap-1 p-2 rounded").style("background: #fff7ed")
         if seen is not self._last:
@@ -130,11 +130,9 @@ class MissingPanel:
             ui.label(f"If {seen.name} were added").classes("font-bold")
             ui.label(f"{seen.sentence}.").classes("text-sm")
             for quantity in tab.quantities:
-                sizes = seen.explains[quantity.key]
-                if shown.after is not None:
-                    sizes = rms(shown.view.left.values, quantity), rms(shown.after, quantity)
-                before, after = map(number, sizes)
-                text = f"{SYMBOL[quantity.name]}: {before} → {after} {unit_of(quantity)}"
+                sizes = (rms(each, quantity) for each in (shown.view.left.values, shown.after))
+                path = " → ".join(map(number, sizes))
+                text = f"{SYMBOL[quantity.name]}: {path} {unit_of(quantity)}"
                 ui.label(f"{text} on these data")
             for name, value in seen.parameters.items():
                 ui.label(f"{name} = {value:.3g}").classes("text-sm")

@@ -7,13 +7,21 @@ from functools import partial
 import numpy as np
 from nicegui import events, run, ui
 
-from wrist_stiffness.analysis import Contents
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.sessions.contents import Contents
 from wrist_stiffness.web.examples import EXAMPLES
 from wrist_stiffness.web.figures import SYMBOL, number, spelled
 from wrist_stiffness.web.tab import Tab
 
 SHIPPED = "shipped model"
+
+UPLOAD = """
+<div class="row no-wrap items-center q-pa-sm">
+  <q-btn type="a" icon="add" flat dense aria-label="choose files"><q-uploader-add-trigger /></q-btn>
+  <div class="q-ml-sm">Drop .mcap, .csv, .yaml, .npz here (up to {limit} MB)</div>
+</div>
+"""
+"""Quasar's own button that chooses files has no name."""
 
 
 class OpenPanel:
@@ -32,14 +40,15 @@ class OpenPanel:
         self._glance = ui.column().classes("w-full gap-1")
         own = tab.workspace
         with ui.expansion("Your own recordings", value=True).classes("w-full dense") as self._own:
-            ui.upload(
-                label=f"Drop .mcap, .csv, .yaml, .npz here (up to {largest // 2**20} MB)",
+            files = ui.upload(
                 multiple=True,
                 auto_upload=True,
                 max_file_size=largest,
                 on_upload=self._uploaded,
                 on_rejected=lambda: ui.notify("That file is too large", type="warning"),
-            ).classes("w-full drop").props("flat bordered")
+            )
+            files.classes("w-full drop").props("flat bordered")
+            files.add_slot("header", UPLOAD.format(limit=largest // 2**20))
             self._names = ui.select(own.recordings(), multiple=True, label="recordings")
             self._names.classes("w-full").props("dense use-chips")
             self._model = ui.select([SHIPPED, *own.models()], value=SHIPPED, label="model")

@@ -52,14 +52,20 @@ def build_page(workspace: Workspace, largest: int) -> None:
         ui.label("Wrist workbench").classes("text-lg font-bold whitespace-nowrap")
         title = ui.label("nothing opened").classes("text-gray-700 ellipsis")
         ui.space()
-        with ui.row().classes("items-center no-wrap gap-2").props("id=busy") as status:
+        with ui.row().classes("items-center no-wrap gap-2").props("id=busy role=status") as status:
             ui.spinner(size="sm")
             ui.label().classes("whitespace-nowrap").bind_text_from(tab, "words")
             bar = ui.linear_progress(0.0, show_value=False).classes("w-24")
+            bar.props("aria-label=progress")
             cancel = ui.button("Cancel", on_click=tab.worker.cancel)
             cancel.props("dense outline color=red")
     status.bind_visibility_from(tab, "busy")
-    ui.timer(0.2, lambda: bar.set_value(tab.done / tab.total if tab.total else 0.0))
+
+    def progress() -> None:
+        bar.set_value(tab.done / tab.total if tab.total else 0.0)
+        status.props(f"data-calls={tab.calls}")
+
+    ui.timer(0.2, progress)
     with ui.row().classes("w-full no-wrap gap-2 p-2 items-stretch"):
         with ui.column().classes("panel gap-1").style("width: 380px; flex: none"):
             with ui.tabs().props("dense align=justify").classes("w-full") as tabs:
@@ -91,5 +97,5 @@ def build_page(workspace: Workspace, largest: int) -> None:
             tab.worker.cancel()
 
     tab.listeners.append(name_it)
-    ui.keyboard(on_key=press)
+    ui.keyboard(on_key=press, ignore=["input", "textarea"])
     ui.context.client.on_delete(tab.worker.end)

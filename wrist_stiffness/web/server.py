@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import socket
 from dataclasses import dataclass
+from multiprocessing.forkserver import ensure_running, set_forkserver_preload
 from typing import Any
 
 from wrist_stiffness.errors import InputError
@@ -55,6 +56,9 @@ def serve(served: Served) -> None:
     if served.largest_mb < 1:
         raise InputError(f"--largest-upload {served.largest_mb} is below 1 MB")
     _require_address(served)
+    # One process imports what the work needs, which takes seconds, and forks for each tab.
+    set_forkserver_preload(["wrist_stiffness.web.bench"])
+    ensure_running()
     from nicegui import app, ui
 
     from wrist_stiffness.web.page import build_page

@@ -5,23 +5,24 @@ Every panel knows the tab alone, and the tab knows none of them: it calls those 
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Sequence
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from nicegui import background_tasks, run, ui
 
-from wrist_stiffness.analysis import Contents, View
+from wrist_stiffness.analysis import View
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.inference.answer import Diagnosis
 from wrist_stiffness.inference.observations import Mask, Quantity
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.sessions.contents import Contents
 from wrist_stiffness.web.bench import Changes, Depends, Offer, Row, Seen, work
 from wrist_stiffness.web.figures import Shown, length, rms, strongest
 from wrist_stiffness.web.workspace import Workspace
@@ -30,6 +31,9 @@ DEPENDS, VERSIONS = "Depends on", "Versions"
 
 ASIDE = 99.0
 """Percentile of the errors at which the scale of colours ends: one wild unit greys no others."""
+
+FORKS = get_context("forkserver")
+"""See `server.serve`."""
 
 
 class Worker:
@@ -43,16 +47,15 @@ class Worker:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._context = multiprocessing.get_context("spawn")
-        self._stop = self._context.Event()
-        self._process: SpawnProcess | None = None
+        self._stop = FORKS.Event()
+        self._process: BaseProcess | None = None
         self._wires: Connection | None = None
 
     def _begun(self) -> Connection:
         """Return the wires to the process: a page that only looks around needs none."""
         if self._wires is None:
-            self._wires, theirs = self._context.Pipe()
-            self._process = self._context.Process(
+            self._wires, theirs = FORKS.Pipe()
+            self._process = FORKS.Process(
                 target=work, args=(self._folder, theirs, self._stop), daemon=True
             )
             self._process.start()
@@ -102,7 +105,7 @@ class Tab:
         self.worker = Worker(workspace.folder)
         self.listeners: list[Callable[[], None]] = []
         self.busy, self._client = False, ui.context.client
-        self.words, self.done, self.total = "", 0, 0
+        self.words, self.done, self.total, self.calls = "", 0, 0, 0
         self.names: tuple[str, ...] = ()
         self.model_path = Path()
         self.contents: tuple[Contents, ...] = ()
@@ -155,7 +158,7 @@ class Tab:
             self._take(changes)
             self.panel, self.lower = then[0] or self.panel, then[1] or self.lower
             self.draw()
-        self.busy, self.words = False, ""
+        self.busy, self.words, self.calls = False, "", self.calls + 1
         with self._client:
             if why == "cancelled":
                 ui.notify("Cancelled. Nothing was changed.")
@@ -222,22 +225,15 @@ class Tab:
         values = view.left.values
         after, name = None, self.candidate
         if self.seen is not None:
-            change = self.seen.change
-            # A unit that one fit takes for a lost beam another may keep.
-            after = values - change if change.shape == values.shape else None
+            after = values - self.seen.change
         elif self.against in self.views:
-            other = self.views[self.against].left.values
-            after = other if other.shape == values.shape else None
+            after = self.views[self.against].left.values
             name = self.rows[self.against].name
         # One scale of colours and one direction for all versions: so the error is seen to fall.
         first = self.views[0].left.values
         scale = float(np.nanpercentile(length(first, quantity), ASIDE))
         axis = strongest(first, quantity) if self.axis is None else self.axis
-        chosen = self.chosen
-        if chosen is not None and len(chosen) != len(values):
-            chosen = None
-        moment = min(self.moment, len(values) - 1)
-        return Shown(view, after, name, quantity, axis, scale, chosen, moment)
+        return Shown(view, after, name, quantity, axis, scale, self.chosen, self.moment)
 
     @property
     def curves(self) -> dict[str, Curve]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class Views:
         row, panel, equal = "w-full no-wrap gap-2 items-stretch", "panel gap-0", "flex: 1 1 0"
         with ui.row().classes(row):
             with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
-                self._numbers = ui.row().classes("gap-x-8 gap-y-0 items-end no-wrap")
+                self._numbers = ui.row().classes("gap-x-6 gap-y-0 items-end no-wrap")
             with ui.column().classes("panel gap-1 justify-center"):
                 quantity = ui.toggle({0: "shift s [µm]", 1: "rotation φ [mdeg]"})
                 quantity.props("dense").bind_value(tab, "quantity").on_value_change(self.draw)
@@ -63,7 +64,9 @@ class Views:
         with ui.row().classes(row).style(f"{height}0.52)"):
             with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
                 self._map_title = ui.label().classes("font-bold")
-                self._map = self._plot("map")
+                self._map = self._plot(
+                    "map", "error over both motor angles; arrow keys go through the poses"
+                )
             with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
                 with ui.row().classes("items-center gap-2 w-full no-wrap"):
                     self._wrist_title = ui.label().classes("font-bold ellipsis")
@@ -71,29 +74,37 @@ class Views:
                     ui.label("displacement").classes("text-xs")
                     self._factor = ui.select({0: "automatic"}, value=0)
                     self._factor.props("dense options-dense borderless")
+                    self._factor.props('aria-label="exaggeration of the displacement"')
                     self._factor.on_value_change(self._draw_wrist)
-                self._wrist = self._plot("wrist")
+                self._wrist = self._plot("wrist", "the wrist in three dimensions")
         with ui.row().classes(row).style(f"{height}0.48)"):
             with ui.column().classes(panel).style("flex: 1.4 1 0; min-width: 0"):
                 self._time_title = ui.label().classes("font-bold")
-                self._time = self._plot("time")
+                self._time = self._plot("time", "error over time; arrow keys go through the poses")
             with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
                 with ui.row().classes("w-full no-wrap items-center gap-2"):
                     lower = ui.toggle([DEPENDS, VERSIONS]).props("dense")
                     lower.bind_value(tab, "lower").on_value_change(self._draw_lower)
                     self._condition = ui.select([], on_change=self._draw_lower)
-                    self._condition.props("dense options-dense").classes("ellipsis")
+                    self._condition.props('dense options-dense aria-label="condition"')
+                    self._condition.classes("ellipsis")
                     self._condition.style("flex: 1 1 0; min-width: 0")
                     self._condition.bind_visibility_from(lower, "value", value=DEPENDS)
-                self._lower = self._plot("lower")
+                self._lower = self._plot(
+                    "lower",
+                    "on what the error depends, or the versions; arrow keys go through them",
+                )
         for plot in (self._map, self._time, self._lower):
             plot.on("plotly_selected", self._selected, js_handler=POINTS)
             plot.on("plotly_click", self._clicked, js_handler=POINTS)
+            plot.props("tabindex=0")
+            for key, step in (("left", -1), ("right", 1)):
+                plot.on(f"keydown.{key}.prevent", partial(self._stepped, plot, step))
         tab.listeners.append(self.draw)
 
-    def _plot(self, name: str) -> ui.plotly:
-        plot = ui.plotly({"data": [], "layout": {}})
-        return plot.classes("w-full grow").style("min-height: 0").props(f"id=plot-{name}")
+    def _plot(self, name: str, shows: str) -> ui.plotly:
+        plot = ui.plotly({"data": [], "layout": {}}).classes("w-full grow").style("min-height: 0")
+        return plot.props(f'id=plot-{name} role=img aria-label="{shows}"')
 
     def draw(self) -> None:
         """Draw all pictures anew."""
@@ -197,6 +208,20 @@ class Views:
         if chosen.any():
             self._tab.choose(chosen)
 
+    def _stepped(self, plot: ui.plotly, step: int) -> None:
+        """Go to the next moment, of those that are selected, or to the next version."""
+        tab, shown = self._tab, self._tab.shown
+        if shown is None:
+            return
+        if plot is self._lower and tab.lower == VERSIONS:
+            tab.look((tab.version + step) % len(tab.rows))
+            return
+        units = np.arange(shown.view.left.n_units)
+        units = units if shown.chosen is None else units[shown.chosen]
+        place = int(np.searchsorted(units, tab.moment))
+        tab.moment = int(units[(place + step) % len(units)])
+        self.draw()
+
     def _clicked(self, event: events.GenericEventArguments) -> None:
         tab, shown = self._tab, self._tab.shown
         if shown is None:
@@ -214,7 +239,10 @@ def _places(told: Any, count: int) -> list[int]:
 
 
 def _show(plot: ui.plotly, figure: Figure) -> None:
-    plot.update_figure(_plain(figure))
+    """Draw a figure where it is another one: the wrist takes longer to draw than to compute."""
+    plain = _plain(figure)
+    if repr(plain) != repr(plot.figure):
+        plot.update_figure(plain)
 
 
 def _plain(value: Any) -> Any:
