@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from stops import Stops
 
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.simulation.stops import Stops
 
 Array = NDArray[np.float64]
 

@@ -18,12 +18,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+from whole_wrist.calculix import run_deck, write_deck
+from whole_wrist.model import build_wrist, factor_pose
+from whole_wrist.solve import solve_pose
 
-from wrist_stiffness.fem.calculix import run_deck, write_deck
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
-from wrist_stiffness.fem.monolithic import solve_pose
 from wrist_stiffness.fem.solids import MeshSettings
-from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
 from wrist_stiffness.lookup.rated_load import rated_wrench
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.mechanism.components import Array, ElasticComponents

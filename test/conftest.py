@@ -17,8 +17,9 @@ worker = os.environ.get("PYTEST_XDIST_WORKER")
 if worker is not None:
     os.environ["ROS_DOMAIN_ID"] = str(int(os.environ["ROS_DOMAIN_ID"]) + int(worker[2:]) % 11)
 
-# Fixtures of several rooms.
+# Fixtures of several rooms, and judges that benchmarks use too.
 sys.path.append(str(Path(__file__).parent))
+sys.path.append(str(Path(__file__).parents[1] / "bench"))
 pytest_plugins = ["measured_wrist"]
 
 # On a busy machine any example can take long.

@@ -9,6 +9,7 @@ Each word writes one block or picture of docs/walls.md; none does all; `patches`
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
@@ -18,15 +19,12 @@ from pathlib import Path
 import numpy as np
 from paper_page import insert_blocks
 
-from wrist_stiffness.fem.calculix import run_deck, write_deck
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
 from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.convergence import richardson
-from wrist_stiffness.fem.monolithic import Disturbance, solve_pose
 from wrist_stiffness.fem.one_sided import PatchedBushing, PatchedWrist, patch_bushing, solve_patches
 from wrist_stiffness.fem.parts import assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import MeshSettings
-from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
 from wrist_stiffness.lookup.rated_load import rated_map, rated_wrench
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.mechanism.components import Array
@@ -34,6 +32,12 @@ from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.workspace import Workspace
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from whole_wrist.calculix import run_deck, write_deck
+from whole_wrist.model import build_wrist, factor_pose
+from whole_wrist.solve import Disturbance, solve_pose
 
 GEOMETRY = "config/palmieri2015.yaml"
 CONDENSE = cache(condense_solid)

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from stops import Stops
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.model.error_model import ErrorModel, Load
-from wrist_stiffness.simulation.stops import Stops
 
 NAMES = ("motor_1_joint", "motor_2_joint")
 SECOND = 1_000_000_000

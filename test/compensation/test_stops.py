@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from stops import Stops
 
 from wrist_stiffness.lookup.response import respond
-from wrist_stiffness.simulation.stops import Stops
 
 THETA = np.array([0.1, 0.2])
 TOOL = np.array([0.0, 0.0, 0.06])

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from whole_wrist.calculix import run_deck, write_deck
+from whole_wrist.model import build_wrist, factor_pose
+from whole_wrist.solve import Disturbance, solve_pose
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.fem.calculix import run_deck, write_deck
-from wrist_stiffness.fem.monolithic import Disturbance, solve_pose
-from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 
 AGREEMENT = 1e-4

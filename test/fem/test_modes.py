@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from whole_wrist.calculix import run_modal_deck, write_modal_deck
+from whole_wrist.model import build_wrist, factor_pose
+from whole_wrist.solve import natural_frequencies
 
 from wrist_stiffness.errors import InputError, TableError
-from wrist_stiffness.fem.calculix import run_modal_deck, write_modal_deck
 from wrist_stiffness.fem.components import elastic_components
-from wrist_stiffness.fem.monolithic import natural_frequencies
-from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 from wrist_stiffness.mechanism.modes import RigidBody, natural_modes, plate
 from wrist_stiffness.mechanism.statics import compliance

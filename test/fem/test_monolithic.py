@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from whole_wrist.model import build_wrist, factor_pose
+from whole_wrist.solve import Disturbance, solve_pose
 
 from wrist_stiffness.fem.components import elastic_components
-from wrist_stiffness.fem.monolithic import Disturbance, solve_pose
-from wrist_stiffness.fem.wrist_model import build_wrist, factor_pose
 from wrist_stiffness.mechanism.components import ELASTIC, LINKS
 from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.geometry_file import mechanism_of

@@ -71,6 +71,7 @@ def test_a_sleeve_in_the_bar_has_to_fit_and_one_beside_it_not():
     checked(values)
 
 
+IN_THE_WAY = "the boss of joint_4 and link_2"
 IN_ONE_PLACE = r"are in one place at motor angles \(.*\) deg, in the operative workspace"
 
 
@@ -85,6 +86,36 @@ IN_ONE_PLACE = r"are in one place at motor angles \(.*\) deg, in the operative w
             "radius_mm",
             -53.0,
             f"the pin of joint_1 and link_2 {IN_ONE_PLACE}",
+        ),
+        (
+            "bushings",
+            "joint_4",
+            "radius_mm",
+            -20.0,
+            f"{IN_THE_WAY} {IN_ONE_PLACE}",
+        ),
+        ("bushings", "joint_4", "length_mm", 8.0, f"{IN_THE_WAY} {IN_ONE_PLACE}"),
+        (
+            "bushings",
+            "joint_2",
+            "radius_mm",
+            5.0,
+            r"joint_2.radius_mm: 5 leaves 24.8 mm of pin .* more than link_1 \(at most 15.5 mm\)",
+        ),
+        (
+            "bushings",
+            "joint_2",
+            "inner_gap_um",
+            2000.0,
+            r"2000 is wider .* \(at most 370",
+        ),
+        ("materials", "polymer", "poisson", -0.9, r"poisson: -0.9 .*-0.7"),
+        (
+            "limits",
+            "joint_upper_deg",
+            None,
+            [78.0, 60.0],
+            r"joint_upper_deg: \[78.0, 60.0\] stops short .* to \(61.5, 60.4\) deg",
         ),
         ("limits", "singularity", None, 0.999, r"no pose of the operative workspace has such a"),
         ("platform", "diameter_mm", None, 70.0, f"the plate and link_1 {IN_ONE_PLACE}"),

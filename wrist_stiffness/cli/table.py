@@ -1,4 +1,4 @@
-"""`wrist-stiffness table build | check | show`: the offline sweep and its table."""
+"""`wrist-stiffness table build | part | check | show`: the offline sweep and its table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import Any
 from wrist_stiffness.cli.options import table_named, whole_load
 from wrist_stiffness.cli.output import say
 from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.mechanism.components import LINKS
 from wrist_stiffness.shipped import shipped_file
+
+SHIPPED = shipped_file("config/palmieri2015.yaml")
 
 BUILD = """\
 Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
@@ -19,6 +22,15 @@ three minutes."""
 BUILD_EPILOG = """\
 example, a wrist of one's own:
   wrist-stiffness table build my_wrist.yaml -o my_wrist.npz"""
+
+PART = """\
+Mesh a link drawn in CAD and print its 6 x 6 stiffness, to be put under that link in a geometry
+file. The STEP file holds one solid in mm, in the base frame with the wrist at home and O at the
+origin; its faces motor_bore and platform_bore are held."""
+
+PART_EPILOG = """\
+example, a forked link_1:
+  wrist-stiffness table part fork.step --link link_1 --geometry my_wrist.yaml"""
 
 CHECK = """\
 Verify a table: complete and undamaged, compliance positive definite, splines as good as stated.
@@ -44,7 +56,7 @@ example, natural frequencies with a gripper of 0.2 kg, 30 mm below O:
 
 
 def add_parser(commands: Commands) -> None:
-    """Add the parsers of the three table commands."""
+    """Add the parsers of the table commands."""
     parser = commands.add_parser("table", help="build, check or show a lookup table")
     actions = parser.add_subparsers(metavar="ACTION", required=True)
 
@@ -76,6 +88,12 @@ def add_parser(commands: Commands) -> None:
         default="closed_form",
         help="what the nodes use (default: closed_form)",
     )
+
+    what = "stiffness of a link drawn in CAD"
+    part = add_command(actions, "part", what, (PART, PART_EPILOG), _part)
+    part.add_argument("step", help="STEP file")
+    part.add_argument("--link", required=True, choices=LINKS, help="the link that it draws")
+    part.add_argument("--geometry", metavar="FILE", help="of its wrist (default: the shipped one)")
 
     check = add_command(actions, "check", "verify a table", (CHECK, CHECK_EPILOG), _check)
     check.add_argument("table", nargs="?", help="table file (default: the shipped one)")
@@ -126,7 +144,7 @@ def _build(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.report.table_lines import fact_lines
 
     built = table.build(
-        arguments.geometry or shipped_file("config/palmieri2015.yaml"),
+        arguments.geometry or SHIPPED,
         arguments.output,
         evaluation=arguments.evaluation,
         interface=arguments.interface,
@@ -138,6 +156,22 @@ def _build(arguments: argparse.Namespace) -> int:
     written = f"written: {arguments.output} (checksum {built.checksum[:12]})"
     values = asdict(built.header) | {"checksum": built.checksum}
     return say(arguments, [*fact_lines(built), written], values)
+
+
+def _part(arguments: argparse.Namespace) -> int:
+    from wrist_stiffness.commands.table import part
+
+    found = part(arguments.step, arguments.geometry or SHIPPED, arguments.link)
+    matrix = found.stiffness.tolist()
+    rows = [f"    - [{', '.join(f'{value:.9e}' for value in row)}]" for row in matrix]
+    lines = [
+        f"# {arguments.step}: {found.elements} elements; "
+        f"at most {100 * found.coarser:.2f} % stiffer if coarser by a quarter",
+        "stiffness:",
+        "  matrix_N_mm:",
+        *rows,
+    ]
+    return say(arguments, lines, {"stiffness": {"matrix_N_mm": matrix}})
 
 
 def _check(arguments: argparse.Namespace) -> int:

@@ -1,9 +1,10 @@
-"""Build, check and show a lookup table."""
+"""Build and show a lookup table."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,12 @@ from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.mechanism.fits import check_fits
-from wrist_stiffness.mechanism.geometry_file import geometry_of
+from wrist_stiffness.mechanism.geometry_file import geometry_of, load_geometry
+from wrist_stiffness.mechanism.own_stiffness import in_millimetres
 from wrist_stiffness.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from wrist_stiffness.fem.step_part import StepPart
 
 MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
 """The corners alone carry no plane to be judged inside; the splines' matrices grow with n^4."""
@@ -96,6 +101,35 @@ def build(
     table = save_table(table, output)
     store.remove()
     return table
+
+
+def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
+    """Condense a link drawn in CAD, its stiffness in the units of a geometry file [N, mm].
+
+    Parameters
+    ----------
+    step : path
+        STEP file, see `fem/step_part.py`.
+    geometry : path
+        Geometry file of its wrist.
+    link : str
+        The link that it draws.
+
+    Returns
+    -------
+    StepPart
+        As `matrix_N_mm` reads.
+
+    Raises
+    ------
+    GeometryError
+        If a file is wrong.
+    """
+    from wrist_stiffness.fem.components import SHIPPED_SIZES
+    from wrist_stiffness.fem.step_part import step_part
+
+    found = step_part(Path(step), load_geometry(geometry), link, SHIPPED_SIZES)
+    return replace(found, stiffness=in_millimetres(found.stiffness))
 
 
 @dataclass(frozen=True)

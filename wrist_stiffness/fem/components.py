@@ -150,7 +150,10 @@ def place_components(
     contact: dict[str, FlangeContact] = {}
     for part in parts:
         element, home = condensed[part.solid], part.home
-        flexibility.append(home.screw @ element.flexibility @ home.screw.T)
+        own = (geometry.links | geometry.bushings)[part.name].stiffness
+        flexibility.append(
+            home.screw @ element.flexibility @ home.screw.T if own is None else own.flexibility
+        )
         motor_side.append(home.wrench @ element.weight_motor_side @ home.rotation.T)
         platform_side.append(home.wrench @ element.weight_platform_side @ home.rotation.T)
         both = np.kron(np.eye(2), home.wrench)

@@ -30,7 +30,6 @@ from wrist_stiffness.fem.parts import (
 )
 from wrist_stiffness.fem.revolve import SECTORS
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
-from wrist_stiffness.fem.wrist_model import DRIVEN, FRAMES, HUB
 from wrist_stiffness.lookup.verification import relative_misses
 from wrist_stiffness.mechanism.components import (
     CARRIER,
@@ -48,6 +47,23 @@ from wrist_stiffness.mechanism.geometry_file import mechanism_of
 SUSPENSION = np.repeat([1e-2, 1e-5], 3)
 """Springs that hold each frame to the ground, so that a pin that rattles in its clearance is found
 where it comes to rest [N/m, N m/rad]; ten million times softer than a wrist."""
+
+FRAMES = (
+    "link_1_root",
+    "link_1_tip",
+    "link_2_root",
+    "link_2_tip",
+    "link_3_root",
+    "link_3_tip",
+    "platform",
+)
+"""Rigid frames: the pin or hub at each end of each link, and the platform."""
+
+HUB = {"joint_2": "platform", "joint_3": "platform", "joint_4": "link_3_root"}
+"""The frame in whose hub a passive joint's bushing slides and turns."""
+
+DRIVEN = {"link_1_root": "joint_1", "link_2_root": "joint_5"}
+"""Frames whose slide along and turn about a motor's axis the motor holds if the bushings slide."""
 
 PIN = {"joint_2": "link_1_tip", "joint_3": "link_3_tip", "joint_4": "link_2_tip"}
 """The frame on which a bushing sits; those of the motors sit in the ground."""

@@ -189,9 +189,12 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
         In the solid's own axes.
     """
     if isinstance(solid.dimensions, LinkDimensions):
-        mesh = mesh_solid(link_shape(solid.dimensions, solid.angle, sizes))
-    else:
-        mesh = _bushing_mesh(solid.dimensions, sizes)
+        return assemble_mesh(solid, mesh_solid(link_shape(solid.dimensions, solid.angle, sizes)))
+    return assemble_mesh(solid, _bushing_mesh(solid.dimensions, sizes))
+
+
+def assemble_mesh(solid: Solid, mesh: SolidMesh) -> ElasticBody:
+    """Assemble the matrices of a solid on a mesh that names its walls and its flanges' sectors."""
     modes = []
     for sector in solid.sectors:
         away_from_hub = -1.0 if sector.startswith(FLANGES[0]) else 1.0
@@ -251,7 +254,8 @@ def _link_part(geometry: Geometry, name: str) -> Part:
     angle = round(math.atan2(sine, float(motor_side @ platform_side)), 12)
     normal = normal / sine
     axes = np.column_stack([motor_side, np.cross(normal, motor_side), normal])
-    solid = Solid(geometry.links[name], angle, "motor_bore", "platform_bore", ())
+    bar = replace(geometry.links[name], stiffness=None)
+    solid = Solid(bar, angle, "motor_bore", "platform_bore", ())
     return Part(name, solid, Placement(axes, np.zeros(3)))
 
 
@@ -274,6 +278,7 @@ def _bushing_part(geometry: Geometry, name: str, rings: int) -> Part:
         radius=0.0,
         inner_gap=None if bushing.inner_gap is None else 0.0,
         outer_gap=None if bushing.outer_gap is None else 0.0,
+        stiffness=None,
     )
     if name in PASSIVE_JOINTS:
         flanges = tuple(end for end in FLANGES if gaps[end] is not None)

@@ -14,6 +14,9 @@ from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 from wrist_stiffness.mechanism.vectors import triad
 
+BOSS = "boss of joint_4"
+"""What of link_3 holds joint_4's bushing where this reaches past the bar."""
+
 POINTS_PER_SECTION = 2
 """Along a body for the smaller side of its section, so that none can pass between them."""
 
@@ -25,7 +28,7 @@ class Collision:
     Parameters
     ----------
     first, second : str
-        A link, a pin by its joint, or the platform.
+        A link, a pin by its joint, the platform or `BOSS`.
     theta : (2,) float
         Motor angles [rad].
     """
@@ -80,8 +83,8 @@ class _Body:
 def collision(geometry: Geometry, poses: Array) -> Collision | None:
     """Return the first collision at some poses, None if there is none.
 
-    Bars may hit bars, the plate and the pins of joints that are not theirs; hubs and bosses are
-    not described, and what a joint connects may touch there.
+    Bars may hit bars, the plate, the boss of another one and the pins of joints that are not
+    theirs; hubs of the platform are not described, and what a joint connects may touch there.
 
     Parameters
     ----------
@@ -93,9 +96,14 @@ def collision(geometry: Geometry, poses: Array) -> Collision | None:
     turns = mechanism_of(geometry).forward(poses).rotations
     bars = {name: _bar(geometry, name) for name in LINKS}
     others = {name: _pin(geometry, name) for name in geometry.bushings}
-    others["platform"] = _plate(geometry)
+    others |= {"platform": _plate(geometry), BOSS: _boss(geometry)}
     pairs = list(combinations(bars, 2))
-    pairs += [(bar, other) for bar in bars for other in others if other not in ENDS[bar]]
+    pairs += [
+        (bar, other)
+        for bar in bars
+        for other in others
+        if other not in ENDS[bar] and (bar, other) != ("link_3", BOSS)
+    ]
     bodies = bars | others
     points = {name: body.points for name, body in bodies.items()}
     far = {name: np.linalg.norm(own, axis=1) for name, own in points.items()}
@@ -135,6 +143,15 @@ def _pin(geometry: Geometry, joint: str) -> _Body:
     # It reaches through its bushing.
     low, high = min(ends) - bushing.length / 2.0, max(ends) + bushing.length / 2.0
     return _round(CARRIER[joint], side, bushing.pin_diameter / 2.0, low, high)
+
+
+def _boss(geometry: Geometry) -> _Body:
+    """From its bar to the end of the sleeve that it holds, no wider than the sleeve."""
+    seat, arc = geometry.bushings["joint_4"], geometry.links["link_3"].arc_radius
+    low = min(arc, abs(seat.radius) - seat.length / 2.0)
+    high = max(arc, abs(seat.radius) + seat.length / 2.0)
+    sleeve = seat.pin_diameter / 2.0 + seat.wall
+    return _round("link_3", geometry.joint_side("joint_4"), sleeve, low, high)
 
 
 def _plate(geometry: Geometry) -> _Body:

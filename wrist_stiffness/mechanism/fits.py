@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wrist_stiffness.errors import UnreachablePoseError
 from wrist_stiffness.inputs.document import Node
-from wrist_stiffness.mechanism.collisions import collision
+from wrist_stiffness.mechanism.collisions import BOSS, collision
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 from wrist_stiffness.mechanism.kinematics import angles_text
@@ -16,8 +18,8 @@ POSES_PER_AXIS = 15
 """Of the grid over the motor angles on which bodies are tried."""
 
 WIDEST_FIT = 0.37e-3
-"""Most by which a bore and what sits in it may differ [m]: the largest clearance of H11/c11, the
-loosest preferred fit of ISO 286, at 30 mm."""
+"""Most by which a bore and what sits in it may differ, and most play between a flange and its hub
+[m]: the largest clearance of H11/c11, the loosest preferred fit of ISO 286, at 30 mm."""
 
 PINS = {
     ("link_1", "motor_bore"): "joint_1",
@@ -65,6 +67,8 @@ def check_fits(root: Node, geometry: Geometry) -> None:
         if name != "source":
             _check_material(name, material)
     _check_bores(root, geometry)
+    _check_pins(root, geometry)
+    _check_gaps(root, geometry)
     limits, tilt = root["limits"], np.degrees(geometry.limits.operative_tilt)
     workspace = Workspace(mechanism_of(geometry), geometry.limits)
     try:
@@ -73,6 +77,18 @@ def check_fits(root: Node, geometry: Geometry) -> None:
         raise limits["operative_tilt_deg"].refuse(
             f"{tilt:g} is not reached in every direction: {error}"
         ) from error
+    needed = workspace.operative_border
+    for key, beyond in (
+        ("joint_lower_deg", needed < geometry.limits.joint_lower),
+        ("joint_upper_deg", needed > geometry.limits.joint_upper),
+    ):
+        if beyond.any():
+            low, high = np.degrees([needed.min(axis=0), needed.max(axis=0)])
+            raise limits[key].refuse(
+                f"{limits[key].plain} stops short of the operative workspace: {tilt:g} deg of "
+                f"tilt need motor angles from ({low[0]:.1f}, {low[1]:.1f}) to "
+                f"({high[0]:.1f}, {high[1]:.1f}) deg"
+            )
     poses = poses[workspace.operative(poses)]
     if not len(poses):
         raise limits["singularity"].refuse(
@@ -96,6 +112,8 @@ def _place_of(body: str, geometry: Geometry) -> tuple[tuple[str, ...], str]:
         return ("links", body, "arc_radius_mm"), body
     if body in geometry.bushings:
         return ("bushings", body, "radius_mm"), f"the pin of {body}"
+    if body == BOSS:
+        return ("bushings", "joint_4", "radius_mm"), f"the {BOSS}"
     return ("platform", "centre_mm"), "the plate"
 
 
@@ -135,3 +153,37 @@ def _check_bores(root: Node, geometry: Geometry) -> None:
                 f"{1e3 * pin:g} does not fit links.{bore}, which has room for {1e3 * room:g} "
                 f"(may differ by {1e3 * WIDEST_FIT:g})"
             )
+
+
+def _check_pins(root: Node, geometry: Geometry) -> None:
+    """Pins are taken as rigid, so none may bend more than the bar that holds it.
+
+    Both as cantilevers of one material under a force along the radius of the bar's arc, without
+    shear (W. C. Young, Roark's Formulas for Stress and Strain).
+    """
+    for (name, _), joint in PINS.items():
+        bar, bushing = geometry.links[name], geometry.bushings[joint]
+        start, end = geometry.link_ends(name)
+        cosine = float(start @ end)
+        arc = math.acos(cosine) - cosine * math.sqrt(1.0 - cosine**2)
+        bends = bar.arc_radius**3 * arc / 2.0 / (bar.section_axial * bar.section_radial**3 / 12.0)
+        inertia = math.pi / 64.0 * bushing.pin_diameter**4
+        longest = (3.0 * inertia * bends) ** (1.0 / 3.0)
+        between = abs(abs(bushing.radius) - bar.arc_radius)
+        length = between - (bar.section_radial + bushing.length) / 2.0
+        if length > longest:
+            raise root["bushings"][joint]["radius_mm"].refuse(
+                f"{1e3 * bushing.radius:g} leaves {1e3 * length:.1f} mm of pin between {name} and "
+                f"its bushing: it would bend more than {name} (at most {1e3 * longest:.1f} mm), "
+                "but is taken as rigid"
+            )
+
+
+def _check_gaps(root: Node, geometry: Geometry) -> None:
+    for joint, bushing in geometry.bushings.items():
+        for key, gap in (("inner_gap_um", bushing.inner_gap), ("outer_gap_um", bushing.outer_gap)):
+            if gap is not None and gap > WIDEST_FIT:
+                raise root["bushings"][joint][key].refuse(
+                    f"{1e6 * gap:g} is wider than any fit (at most {1e6 * WIDEST_FIT:g}); "
+                    "null = no flange"
+                )

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ENDS, Array
+from wrist_stiffness.mechanism.own_stiffness import OwnStiffness
 
 ROUNDING = 1e-9
 """Share by which a number may pass a limit that it stands at."""
@@ -54,6 +55,8 @@ class LinkDimensions:
         Diameter of the radial bore at the motor-side and platform-side joint [m].
     material : Material
         Material of the bar.
+    stiffness : OwnStiffness or None
+        Given by the file instead of the bar's; the bar still says what it weighs.
     """
 
     arc_radius: float
@@ -63,6 +66,7 @@ class LinkDimensions:
     motor_bore: float
     platform_bore: float
     material: Material
+    stiffness: OwnStiffness | None = None
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,8 @@ class BushingDimensions:
         Gap between flange and hub face [m]; None where there is no flange.
     material : Material
         Material of the sleeve.
+    stiffness : OwnStiffness or None
+        Given by the file instead of the sleeve's, where no flange takes part in contact.
     """
 
     radius: float
@@ -99,6 +105,7 @@ class BushingDimensions:
     inner_gap: float | None
     outer_gap: float | None
     material: Material
+    stiffness: OwnStiffness | None = None
 
 
 @dataclass(frozen=True)

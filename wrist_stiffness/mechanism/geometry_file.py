@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -40,6 +41,7 @@ from wrist_stiffness.mechanism.geometry import (
     PlatformDimensions,
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
+from wrist_stiffness.mechanism.own_stiffness import own_stiffness
 from wrist_stiffness.mechanism.vectors import unit
 
 SCHEMA = 1
@@ -49,11 +51,15 @@ READOUT_SPREAD = 0.1
 
 LENGTH = Quantity(number(above=0.0))
 
+# Read when the rest of its part is known.
+OWN: dict[str, Schema[Any]] = {"stiffness": lambda node: None}
+
 # From soft rubber and light foam to beyond diamond and osmium: what lies outside is another unit.
+# Re-entrant foam has the least ratio of any isotropic solid (R. Lakes, Science 235, 1987).
 MATERIAL = record(
     {
         "young_GPa": Quantity(number(above=1e-4, below=2000.0)),
-        "poisson": number(above=-1.0, below=0.5),
+        "poisson": number(at_least=-0.7, below=0.5),
         "density_kg_m3": Quantity(number(above=10.0, below=25000.0)),
         "expansion_1e-6_K": Quantity(number()),
     },
@@ -80,6 +86,7 @@ LIMITS = record(
 )
 
 T = TypeVar("T")
+P = TypeVar("P", LinkDimensions, BushingDimensions)
 
 
 def load_geometry(path: str | Path) -> Geometry:
@@ -137,14 +144,20 @@ def geometry_of(root: Node) -> Geometry:
     def read_materials(node: Node) -> None:
         materials.update(mapping_of(MATERIAL, SOURCES)(node))
 
-    link, bushing = _link(material), _bushing(material)
+    axes: dict[str, Array] = {}
+
+    def read_axes(node: Node) -> dict[str, Array]:
+        axes.update(_each(JOINTS, _axis)(node))
+        return axes
+
+    link, bushing = _link(material), _bushing(material, axes)
     values = record(
         {
             "schema": version(SCHEMA),
             "materials": read_materials,
             "name": text(),
             "status": text(*SOURCES),
-            "axes": _each(JOINTS, _axis),
+            "axes": read_axes,
             "links": _each(LINKS, link),
             "bushings": _each(JOINTS, bushing),
             "platform": _platform(material),
@@ -210,12 +223,13 @@ def _link(material: Schema[Material]) -> Schema[LinkDimensions]:
     bores = ("motor_bore_mm", "platform_bore_mm")
     schema = record(
         {**dict.fromkeys((*lengths, *bores), LENGTH), "material": material},
+        OWN,
         sources=SOURCES,
         make=LinkDimensions,
     )
 
     def read(node: Node) -> LinkDimensions:
-        link = schema(node)
+        link: LinkDimensions = schema(node)
         limit = min(link.section_axial, 2.0 * link.overhang)
         for key, bore in zip(bores, (link.motor_bore, link.platform_bore), strict=True):
             if bore >= limit:
@@ -228,25 +242,31 @@ def _link(material: Schema[Material]) -> Schema[LinkDimensions]:
                 f"{link.section_radial * 1e3:g} reaches past O "
                 f"(twice arc_radius_mm is {2e3 * link.arc_radius:g})"
             )
-        return link
+        return _with_own(node, link, link.arc_radius, np.zeros((6, 0)))
 
     return read
 
 
-def _bushing(material: Schema[Material]) -> Schema[BushingDimensions]:
+def _with_own(node: Node, part: P, distance: float, free: Array) -> P:
+    if "stiffness" not in node.value:
+        return part
+    return replace(part, stiffness=own_stiffness(node["stiffness"], distance, free))
+
+
+def _bushing(material: Schema[Material], axes: dict[str, Array]) -> Schema[BushingDimensions]:
     lengths = ("pin_diameter_mm", "length_mm", "wall_mm", "flange_diameter_mm")
     keys: dict[str, Any] = dict.fromkeys((*lengths, "flange_thickness_mm"), LENGTH)
     keys |= {"radius_mm": Quantity(number()), "material": material}
     # 0 = touching, null = no flange.
     gaps = dict.fromkeys(("inner_gap_um", "outer_gap_um"), Quantity(nullable(number(at_least=0.0))))
     active = record(
-        keys, sources=SOURCES, make=partial(BushingDimensions, inner_gap=None, outer_gap=None)
+        keys, OWN, sources=SOURCES, make=partial(BushingDimensions, inner_gap=None, outer_gap=None)
     )
-    passive = record({**keys, **gaps}, sources=SOURCES, make=BushingDimensions)
+    passive = record({**keys, **gaps}, OWN, sources=SOURCES, make=BushingDimensions)
 
     def read(node: Node) -> BushingDimensions:
-        is_passive = node.path.rpartition(".")[2] in PASSIVE_JOINTS
-        bushing = passive(node) if is_passive else active(node)
+        joint = node.path.rpartition(".")[2]
+        bushing: BushingDimensions = (passive if joint in PASSIVE_JOINTS else active)(node)
         sleeve = bushing.pin_diameter + 2.0 * bushing.wall
         if bushing.flange_diameter <= sleeve:
             raise node["flange_diameter_mm"].refuse(
@@ -257,7 +277,10 @@ def _bushing(material: Schema[Material]) -> Schema[BushingDimensions]:
                 f"{bushing.radius * 1e3:g} puts the bushing over O "
                 f"(half of length_mm is {5e2 * bushing.length:g})"
             )
-        return bushing
+        if "stiffness" in node.value and (bushing.inner_gap, bushing.outer_gap) != (None, None):
+            raise node["stiffness"].refuse("is for a joint without flanges: its gaps must be null")
+        slide_and_turn = np.kron(np.eye(2), axes[joint][:, None]).astype(np.float64)
+        return _with_own(node, bushing, abs(bushing.radius), slide_and_turn)
 
     return read
 

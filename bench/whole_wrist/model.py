@@ -18,52 +18,22 @@ from scipy import sparse
 
 from wrist_stiffness.fem.elasticity import block_axes, cylindrical_axes, rigid_motion
 from wrist_stiffness.fem.factor import Factor, factorise
+from wrist_stiffness.fem.one_sided import DRIVEN, FRAMES, HUB, PIN, SLIDES_ON
 from wrist_stiffness.fem.parts import ElasticBody, Part, Solid, assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.fem.superelement import ALL_WAYS, RADIALLY
-from wrist_stiffness.mechanism.components import CARRIER, PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.components import CARRIER, LINKS, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 
-FRAMES = (
-    "link_1_root",
-    "link_1_tip",
-    "link_2_root",
-    "link_2_tip",
-    "link_3_root",
-    "link_3_tip",
-    "platform",
-)
-"""Rigid frames: the pin or hub at each end of each link, and the platform."""
-
-HUB = {"joint_2": "platform", "joint_3": "platform", "joint_4": "link_3_root"}
-"""The frame in whose hub a passive joint's bushing slides and turns."""
-
-MOTOR_FRAME = {
-    "link_1": "link_1_root",
-    "link_2": "link_2_root",
-    "link_3": "link_3_root",
-    "joint_2": "link_1_tip",
-    "joint_3": "link_3_tip",
-    "joint_4": "link_2_tip",
-}
+MOTOR_FRAME = {link: f"{link}_root" for link in LINKS} | PIN
 """Frame on the motor side; that of joint_1 and joint_5 is the ground."""
 
-PLATFORM_FRAME = {
-    "link_1": "link_1_tip",
-    "link_2": "link_2_tip",
-    "link_3": "link_3_tip",
-    "joint_1": "link_1_root",
-    "joint_5": "link_2_root",
-    **HUB,
-}
+PLATFORM_FRAME = {link: f"{link}_tip" for link in LINKS} | SLIDES_ON
 """Frame on the platform side; a passive joint's wall differs from it by its slide and turn."""
 
 SCREWS = 6 * len(FRAMES) + 2 * len(PASSIVE_JOINTS)
 """Unknowns besides the inner nodes: seven screws at O, then slide and turn of each joint."""
-
-DRIVEN = {"link_1_root": "joint_1", "link_2_root": "joint_5"}
-"""Frames whose slide along and turn about a motor's axis the motor holds if the bushings slide."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from scipy import sparse
 from scipy.optimize import nnls
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from whole_wrist.model import SCREWS, PlacedBody, WristAtPose, platform_weight
 from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
-from wrist_stiffness.fem.wrist_model import SCREWS, PlacedBody, WristAtPose, platform_weight
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.modes import RigidBody
 from wrist_stiffness.mechanism.vectors import block_diagonal

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from whole_wrist.model import FRAMES, SCREWS, WristAtPose, platform_weight
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.fem.solids import MILLIMETRES
-from wrist_stiffness.fem.wrist_model import FRAMES, SCREWS, WristAtPose, platform_weight
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.modes import RigidBody
 
