@@ -344,8 +344,7 @@ class _Beyond:
     """What laws gain beside a state, to first order, from their forms on the units alone."""
 
     def __init__(self, at: Evidence, white: Array, carried: Array) -> None:
-        columns, _ = at.point.beside(at.background)
-        mixed, gram = columns.T @ white, white.T @ white
+        mixed, gram = at.products(white), white.T @ white
         ((information, slope),) = at.scores(mixed, white.T @ at.point.left, [gram])
         shape = carried.shape[2:]
         self._information = information.reshape(*shape, *shape)

@@ -90,11 +90,11 @@ class Evidence:
     excess: float
 
     @cached_property
-    def _known(self) -> tuple[Array, Array, Array, float]:
-        """Columns, their products, those with what is left, and its square."""
-        point = self.point
-        columns, gram = point.beside(self.background)
-        return columns, gram, columns.T @ point.left, float(point.left @ point.left)
+    def _known(self) -> tuple[Array, Array, float]:
+        """Products of all columns, those with what is left, and its square."""
+        point, ground = self.point, self.background
+        target = point.products(ground, point.left)
+        return point.gram(ground), target, float(point.left @ point.left)
 
     @cached_property
     def _priors(self) -> tuple[Array, Array, float]:
@@ -120,7 +120,7 @@ class Evidence:
     @cached_property
     def _solved(self) -> tuple[Array, Array, Array, Array]:
         """Scaled Cholesky factor of the information, the scales, the step, and the slope."""
-        _, gram, target, _ = self._known
+        gram, target, _ = self._known
         precision, offset, _ = self._priors
         information = gram / self.excess
         information[np.diag_indices_from(information)] += self.precision
@@ -137,7 +137,7 @@ class Evidence:
         factor, scale, step, slope = self._solved
         precision, offset, correction = self._priors
         n, ground = self.point.count, self.background
-        cost = self._known[3] / self.excess + float(precision @ offset**2 + slope @ step)
+        cost = self._known[2] / self.excess + float(precision @ offset**2 + slope @ step)
         volume = 2.0 * float(np.sum(np.log(np.diag(factor))) - np.sum(np.log(scale)))
         log = -0.5 * (n * np.log(self.excess) + cost + volume - np.sum(np.log(self.precision)))
         log += correction + _log_excess(np.array([self.excess]), ground.noise_width)[0]
@@ -157,9 +157,8 @@ class Evidence:
             Like this one's, anywhere.
         """
         p = len(self.point.z)
-        beside = self._known[0][:, p:]
-        information = beside.T @ beside / self.excess + np.diag(self.precision[p:])
-        target = beside.T @ point.left / self.excess
+        information = self._known[0][p:, p:] / self.excess + np.diag(self.precision[p:])
+        target = self.point.products(self.background, point.left)[p:] / self.excess
         cost = float(point.left @ point.left) / self.excess
         cost += float(np.sum((point.weight * point.z) ** 2))
         cost -= float(target @ np.linalg.solve(information, target))
@@ -176,10 +175,10 @@ class Evidence:
         What is known of them once all amplitudes are found, a discrepancy included (White 1980).
         """
         p, known = len(self.point.z), known_noise(self.point, self.background)
-        columns = self._known[0]
-        named, beside = columns[:, :p], columns[:, p:]
+        named = self.point.columns
+        beside = np.hstack([self.point.inexact, self.background.columns])
         # Columns by the inverse of the known covariance (Woodbury).
-        own = known._known[0][:, p:]
+        own = np.hstack([known.point.inexact, known.background.columns])
         inner = own.T @ own + np.diag(known.precision[p:])
         weighted = named - own @ np.linalg.solve(inner, own.T @ named)
         prior = np.diag(self.precision[:p])
@@ -221,7 +220,7 @@ class Evidence:
     @cached_property
     def square(self) -> float:
         """Sum of squares of what is left when everything is explained."""
-        _, gram, target, own = self._known
+        gram, target, own = self._known
         step = self._solved[2]
         return float(own + 2.0 * target @ step + step @ gram @ step)
 
@@ -230,7 +229,7 @@ class Evidence:
         """Products (q, q) of what of the background's columns what has a name could not take up."""
         ground = self.background
         own = len(self.precision) - len(ground.group)
-        gram = self._known[1]
+        gram = self._known[0]
         information = gram[:own, :own] + np.diag(self.excess * self.precision[:own])
         scale = 1.0 / np.sqrt(np.diag(information))
         factor, _ = cho_factor(information * scale[:, None] * scale, lower=True, check_finite=False)
@@ -323,6 +322,10 @@ class Evidence:
             self, amplitude=amplitude, excess=max(1.0, float(left @ left) / self.point.count)
         )
 
+    def products(self, columns: Array) -> Array:
+        """Return the products (K, k) of all columns of the set with further ones (N, k)."""
+        return self.point.products(self.background, columns)
+
     def strength(self, columns: Array) -> float:
         """Return how many standard deviations unknowns of typical size leave beyond the rest.
 
@@ -333,7 +336,7 @@ class Evidence:
         """
         factor, scale, _, _ = self._solved
         mixed = solve_triangular(
-            factor, scale[:, None] * (self._known[0].T @ columns), lower=True, check_finite=False
+            factor, scale[:, None] * self.products(columns), lower=True, check_finite=False
         )
         information = (columns.T @ columns - mixed.T @ mixed / self.excess) / self.excess
         return float(np.sqrt(max(np.linalg.eigvalsh(information)[-1], 0.0)))
@@ -353,12 +356,11 @@ class Evidence:
             Gain, the amplitudes as they are, and the unknowns.
         """
         factor, scale, step, _ = self._solved
-        known, counts = self._known[0], [each.shape[1] for each in blocks]
+        counts = [each.shape[1] for each in blocks]
         columns = np.concatenate(blocks, axis=1)
-        mixed = solve_triangular(
-            factor, scale[:, None] * (known.T @ columns), lower=True, check_finite=False
-        )
-        slope = -columns.T @ (self.point.left + known @ step) / self.excess
+        products = self.products(columns)
+        mixed = solve_triangular(factor, scale[:, None] * products, lower=True, check_finite=False)
+        slope = -(columns.T @ self.point.left + products.T @ step) / self.excess
         ends = np.cumsum(counts)
         found = []
         for first, end in zip(ends - counts, ends, strict=True):
@@ -481,7 +483,10 @@ def further(at: Evidence, background: Background) -> dict[int, tuple[float, floa
     absent = background.part(set(range(len(background.groups))) - set(at.background.numbers))
     if not absent.groups:
         return {}
-    scores = at.scores(*at.point.scores(at.background, absent))
+    whole_gram = background.gram[np.ix_(at.background.places, absent.places)]
+    mixed = np.vstack([at.point.mixed(absent), whole_gram])
+    blocks = [each.columns.T @ each.columns for each in absent.groups]
+    scores = at.scores(mixed, absent.products(at.point.left), blocks)
     found = {}
     for number, group, score in zip(absent.numbers, absent.groups, scores, strict=True):
         gain, size = _group_gain(*score, group)

@@ -96,9 +96,21 @@ class Background:
         return frozenset(np.flatnonzero(~self.optional).tolist())
 
     @cached_property
-    def columns(self) -> Array:
-        """Columns of all groups, (N, q)."""
+    def _all(self) -> Array:
         return np.concatenate([each.columns for each in self.groups], axis=1)
+
+    @property
+    def columns(self) -> Array:
+        """Columns of all groups, (N, q); those of a part are copied each time."""
+        return self._all if self.whole is None else self.whole.columns[:, self.places]
+
+    def products(self, columns: Array) -> Array:
+        """Return the products of all columns with further ones (N, k), (q, k), or with one (N,)."""
+        if not self.groups:
+            return np.zeros((0, *columns.shape[1:]))
+        if self.whole is None:
+            return np.asarray(self._all.T @ columns)
+        return self.whole.products(columns)[self.places]
 
     @cached_property
     def places(self) -> NDArray[np.intp]:
@@ -173,7 +185,7 @@ class Point:
     varied: Mapping[str, Array] = field(default_factory=dict)
     linear: bool = False
     numbers: int = 0
-    _beside: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _beside: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def count(self) -> int:
@@ -218,31 +230,39 @@ class Point:
             _beside={},
         )
 
-    def beside(self, ground: Background) -> tuple[Array, Array]:
-        """Return all columns, those of a background last, and their products; worked out once."""
-        if id(ground) not in self._beside:
+    def products(self, ground: Background, columns: Array) -> Array:
+        """Return the products of all columns, those of a background last, with further ones.
+
+        Parameters
+        ----------
+        ground : Background
+            q columns.
+        columns : (N, k) or (N,) float
+            The further ones.
+
+        Returns
+        -------
+        (p + l + q, k) or (p + l + q,) float
+        """
+        own = self.columns.T @ columns, self.inexact.T @ columns
+        return np.concatenate([*own, ground.products(columns)])
+
+    def gram(self, ground: Background) -> Array:
+        """Return the products of all columns with each other, (p + l + q, p + l + q)."""
+        if "own" not in self._beside:
             named = np.concatenate([self.columns, self.inexact], axis=1)
-            beside = ground.columns if ground.groups else named[:, :0]
-            columns = np.concatenate([named, beside], axis=1)
-            mixed = self._with(ground)
-            gram = np.block([[named.T @ named, mixed], [mixed.T, ground.gram]])
-            self._beside[id(ground)] = columns, gram
-        known: tuple[Array, Array] = self._beside[id(ground)]
-        return known
+            self._beside["own"] = named.T @ named
+        if self._beside.get("ground") is not ground:
+            mixed = self.mixed(ground)
+            gram = np.block([[self._beside["own"], mixed], [mixed.T, ground.gram]])
+            self._beside.update(ground=ground, gram=gram)
+        return np.asarray(self._beside["gram"])
 
-    def scores(self, there: Background, absent: Background) -> tuple[Array, Array, list[Array]]:
-        """Return what `Evidence.scores` takes of groups that are not there."""
-        whole = absent.whole or absent
-        mixed = np.vstack([self._with(absent), whole.gram[np.ix_(there.places, absent.places)]])
-        blocks = [each.columns.T @ each.columns for each in absent.groups]
-        return mixed, absent.columns.T @ self.left, blocks
-
-    def _with(self, ground: Background) -> Array:
+    def mixed(self, ground: Background) -> Array:
         """Return the products of the set's columns with those of a background, (p + l, q)."""
-        whole = ground if ground.whole is None else ground.whole
-        key = "mixed", id(whole)
-        if key not in self._beside:
-            named = np.concatenate([self.columns, self.inexact], axis=1)
-            beside = whole.columns if whole.groups else named[:, :0]
-            self._beside[key] = named.T @ beside
-        return np.asarray(self._beside[key][:, ground.places])
+        whole = ground.whole or ground
+        if self._beside.get("whole") is not whole:
+            own = self.columns, self.inexact
+            mixed = np.concatenate([whole.products(each).T for each in own])
+            self._beside.update(whole=whole, mixed=mixed)
+        return np.asarray(self._beside["mixed"][:, ground.places])
