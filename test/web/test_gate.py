@@ -1,6 +1,7 @@
 """Who is answered: names of this machine, or whoever has the token; nothing too large."""
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -32,7 +33,9 @@ def answer(gate, query=b"", kind="http", body=(b"",), **headers):
     async def send(message):
         sent.append(message)
 
-    asyncio.run(gate(scope, receive, send))
+    # Playwright leaves a loop running in the thread of the tests.
+    with ThreadPoolExecutor(1) as other:
+        other.submit(asyncio.run, gate(scope, receive, send)).result()
     return sent
 
 

@@ -9,7 +9,6 @@ from typing import Any
 from wrist_stiffness.cli.options import table_named, whole_load
 from wrist_stiffness.cli.output import say
 from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
-from wrist_stiffness.mechanism.components import LINKS
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015.yaml")
@@ -92,7 +91,8 @@ def add_parser(commands: Commands) -> None:
     what = "stiffness of a link drawn in CAD"
     part = add_command(actions, "part", what, (PART, PART_EPILOG), _part)
     part.add_argument("step", help="STEP file")
-    part.add_argument("--link", required=True, choices=LINKS, help="the link that it draws")
+    links = ("link_1", "link_2", "link_3")
+    part.add_argument("--link", required=True, choices=links, help="the link that it draws")
     part.add_argument("--geometry", metavar="FILE", help="of its wrist (default: the shipped one)")
 
     check = add_command(actions, "check", "verify a table", (CHECK, CHECK_EPILOG), _check)
