@@ -66,6 +66,8 @@ def test_the_command_prints_what_a_geometry_file_takes(geometry, tmp_path, capsy
 def test_what_is_no_link_is_refused(geometry, coarse, tmp_path):
     path = tmp_path / "link.step"
     said = {}
+    with pytest.raises(GeometryError, match=r"link.step: cannot be read: No such file"):
+        step_part(path, geometry, "link_1", coarse)
     path.write_text("ISO-10303-21;")
     with pytest.raises(GeometryError, match=r"link.step: not a STEP file"):
         step_part(path, geometry, "link_1", coarse)

@@ -20,6 +20,7 @@ from wrist_stiffness.sessions.observing import observe, without_mounting
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.web.bench import Bench
 
 UP = np.array([0.0, 0.0, 1.0])
 NONE = np.zeros(3)
@@ -243,3 +244,13 @@ def test_a_wrong_description_is_refused(tmp_path, was, now, told):
     table.write_text(f"{SETTINGS},a_um,b_um,c_um,d_um,e_um,level_mdeg\n")
     with pytest.raises(InputError, match=told):
         import_csv(table, tmp_path / "bag.mcap", gauges_file=gauges)
+
+
+def test_the_page_says_that_its_pictures_need_poses(tmp_path, model):
+    block = conditions(30)
+    bag = imported(tmp_path, block, readings_of(model, block))
+    bench = Bench(tmp_path, lambda text: None, lambda done, total: None)
+    with pytest.raises(
+        InputError, match=r"bag\.mcap: readings of gauges; the pictures of this page"
+    ):
+        bench.open_named([bag.name], "")

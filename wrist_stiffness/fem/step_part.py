@@ -15,6 +15,7 @@ from wrist_stiffness.fem.mesh import SolidMesh, mesh_solid
 from wrist_stiffness.fem.parts import assemble_mesh, wrist_parts
 from wrist_stiffness.fem.solids import MILLIMETRES, MeshSettings
 from wrist_stiffness.fem.superelement import frame_stiffness
+from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.fits import WIDEST_FIT
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -81,6 +82,7 @@ def step_part(path: Path, geometry: Geometry, link: str, sizes: MeshSettings) ->
 
 
 def _mesh(path: Path, sizes: MeshSettings) -> SolidMesh:
+    open_input(path, GeometryError).close()
     try:
         shape = OCCGeometry(str(path)).shape
     except NgException as error:
