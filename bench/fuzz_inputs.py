@@ -43,6 +43,7 @@ from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
 from wrist_stiffness.recording.fixed_layout import FixedReader
 from wrist_stiffness.recording.messages import MESSAGE_TYPES
+from wrist_stiffness.sessions.reading.gauges_file import read_gauges
 
 PROJECT = Path(__file__).parents[1]
 SLOW_S, LARGE_BYTES = 2.0, 500 << 20
@@ -75,6 +76,15 @@ FRAMES = (
 RIVALS = """{"schema": 2, "noise": {"s_um": 1.0, "phi_mdeg": 2.0}, "suspects": [], "findings":
 [{"class": [{"effect": "backlash", "component": "motor_1"}],
 "parameters": {"width_mdeg": [20.0, 2.0]}}], "not_excited": []}"""
+GAUGES = """schema: 1
+gauges:
+  - {column: a_um, point_mm: [25, 0, -12], direction: [0, 0, 1]}
+  - {column: level_mdeg, direction: [1, 0, 0]}
+"""
+OWN = """  link_1: {stiffness: {origin_mm: [0, 0, 0], x: [1, 0, 0], y: [0, 1, 0], matrix_N_mm: [
+             [9000, 0, 0, 0, 0, 0], [0, 9000, 0, 0, 0, 0], [0, 0, 9000, 0, 0, 0],
+             [0, 0, 0, 9000000, 0, 0], [0, 0, 0, 0, 9000000, 0], [0, 0, 0, 0, 0, 9000000]]},
+           """
 TABLE = """\
 time_s,motor_1_deg,motor_2_deg,fx_N,fy_N,fz_N,mx_Nm,my_Nm,mz_Nm,x_mm,y_mm,z_mm,T_link_1_degC
 0,10,5,0,0,-1,0,0,0,0.001,0.002,0.003,20
@@ -265,6 +275,7 @@ def parsers(folder: Path) -> dict[str, tuple[list[bytes], Mutate, Callable[[byte
     data = PROJECT / "test/data/replay"
     table = (PROJECT / "precomputed/palmieri2015_25_poses.npz").read_bytes()
     (folder / "t.npz").write_bytes(table)
+    shipped = (PROJECT / "config/palmieri2015.yaml").read_text()
     model = re.sub(r"path: .*npz", "path: t.npz", (data / "effects.yaml").read_text())
     model = re.sub(r"\n *checksum: .*", "", model)
 
@@ -300,12 +311,13 @@ def parsers(folder: Path) -> dict[str, tuple[list[bytes], Mutate, Callable[[byte
         "frames": ([FRAMES.encode()], lambda d: frames_from_yaml(d.decode("utf-8", "replace"))),
         "formula": ([FORMULA.encode()], lambda d: Formula(d.decode("utf-8", "replace"), VARIABLES)),
         "geometry": (
-            [(PROJECT / "config/palmieri2015.yaml").read_bytes()],
+            [shipped.encode(), shipped.replace("  link_1: {", OWN).encode()],
             file("g.yaml", load_geometry),
         ),
         "model": ([model.encode()], file("m.yaml", load_model)),
         "parameters": ([(data / "parameters.yaml").read_bytes()], file("p.yaml", node_settings)),
         "loads": ([LOADS.encode()], file("l.yaml", lambda path: read_loads(path, gravity, 20.0))),
+        "gauges": ([GAUGES.encode()], file("gauges.yaml", read_gauges)),
         "rivals": ([RIVALS.encode()], file("r.json", read_rivals)),
         "metadata": ([metadata], file("bag/metadata.yaml", bag)),
         "csv": (
