@@ -75,7 +75,7 @@ def test_a_class_is_named_by_a_set_that_was_fitted(rng, kept):
     assert best.names
     unfitted = {frozenset((name,)) for name in search.promised} - set(search.states)
     promises = [search.promised[name] for names in unfitted for name in names]
-    assert max(promises) > best.evidence.log
+    assert search.base.evidence.log + max(promises) > best.evidence.log
     chances = probabilities(search)
     assert max(chances[names] for names in unfitted) <= chances[best.names]
     reading = read(search)
@@ -108,3 +108,40 @@ def test_a_better_nominal_fit_is_asked_anew(rng):
 
 def _rest(point):
     return point.columns, point.z, point.weight, point.effects, point.inexact, point.varied
+
+
+@pytest.mark.parametrize("only_whole", [False, True])
+def test_a_whole_fit_is_for_what_comes_near_the_best_to_first_order(rng, only_whole):
+    """All slopes promise something; beside the cause the others promise little."""
+
+    class Told(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            cause = rng.normal(size=ROWS)
+            self.left = 3.0 * cause + rng.normal(size=ROWS)
+            for number, name in enumerate(self.slopes):
+                noise = rng.normal(size=ROWS)
+                own = cause if number == 3 else 0.6 * cause + 0.8 * noise
+                self.slopes[name] = self.whole[name] = own[:, None]
+            self.fitted_whole = []
+
+        def tangent(self, fit, ranked):
+            if only_whole:
+                return None
+            name, point = ranked.trial.name, fit.point
+            columns, varied = -self.slopes[name], self.slopes[name] * ranked.z
+            left = point.left + columns @ ranked.z
+            return point.with_effect(name, left, columns, ranked.z, varied, 0.0)
+
+        def added(self, fit, ranked):
+            self.fitted_whole.append(ranked.trial.name)
+            return super().added(fit, ranked)
+
+    problem = Told(rng)
+    search = Search(problem, most_effects=1)
+    search.run()
+    assert search.best.names == {"law_3@place"}
+    if only_whole:
+        assert len(problem.fitted_whole) >= LEADERS
+    else:
+        assert problem.fitted_whole == ["law_3@place"]
