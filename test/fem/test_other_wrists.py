@@ -68,7 +68,12 @@ def store(tmp_path_factory):
     ("arcs", "motors", "askew"),
     [
         ((60.0, 60.0, 60.0), 90.0, 0.0),
-        ((75.0, 75.0, 75.0), 90.0, 0.0),
+        ((75.0, 75.0, 75.0), 75.0, 40.0),
+        ((90.0, 90.0, 90.0), 120.0, -20.0),
+        ((105.0, 105.0, 105.0), 60.0, 20.0),
+        ((120.0, 120.0, 120.0), 90.0, 0.0),
+        ((60.0, 90.0, 120.0), 120.0, -20.0),
+        ((105.0, 75.0, 90.0), 60.0, 20.0),
     ],
 )
 def test_other_links_and_axes_are_built(store, arcs, motors, askew):
@@ -103,3 +108,11 @@ def test_other_links_and_axes_are_built(store, arcs, motors, askew):
 def test_what_cannot_be_built_is_refused(arc, tilt, message):
     with pytest.raises(GeometryError, match=message):
         checked(wrist((arc, 90.0, 90.0), tilt=tilt))
+
+
+def test_a_link_that_runs_into_a_pin_is_named_with_its_pose():
+    values = wrist((90.0, 60.0, 60.0), 60.0, 30.0, tilt=35.0)
+    values["limits"] |= {"joint_lower_deg": [-170.0] * 2, "joint_upper_deg": [170.0] * 2}
+    message = r"the pin of joint_3 and link_1 are in one place at motor angles \(89.857, -11.091\)"
+    with pytest.raises(GeometryError, match=message):
+        checked(values)

@@ -77,6 +77,47 @@ def test_a_bearing_that_spins_freely_is_no_softer_across(shipped):
     np.testing.assert_allclose(found, np.diag(expected), atol=1e-9 * expected.max())
 
 
+def test_a_pair_of_bearings_is_its_balls():
+    """Each ball a spring along its line of contact, at its place on the pitch circle."""
+    ball, contact, pitch, apart, count = 4e6, np.radians(25.0), 9e-3, 11e-3, 7
+    geometry = geometry_from_values(VALUES)
+    axis = geometry.axes["joint_5"]
+    across = np.linalg.svd(axis[None])[2][1:]
+    stiffness = np.zeros((6, 6))
+    # Back to back: the lines of contact lean outwards, so pressure centres are farther apart.
+    for side in (1.0, -1.0):
+        for turn in 2.0 * np.pi / count * np.arange(count):
+            outwards = np.cos(turn) * across[0] + np.sin(turn) * across[1]
+            line = np.cos(contact) * outwards - side * np.sin(contact) * axis
+            place = (geometry.bushings["joint_5"].radius + side * apart / 2.0) * axis
+            wrench = np.concatenate([line, np.cross(place + pitch * outwards, line)])
+            stiffness += ball * np.outer(wrench, wrench)
+    pair = {
+        "radial_N_um": 1e-6 * count * ball * np.cos(contact) ** 2 / 2.0,
+        "axial_N_um": 1e-6 * count * ball * np.sin(contact) ** 2,
+        "distance_mm": 1e3 * (apart + 2.0 * pitch * np.tan(contact)),
+    }
+    found = read("joint_5", {"bearings": pair})
+    # The free turn about the axis, which passes through O, has neither stiffness nor flexibility.
+    expected = np.linalg.pinv(stiffness, rcond=1e-12, hermitian=True)
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs((found - expected) / size).max() < READ
+
+
+@pytest.mark.parametrize(
+    ("joint", "change", "message"),
+    [
+        ("joint_1", {"radial_N_um": 0.0}, "radial_N_um: 0.0 is not above 0"),
+        ("joint_1", {"axial_N_um": None}, "bearings.axial_N_um: None is not a finite"),
+        ("joint_2", {}, "joint_2.stiffness: is for a joint without flanges"),
+    ],
+)
+def test_bearings_that_cannot_be_are_refused(joint, change, message):
+    pair = {"radial_N_um": 20.0, "axial_N_um": 8.0, "distance_mm": 12.0}
+    with pytest.raises(GeometryError, match=message):
+        read(joint, {"bearings": pair | change})
+
+
 @pytest.mark.parametrize(
     ("part", "change", "message"),
     [

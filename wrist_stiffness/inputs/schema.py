@@ -20,6 +20,7 @@ from wrist_stiffness.errors import with_a_point
 from wrist_stiffness.inputs.document import Node
 
 UNITS = {
+    "N_um": 1e6,
     "mm": 1e-3,
     "um": 1e-6,
     "deg": np.pi / 180.0,
@@ -28,7 +29,8 @@ UNITS = {
     "1e-6_K": 1e-6,
     **dict.fromkeys(("s", "kg", "N", "Nm", "kg_m3", "m_s2", "degC"), 1.0),
 }
-"""How a key may end, and how much that is in SI (a temperature stays in degrees Celsius)."""
+"""How a key may end, longer ends first, and how much that is in SI (a temperature stays in degrees
+Celsius)."""
 
 UNIT_TOLERANCE = 1e-6
 """Axes are typed with finite digits: they are made unit if their length is this close to 1."""

@@ -93,7 +93,8 @@ class BushingDimensions:
     material : Material
         Material of the sleeve.
     stiffness : OwnStiffness or None
-        Given by the file instead of the sleeve's, where no flange takes part in contact.
+        Given by the file, or of its ball bearings, instead of the sleeve's, where no flange takes
+        part in contact.
     """
 
     radius: float

@@ -41,7 +41,7 @@ from wrist_stiffness.mechanism.geometry import (
     PlatformDimensions,
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.own_stiffness import own_stiffness
+from wrist_stiffness.mechanism.own_stiffness import bearing_pair, own_stiffness
 from wrist_stiffness.mechanism.vectors import unit
 
 SCHEMA = 1
@@ -279,7 +279,12 @@ def _bushing(material: Schema[Material], axes: dict[str, Array]) -> Schema[Bushi
             )
         if "stiffness" in node.value and (bushing.inner_gap, bushing.outer_gap) != (None, None):
             raise node["stiffness"].refuse("is for a joint without flanges: its gaps must be null")
-        slide_and_turn = np.kron(np.eye(2), axes[joint][:, None]).astype(np.float64)
+        axis = axes[joint]
+        given = node.value.get("stiffness")
+        if isinstance(given, Node) and isinstance(given.value, dict) and "bearings" in given.value:
+            pair = record({"bearings": bearing_pair(bushing.radius * axis, axis)})
+            return replace(bushing, stiffness=pair(given)["bearings"])
+        slide_and_turn = np.kron(np.eye(2), axis[:, None]).astype(np.float64)
         return _with_own(node, bushing, abs(bushing.radius), slide_and_turn)
 
     return read

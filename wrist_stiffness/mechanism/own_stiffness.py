@@ -1,4 +1,4 @@
-"""A part's own 6 x 6 stiffness, measured or from another solver, instead of that of its drawing."""
+"""A part's own 6 x 6 stiffness, measured or from another solver, or of a pair of ball bearings."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from wrist_stiffness.inputs.document import Node
 from wrist_stiffness.inputs.schema import (
     UNIT_TOLERANCE,
     Quantity,
+    Schema,
     direction,
     list_of,
+    number,
     record,
     vector,
 )
@@ -88,6 +90,40 @@ def own_stiffness(node: Node, distance: float, free: Array) -> OwnStiffness:
     at_frame = (matrix + matrix.T) / 2.0 / IN_MILLIMETRES
     wrench = to_origin @ axes
     return OwnStiffness(_inverse(place, wrench @ at_frame @ wrench.T, distance, free))
+
+
+def bearing_pair(centre: Array, axis: Array) -> Schema[OwnStiffness]:
+    """Return the schema of a preloaded pair of ball bearings on an axis that turns freely.
+
+    Of one bearing `radial_N_um` and `axial_N_um`; `distance_mm` between the pressure centres, where
+    the lines of contact meet the axis.  Balls that share a preload evenly are exactly a radial and
+    an axial spring at that point: T. C. Lim and R. Singh, J. Sound Vib. 139 (1990) 179.
+
+    Parameters
+    ----------
+    centre : (3,) float
+        The middle of the pair in F at home [m].
+    axis : (3,) float
+        Unit vector.
+
+    Returns
+    -------
+    schema
+        Refuses what is missing or not positive.
+    """
+    keys = dict.fromkeys(("radial_N_um", "axial_N_um", "distance_mm"), Quantity(number(above=0.0)))
+
+    def make(radial: float, axial: float, distance: float) -> OwnStiffness:
+        along = np.outer(axis, axis)
+        across = np.eye(3) - along
+        flexibility = np.zeros((6, 6))
+        flexibility[:3, :3] = across / (2.0 * radial) + along / (2.0 * axial)
+        flexibility[3:, 3:] = across * 2.0 / (radial * distance**2)
+        to_origin = np.eye(6)
+        to_origin[:3, 3:] = skew(centre)
+        return OwnStiffness(to_origin @ flexibility @ to_origin.T)
+
+    return record(keys, make=make)
 
 
 def in_millimetres(stiffness: Array) -> Array:
