@@ -278,5 +278,5 @@ def _gap_rows(
         rows.append(sparse.csr_matrix(by_hub + sparse.csr_matrix(pressure.T) @ t))
         bushing = wrist.geometry.bushings[part.name]
         of_flange = dict(zip(FLANGES, (bushing.inner_gap, bushing.outer_gap), strict=True))
-        gaps += [of_flange[sector.rsplit("_", 1)[0]] for sector in sectors]
+        gaps += [of_flange[sector.split("_")[0]] for sector in sectors]
     return sparse.csr_matrix(sparse.vstack(rows)), np.array(gaps, dtype=float)

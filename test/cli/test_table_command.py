@@ -248,7 +248,8 @@ def test_build_writes_a_table_that_is_good(tmp_path, monkeypatch, capsys):
     )
     monkeypatch.setattr(sweep, "BuildSettings", partial(sweep.BuildSettings, sizes=sizes))
     monkeypatch.chdir(tmp_path)
-    assert main(["table", "build", "-o", "built.npz", "--grid", "5", "--json", "built.json"]) == 0
+    options = ["--grid", "5", "--tolerance", "0.2", "--json", "built.json"]
+    assert main(["table", "build", "-o", "built.npz", *options]) == 0
     shown = capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["built.json", "built.npz"]
     header, table = json.loads((tmp_path / "built.json").read_text()), load_table("built.npz")

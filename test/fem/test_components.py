@@ -165,7 +165,7 @@ def test_shapes_that_cannot_be_built_are_refused(make_wrist, coarse):
         link_shape(replace(link, motor_bore=6.9e-3), 0.2, coarse)
     bushing = make_wrist().bushings["joint_2"]
     with pytest.raises(GeometryError, match="flange of 6.000 mm is not wider"):
-        bushing_section(replace(bushing, flange_diameter=6e-3), coarse)
+        bushing_section(replace(bushing, flange_diameter=6e-3), coarse, 2)
 
 
 def test_a_shape_that_netgen_cannot_mesh_is_one_clear_error():

@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from wrist_stiffness.fem.components import elastic_components
 from wrist_stiffness.fem.one_sided import PatchedWrist, patch_bushing, solve_patches
-from wrist_stiffness.fem.parts import assemble_body, wrist_parts
+from wrist_stiffness.fem.parts import RINGS, assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.mechanism.components import ELASTIC
@@ -40,7 +40,7 @@ def make_patched(geometry, components):
     def patched(wall_rings: int) -> PatchedWrist:
         parts = wrist_parts(geometry)
         bushings = {
-            part.name: patch_bushing(assemble_body(part.solid, SIZES), wall_rings, 1)
+            part.name: patch_bushing(assemble_body(part.solid, SIZES), wall_rings)
             for part in parts
             if part.solid.is_bushing
         }
@@ -167,4 +167,4 @@ def test_patches_answer_alike_around_the_bushing(patched):
     turned = np.roll(bushing.flexibility, (size, size), axis=(0, 1))
     np.testing.assert_allclose(turned, bushing.flexibility, atol=1e-9 * np.abs(turned).max())
     assert np.linalg.eigvalsh(bushing.flexibility)[0] > 0.0
-    assert np.count_nonzero(bushing.surface == "inner") == slices
+    assert np.count_nonzero(bushing.surface == "inner") == RINGS * slices

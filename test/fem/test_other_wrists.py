@@ -24,6 +24,7 @@ COARSE = BuildSettings(
     sizes=MeshSettings(
         link=6e-3, bore=3e-3, bushing=1.5e-3, bushing_corner=0.6e-3, bushing_arc=4e-3
     ),
+    tolerance=1.0,
     per_axis=5,
 )
 AGREEMENT = 1e-6

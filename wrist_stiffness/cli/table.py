@@ -15,8 +15,8 @@ SHIPPED = shipped_file("config/palmieri2015.yaml")
 
 BUILD = """\
 Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
-joint space. The grid is refined until poses that it never saw agree to the tolerance. Takes one to
-three minutes."""
+joint space. Mesh, contact rings and grid are refined until the stated error keeps the tolerance, or
+it says what does not. Takes one to three minutes with the default."""
 
 BUILD_EPILOG = """\
 example, a wrist of one's own:
@@ -63,8 +63,7 @@ def add_parser(commands: Commands) -> None:
     build = add_command(actions, "build", what, (BUILD, BUILD_EPILOG), _build)
     build.add_argument("geometry", nargs="?", help="geometry file (default: the shipped wrist's)")
     build.add_argument("-o", "--output", required=True, metavar="TABLE", help="ends in .npz")
-    error = "largest relative error of the interpolated s and phi"
-    build.option("--tolerance", 0.005, error, "FRACTION")
+    build.option("--tolerance", 0.025, "largest error of s and phi to be stated", "FRACTION")
     build.add_argument(
         "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
     )
@@ -153,9 +152,15 @@ def _build(arguments: argparse.Namespace) -> int:
         kernel=arguments.kernel,
         progress=Progress("sweep"),
     )
+    lines = [*fact_lines(built)]
+    if (stated := built.header.errors["stated_relative"]) > arguments.tolerance:
+        lines.append(
+            f"tolerance {100 * arguments.tolerance:g} % NOT met: the stated error is "
+            f"{100 * stated:.2f} %"
+        )
     written = f"written: {arguments.output} (checksum {built.checksum[:12]})"
     values = asdict(built.header) | {"checksum": built.checksum}
-    return say(arguments, [*fact_lines(built), written], values)
+    return say(arguments, [*lines, written], values)
 
 
 def _part(arguments: argparse.Namespace) -> int:

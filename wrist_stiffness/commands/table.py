@@ -34,7 +34,7 @@ def build(
     output: str | Path,
     evaluation: Evaluation = "closed_form",
     interface: str = "rigid",
-    tolerance: float = 0.005,
+    tolerance: float = 0.02,
     per_axis: int | None = None,
     kernel: Kernel = "thin_plate",
     progress: Progress = silent,
@@ -54,9 +54,9 @@ def build(
     interface : str
         `rigid`, `distributing` or `sliding` walls.
     tolerance : float
-        Largest relative interpolation error in the operative workspace.
+        Relative error of s and phi that mesh, contact rings and grid are refined to.
     per_axis : int or None
-        Fixed grid, 5 for the paper's 25 poses; None refines to the tolerance.
+        Fixed grid, 5 for the paper's 25 poses; None refines it too.
     kernel : str
         `thin_plate`, or `sandwell` as in the paper.
     progress : callable

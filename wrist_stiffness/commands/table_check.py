@@ -106,6 +106,8 @@ def check(
             interface=header.interface,  # type: ignore[arg-type]
             evaluation=header.evaluation,
             kernel=header.kernel,
+            rings=header.mesh["rings"],
+            tolerance=np.inf,
             per_axis=header.per_axis,
         )
         again = build_table(header.geometry, settings, progress)

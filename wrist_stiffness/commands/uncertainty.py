@@ -41,7 +41,7 @@ SECOND_ORDER, SECOND_ORDER_NAME = "second_order", "second order: finite rotation
 
 STATED_PARTS = {
     "mesh": "finite elements, extrapolated",
-    "contact": "flange contact: one ring against four",
+    "contact": "flange contact: rings over the width",
     "walls": "sliding walls that lift off",
     SECOND_ORDER: SECOND_ORDER_NAME,
 }
@@ -78,18 +78,14 @@ def contributions(table: Table) -> list[Contribution]:
     Returns
     -------
     list of Contribution
-        A part that an older version did not state is absent.
+        A part that the table does not state is absent.
     """
     errors, found = table.header.errors, []
     for part, name in STATED_PARTS.items():
         if bound := errors.get(part):
-            # Tables of older versions state the mesh's mean error and no other numerical one.
-            mean = part == "mesh" and "contact" not in errors
-            found.append(_contribution(f"{name} (mean)" if mean else name, bound, True))
+            found.append(_contribution(name, bound, True))
     used = table.header.evaluation == "spline"
     found.append(_contribution("spline", errors["predicted"]["operative"], used))
-    if SECOND_ORDER not in errors:
-        found.append(_contribution(SECOND_ORDER_NAME, second_order(table), False))
     poses, loads = _draws(table, DRAWS)
     configuration = table.mechanism.forward(poses)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.condensed_store import PACKAGES, CondensedSolid, condense_solid
-from wrist_stiffness.fem.parts import Part, Solid, wrist_parts
+from wrist_stiffness.fem.parts import RINGS, Part, Solid, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
 from wrist_stiffness.mechanism.components import (
@@ -26,10 +26,7 @@ from wrist_stiffness.mechanism.vectors import skew
 SHIPPED_SIZES = MeshSettings(
     link=1.2e-3, bore=0.8e-3, bushing=0.5e-3, bushing_corner=0.02e-3, bushing_arc=1.4e-3
 )
-"""Element sizes of the shipped tables.  On the shipped wrist, over the operative workspace, s, phi
-and the norm of C come out too small by 0.53, 0.50 and 0.49 % with the order that
-`convergence.mesh_convergence` allows (factors 2.25, 1.5, 1, 2/3), by 0.38, 0.32 and 0.32 % with
-the order observed."""
+"""Element sizes of the shipped tables, which state what these leave out."""
 
 Condenser = Callable[[Solid, MeshSettings, Interface], CondensedSolid]
 """Makes the superelement of a solid."""
@@ -70,7 +67,7 @@ def elastic_components(
     interface: Interface = "rigid",
     progress: PartProgress | None = None,
     condenser: Condenser = condense_solid,
-    rings: int = 1,
+    rings: int = RINGS,
 ) -> tuple[ElasticComponents, Provenance]:
     """Condense every elastic part of a wrist.
 

@@ -25,7 +25,6 @@ from wrist_stiffness.fem.parts import (
     ElasticBody,
     Part,
     assemble_body,
-    split_into_rings,
     wrist_parts,
 )
 from wrist_stiffness.fem.revolve import SECTORS
@@ -71,7 +70,7 @@ PIN = {"joint_2": "link_1_tip", "joint_3": "link_3_tip", "joint_4": "link_2_tip"
 SLIDES_ON = {**HUB, "joint_1": "link_1_root", "joint_5": "link_2_root"}
 """The frame that slides or turns on a bushing."""
 
-WALL_RINGS, FLANGE_RINGS = 4, 1
+WALL_RINGS = 4
 """Patches for `lifting_misses`, whose ratio is steadier than what it divides (docs/walls.md)."""
 
 MOST_STEPS = 200
@@ -104,16 +103,16 @@ class PatchedBushing:
     area: Array
 
 
-def patch_bushing(body: ElasticBody, wall_rings: int, flange_rings: int) -> PatchedBushing:
+def patch_bushing(body: ElasticBody, wall_rings: int) -> PatchedBushing:
     """Condense a bushing onto its contact patches.
 
     Parameters
     ----------
     body : ElasticBody
-        A bushing; there are as many patches around as its mesh has slices.
-    wall_rings, flange_rings : int
-        Patches along the wall, and over the width of a flange: of equal numbers of mesh lines, so
-        finest where the mesh is.
+        A bushing; there are as many patches around as its mesh has slices, and over the width of a
+        flange as its solid has rings.
+    wall_rings : int
+        Patches along the wall, of equal numbers of mesh lines, so finest where the mesh is.
 
     Returns
     -------
@@ -125,23 +124,26 @@ def patch_bushing(body: ElasticBody, wall_rings: int, flange_rings: int) -> Patc
     held = (3 * mesh.surface_nodes(solid.motor_wall)[:, None] + np.arange(3)).ravel()
     free = np.setdiff1d(np.arange(3 * len(mesh.nodes)), held)
     presses_outwards = 1.0 if solid.platform_wall == "pin_wall" else -1.0
-    surfaces = [("wall", mesh.surfaces[solid.platform_wall], wall_rings, 0, presses_outwards)]
+    surfaces = [
+        ("wall", line, 0, presses_outwards)
+        for line in _split_along(mesh, mesh.surfaces[solid.platform_wall], wall_rings)
+    ]
     for flange, sign in zip(FLANGES, (-1.0, 1.0), strict=True):
-        if flange in solid.flanges:
-            whole = np.concatenate([mesh.surfaces[f"{flange}_{k}"] for k in range(SECTORS)])
-            surfaces.append((flange, whole, flange_rings, 2, sign))
+        for ring in range(solid.rings) if flange in solid.flanges else ():
+            sectors = [mesh.surfaces[f"{flange}_{ring}_{k}"] for k in range(SECTORS)]
+            surfaces.append((flange, np.concatenate(sectors), 2, sign))
     turn = 2.0 * np.pi / mesh.slices
     modes, names, places = [], [], []
     for k in range(mesh.slices):
-        for name, facets, rings, way, sign in surfaces:
-            for patch in split_into_rings(mesh, _slice(mesh, facets, k), rings, way == 2):
-                integrals = surface_integrals(replace(mesh, surfaces={"patch": patch}), "patch")
-                area, *moment = integrals.sum(axis=0)
-                mode = np.zeros((len(mesh.nodes), 3))
-                mode[:, way] = sign * integrals[:, 0] / area
-                modes.append(mode.ravel())
-                names.append(name)
-                places.append([(k + 0.5) * turn, moment[2] / area, area])
+        for name, facets, way, sign in surfaces:
+            patch = _slice(mesh, facets, k)
+            integrals = surface_integrals(replace(mesh, surfaces={"patch": patch}), "patch")
+            area, *moment = integrals.sum(axis=0)
+            mode = np.zeros((len(mesh.nodes), 3))
+            mode[:, way] = sign * integrals[:, 0] / area
+            modes.append(mode.ravel())
+            names.append(name)
+            places.append([(k + 0.5) * turn, moment[2] / area, area])
     loads, count = np.array(modes).T, len(modes) // mesh.slices
     factor = factorise_cyclic(body.stiffness, axes, mesh.nodes, free, mesh.slices)
     by_first = loads[free].T @ factor.solve(loads[free, :count])
@@ -290,9 +292,9 @@ def lifting_misses(
     (n, 2) float
         Lengths of the differences of s and phi over those of the two-sided walls.
     """
-    parts = wrist_parts(geometry)
+    parts = wrist_parts(geometry, rings=1)
     bushings = {
-        part.name: patch_bushing(assemble_body(part.solid, sizes), WALL_RINGS, FLANGE_RINGS)
+        part.name: patch_bushing(assemble_body(part.solid, sizes), WALL_RINGS)
         for part in parts
         if part.solid.is_bushing
     }
@@ -399,3 +401,14 @@ def _slice(mesh: SolidMesh, facets: NDArray[np.int64], number: int) -> NDArray[n
     centre = mesh.tets.p[:, mesh.tets.facets[:, facets]].mean(axis=1)
     angle = np.arctan2(centre[1], centre[0]) % (2.0 * np.pi)
     return facets[(angle * mesh.slices / (2.0 * np.pi)).astype(int) == number]
+
+
+def _split_along(mesh: SolidMesh, facets: NDArray[np.int64], rings: int) -> list[NDArray[np.int64]]:
+    """Split a wall's facets along z into rings of equal numbers of mesh lines, at most one each."""
+    height = mesh.tets.p[2, mesh.tets.facets[:, facets]]
+    # Both triangles of a mesh line's quadrilateral reach from one of its ends to the other.
+    lines, of_facet = np.unique(
+        np.round(height.min(axis=0) + height.max(axis=0), 9), return_inverse=True
+    )
+    rings = min(rings, len(lines))
+    return [facets[of_facet * rings // len(lines) == k] for k in range(rings)]

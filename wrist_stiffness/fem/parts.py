@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from wrist_stiffness.fem.elasticity import (
@@ -30,6 +29,9 @@ from wrist_stiffness.mechanism.geometry import (
     Material,
 )
 from wrist_stiffness.mechanism.vectors import skew
+
+RINGS = 2
+"""Contact modes over the width of a flange; what more would change is stated by each table."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class Solid:
     flanges : tuple of str
         Flanges that take part in contact.
     rings : int
-        Contact modes over the width of each sector, of equal numbers of mesh lines.
+        Contact modes over the width of each sector.
     """
 
     dimensions: LinkDimensions | BushingDimensions
@@ -96,7 +98,7 @@ class Solid:
     motor_wall: str
     platform_wall: str
     flanges: tuple[str, ...]
-    rings: int = 1
+    rings: int = RINGS
 
     @property
     def material(self) -> Material:
@@ -111,7 +113,12 @@ class Solid:
     @property
     def sectors(self) -> list[str]:
         """Names of the surfaces that carry contact modes, in order."""
-        return [f"{flange}_{k}" for flange in self.flanges for k in range(SECTORS)]
+        return [
+            f"{flange}_{ring}_{sector}"
+            for flange in self.flanges
+            for ring in range(self.rings)
+            for sector in range(SECTORS)
+        ]
 
 
 @dataclass(frozen=True)
@@ -152,7 +159,7 @@ class ElasticBody:
     pressure: Array
 
 
-def wrist_parts(geometry: Geometry, rings: int = 1) -> list[Part]:
+def wrist_parts(geometry: Geometry, rings: int = RINGS) -> list[Part]:
     """List the elastic parts of a wrist in the order of `ELASTIC`.
 
     Parameters
@@ -190,7 +197,11 @@ def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
     """
     if isinstance(solid.dimensions, LinkDimensions):
         return assemble_mesh(solid, mesh_solid(link_shape(solid.dimensions, solid.angle, sizes)))
-    return assemble_mesh(solid, _bushing_mesh(solid.dimensions, sizes))
+    sector_arc = math.pi * (solid.dimensions.pin_diameter + 2.0 * solid.dimensions.wall) / SECTORS
+    arcs = max(1, math.ceil(sector_arc / sizes.bushing_arc))
+    return assemble_mesh(
+        solid, revolve(bushing_section(solid.dimensions, sizes, solid.rings), arcs)
+    )
 
 
 def assemble_mesh(solid: Solid, mesh: SolidMesh) -> ElasticBody:
@@ -198,9 +209,8 @@ def assemble_mesh(solid: Solid, mesh: SolidMesh) -> ElasticBody:
     modes = []
     for sector in solid.sectors:
         away_from_hub = -1.0 if sector.startswith(FLANGES[0]) else 1.0
-        for ring in split_into_rings(mesh, mesh.surfaces[sector], solid.rings):
-            share = surface_integrals(replace(mesh, surfaces={"ring": ring}), "ring")[:, 0]
-            modes.append(away_from_hub * share / share.sum())
+        share = surface_integrals(mesh, sector)[:, 0]
+        modes.append(away_from_hub * share / share.sum())
     pressure = np.zeros((len(mesh.nodes), 3, len(modes)))
     for k, mode in enumerate(modes):
         pressure[:, 2, k] = mode
@@ -215,37 +225,6 @@ def assemble_mesh(solid: Solid, mesh: SolidMesh) -> ElasticBody:
     )
 
 
-def split_into_rings(
-    mesh: SolidMesh, facets: NDArray[np.int64], rings: int, along_radius: bool = True
-) -> list[NDArray[np.int64]]:
-    """Split facets of a swept surface into rings of equal numbers of mesh lines.
-
-    Parameters
-    ----------
-    mesh : SolidMesh
-        A bushing's.
-    facets : (n,) int
-        Of a flange, or of a wall.
-    rings : int
-        At most so many; no more than there are lines.
-    along_radius : bool
-        From inside out, as on a flange; else along z.
-
-    Returns
-    -------
-    list of (m,) int
-        Facets ring by ring.
-    """
-    corners = mesh.tets.p[:, mesh.tets.facets[:, facets]]
-    place = np.hypot(corners[0], corners[1]) if along_radius else corners[2]
-    # Both triangles of a mesh line's quadrilateral reach from one of its ends to the other.
-    lines, of_facet = np.unique(
-        np.round(place.min(axis=0) + place.max(axis=0), 9), return_inverse=True
-    )
-    rings = min(rings, len(lines))
-    return [facets[of_facet * rings // len(lines) == k] for k in range(rings)]
-
-
 def _link_part(geometry: Geometry, name: str) -> Part:
     motor_side, platform_side = geometry.link_ends(name)
     normal = np.cross(motor_side, platform_side)
@@ -257,12 +236,6 @@ def _link_part(geometry: Geometry, name: str) -> Part:
     bar = replace(geometry.links[name], stiffness=None)
     solid = Solid(bar, angle, "motor_bore", "platform_bore", ())
     return Part(name, solid, Placement(axes, np.zeros(3)))
-
-
-def _bushing_mesh(bushing: BushingDimensions, sizes: MeshSettings) -> SolidMesh:
-    sector_arc = math.pi / SECTORS * (bushing.pin_diameter + 2.0 * bushing.wall)
-    arcs = max(1, math.ceil(sector_arc / sizes.bushing_arc))
-    return revolve(bushing_section(bushing, sizes), arcs)
 
 
 def _bushing_part(geometry: Geometry, name: str, rings: int) -> Part:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import astuple, dataclass
 
+import numpy as np
 from netgen.occ import (
     Axes,
     Axis,
@@ -130,11 +131,13 @@ def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGe
     return OCCGeometry(bar)
 
 
-def bushing_section(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeometry:
+def bushing_section(bushing: BushingDimensions, sizes: MeshSettings, rings: int) -> OCCGeometry:
     """Half section of a flanged bushing in the plane of x = radius and y = place along the bore.
 
     Edges: `pin_wall` (the whole bore, under the flanges too), `hub_wall` (the sleeve's outside
-    between the flanges) and, where there is a flange, its edge towards the hub, `inner` or `outer`.
+    between the flanges) and, where there is a flange, its rings towards the hub from inside out,
+    `inner_0`, `inner_1` ... or `outer_0`, ....  Their widths grow as 1, 3, 5, ...: the pressure is
+    steepest at the sleeve.
     The ends of the hub wall and of the bore carry the singular stresses of a held edge, so the
     mesh is graded towards them; a section can afford it, a tetrahedral mesh of the solid cannot.
 
@@ -144,6 +147,8 @@ def bushing_section(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeome
         The bushing's dimensions [m]; its `radius` and the size of its gaps do not enter.
     sizes : MeshSettings
         Element sizes [m], stored in the shape.
+    rings : int
+        Rings over the width of a flange.
 
     Returns
     -------
@@ -167,14 +172,15 @@ def bushing_section(bushing: BushingDimensions, sizes: MeshSettings) -> OCCGeome
             f"of {2e3 * r_hub / MILLIMETRES:.3f} mm"
         )
     # Corners (r, z), each with the name of the edge that starts there.
-    inner = [(r_flange, -half - thickness, None), (r_flange, -half, "inner")] if has_inner else []
-    outer = [(r_flange, half, None), (r_flange, half + thickness, None)] if has_outer else []
+    borders = r_hub + (r_flange - r_hub) * (np.arange(rings + 1) / rings) ** 2
+    inner = [(r, -half, f"inner_{k}") for k, r in enumerate(borders[1:])][::-1]
+    outer = [(r, half, f"outer_{k}") for k, r in enumerate(borders[:-1])]
     outline = [
         (r_pin, -half - thickness * has_inner, None),
-        *inner,
+        *([(r_flange, -half - thickness, None), *inner] if has_inner else []),
         (r_hub, -half, "hub_wall"),
-        (r_hub, half, "outer" if has_outer else None),
-        *outer,
+        *([*outer, (r_flange, half, None)] if has_outer else [(r_hub, half, None)]),
+        *([(r_flange, half + thickness, None)] if has_outer else []),
         (r_pin, half + thickness * has_outer, "pin_wall"),
     ]
     drawing = WorkPlane().MoveTo(*outline[0][:2])

@@ -33,7 +33,7 @@ from wrist_stiffness.mechanism.components import (
     FlangeContact,
 )
 
-SCHEMA = 1
+SCHEMA = 2
 MAGIC = "wrist_stiffness table"
 
 LARGEST_BYTES = 256 << 20

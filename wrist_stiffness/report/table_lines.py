@@ -64,12 +64,13 @@ def facts(table: Table) -> Iterable[tuple[str, str]]:
         "parts",
         f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces",
     )
-    yield "contact", f"{len(table.components.sectors.gap)} flange sectors"
+    sectors, rings = len(table.components.sectors.gap), header.mesh["rings"]
+    yield "contact", f"{sectors} flange sectors in {rings} rings"
     yield "grid", f"{len(table.nodes)} poses ({header.per_axis} per axis), kernel {header.kernel}"
     yield "evaluation", header.evaluation
     for part, what in (
-        ("mesh", "extrapolated from three meshes"),
-        ("contact", "one ring over a flange's width against four"),
+        ("mesh", "extrapolated from a coarser one"),
+        ("contact", "against eight rings over a flange's width"),
         ("walls", "walls that lift off against two-sided ones"),
         ("second_order", "finite rotations"),
     ):
