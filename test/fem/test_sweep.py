@@ -169,7 +169,7 @@ def test_mesh_and_rings_are_refined_until_the_tolerance_is_met(values, store, ta
     errors, mesh = built(tolerance=np.inf)
     for half in ("s", "phi"):
         assert too_stiff <= errors["mesh"][half] <= 1.5 * too_stiff
-    asked = errors["contact_relative"] + 0.8 * errors["mesh_relative"]
+    asked = 0.9 * errors["stated_relative"]
     finer, refined = built(tolerance=asked)
     assert finer["stated_relative"] <= asked
     assert refined["sizes_mm"]["link"] < mesh["sizes_mm"]["link"]
