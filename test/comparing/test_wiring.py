@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.wiring import _share
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.simulation.cell import CellSettings
 
 POSES = 60
 NOISE = np.repeat([0.7e-6, np.radians(1e-3)], 3)
@@ -47,8 +47,9 @@ def told(model, measured):
         (-1.0, "with the load's sign turned the error falls from"),
         (1e-3, "with the load times 1000"),
         (1.0 / 9.80665, "is it in kilograms?"),
+        (1.0 / 4.4482216, r"is it in pounds (lbf)?"),
     ],
-    ids=["sign", "kN", "kg"],
+    ids=["sign", "kN", "kg", "lbf"],
 )
 def test_a_load_of_a_wrong_sign_or_unit_is_told(model, factor, words):
     measured = session(model)
@@ -76,10 +77,40 @@ def test_positions_in_metres_where_millimetres_belong_are_told(model, pointed):
         measured = replace(measured, rotation=np.full((POSES, 3, 3), np.nan))
     metres = replace(measured, shift=1e-3 * measured.shift, covariance=None)
     sentence = told(model, metres)
-    # In micrometres it grows: the noise is a thousand times as large as well.
-    fall = re.search(r"positions times 1000 the error falls from (\S+) x to (\S+) x", sentence)
+    fall = re.search(r"positions times 1000 the error falls from (\S+) to (\S+) um", sentence)
     assert float(fall[1]) > 2.0 * float(fall[2])
     assert "are they in m where mm belong" in sentence
+
+
+@pytest.mark.parametrize(
+    ("load", "shift", "words"),
+    [
+        (1.0, 1.0, ""),
+        (1.0 / 9.80665, 1.0, "is it in kilograms?"),
+        (1.0 / 4.4482216, 1.0, "is it in pounds (lbf)?"),
+        (1.0, 1.0 / 25.4, "are they in inches where mm belong"),
+        (1.0, 1e3, "are they in mm?"),
+    ],
+    ids=["right", "kg", "lbf", "inches", "mm"],
+)
+def test_units_are_told_below_the_noise_of_a_tracker(model, in_the_cell, load, shift, words):
+    """A wrong unit leaves 1.3 x the noise: many poses tell it, no single one does."""
+    settings = CellSettings(rate_hz=20.0, program_seconds=60.0, instrument="tracker")
+    measured = in_the_cell(model.table, settings, 3)
+    block = replace(measured.block, load=load * measured.block.load)
+    seen = replace(measured, block=block, shift=shift * measured.shift, covariance=None)
+    sentence = told(model, seen)
+    assert words in sentence if words else sentence == ""
+
+
+@pytest.mark.parametrize("softer", [2.0, 4.4482216, 9.80665])
+def test_a_soft_joint_is_no_wrong_unit(model, softer):
+    """Its share of the compliance grows as all would under another unit."""
+    law = Effect(find_law("bushing_stiffness"), "joint_1")
+    soft = law.with_values({"flexibility_percent": 100.0 * (softer - 1.0)})
+    found = compare_models([("m", model)], [session(model, (soft,))])
+    assert found.over_noise(found.models[0]) > 1.1
+    assert found.mistake == ""
 
 
 def test_positions_in_metres_are_told_of_a_wrist_that_was_never_calibrated(model):
@@ -144,12 +175,6 @@ def test_a_mistake_is_told_beside_a_fault_that_it_does_not_touch(model):
     assert told(model, measured) == ""
     block = replace(measured.block, load=-measured.block.load)
     assert "with the load's sign turned" in told(model, replace(measured, block=block))
-
-
-def test_what_lowers_s_and_raises_phi_is_no_mistake():
-    before = {"s_um": 12.0, "phi_mdeg": 8.0}
-    assert _share(before, {"s_um": 1.0, "phi_mdeg": 8.1}) == pytest.approx(1 / 12)
-    assert _share(before, {"s_um": 1.0, "phi_mdeg": 9.0}) == 1.0
 
 
 def test_what_explains_a_little_is_not_told(model):

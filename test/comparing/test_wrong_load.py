@@ -105,7 +105,7 @@ def test_a_second_fit_no_better_than_the_first_tells_no_mistake(monkeypatch):
     asked = []
     evidence = SimpleNamespace(log=-300.0, point=SimpleNamespace(left=[0.0] * 100))
     found = SimpleNamespace(fit=SimpleNamespace(fit=SimpleNamespace(evidence=evidence)))
-    suspicion = Suspicion(MISTAKES[0], 0.4, "the error falls")
+    suspicion = Suspicion(MISTAKES[0], 0.99, 0.4, "the error falls")
     monkeypatch.setattr(module, "suspicion_in", lambda *a: asked.append(a[2]) or suspicion)
     monkeypatch.setattr(module, "answering_as", lambda *_: None)
     monkeypatch.setattr(module, "calibrate", lambda *a: found)

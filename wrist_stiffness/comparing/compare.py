@@ -69,7 +69,7 @@ def compare_models(
         observed, left, absorbed = _prepared(model, sessions, cuts, calibrated)
         compared.append(ComparedModel(name, observed.observations, left, absorbed))
         progress(len(compared), steps)
-    suspicion = suspected(model, observed, calibrated, left.observations, left.noise)
+    suspicion = suspected(model, observed, calibrated, left)
     progress(steps, steps)
     table = compared[0].refitted
     return Comparison(
@@ -103,7 +103,7 @@ def suspicion_in(
     cuts = tuple(as_units(model, session) for session in sessions)
     calibrated = said_calibrated(sessions)
     observed, left, _ = _prepared(model, sessions, cuts, calibrated)
-    return suspected(model, observed, calibrated, left.observations, left.noise, mistakes)
+    return suspected(model, observed, calibrated, left, mistakes)
 
 
 def _prepared(

@@ -1,9 +1,9 @@
 """Signs, units and names that a cell got wrong: which of them would explain the error.
 
 No set-up explains a load of the wrong sign, and no effect is as large.  So the few usual mistakes
-are tried on what was measured, and one that explains most of the error is told; one that explains
-part of it may be asked by a whole fit (`wrong_load`).  None is ever applied: whoever wired the cell
-has to look.
+are tried on what was measured.  The most probable one is told where it explains most of the error;
+one that explains part of it may be asked by a whole fit (`wrong_load`).  None is ever applied:
+whoever wired the cell has to look.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.comparing.comparison import sizes
-from wrist_stiffness.comparing.set_up import without_set_up
-from wrist_stiffness.inference import Observations
+from wrist_stiffness.comparing.explained import Explained
+from wrist_stiffness.comparing.sentences import percent
+from wrist_stiffness.comparing.set_up import INDEPENDENT, without_set_up
+from wrist_stiffness.inference.answer import NAMING
+from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import Gauge
@@ -27,21 +29,18 @@ LOOK_FIRST = "Look at the set-up first"
 """How the sentence begins that tells a mistake."""
 
 WORTH_ASKING = 2.0
-"""Error over the instrument's noise from which a mistake is looked for."""
+"""Error over the instrument's noise from which a whole fit is asked for a mistake."""
+
+BESIDE = (0.5, 2.0)
+"""A unit is none if so many times its load fits better: then the wrist has another stiffness, as a
+fault may give it.  The units that are taken for each other are more than four times apart."""
+
+RIGHT = 0.5
+"""Probability, before anything is measured, that nothing is wrong: as good as any other."""
 
 CLEAR = 0.5
-"""A mistake is told if s or phi without it is less than this share of what it is with it."""
-
-HINTED = 0.9
-"""The same from which on a mistake is worth a whole fit: a right load leaves 0.25 to 0.7 of what
-axes bent to the wrong one leave, another wrong one 0.95 and more."""
-
-GROWN = 1.05
-"""A mistake is none if s or phi without it is more than that times as large."""
-
-LARGER = 10.0
-"""A mistake is none if s or phi without it is more than that times as large in its own unit: where
-a larger unit hides the model, nothing fits better."""
+"""A mistake is told if without it less than this share is left of what s or phi has above noise and
+drift: a fault explains the rest no better."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,8 @@ class Mistake:
         The same for the measured positions.
     gauge : str
         Name of a gauge whose readings turn their sign without it.
+    unit : bool
+        It is a wrong unit.
     """
 
     without: str
@@ -67,6 +68,7 @@ class Mistake:
     block: Callable[[Block], Block] = lambda block: block
     shift_factor: float = 1.0
     gauge: str = ""
+    unit: bool = False
 
     def put_right(self, session: UnitSession) -> UnitSession:
         """Return the session without the mistake."""
@@ -83,6 +85,10 @@ class Mistake:
         return replace(
             session, block=self.block(session.block), shift=self.shift_factor * session.shift
         )
+
+    def with_load(self, times: float) -> Mistake:
+        """Return it beside a load so many times as large."""
+        return replace(self, block=lambda block: _load(times)(self.block(block)))
 
     def concerns(self, session: UnitSession) -> bool:
         """Tell whether the session could have it: a measured rotation names its own motors."""
@@ -103,8 +109,9 @@ LOAD_MISTAKES = (
         "does the sensor show what acts on the platform, or the reaction (acts_on: environment)?",
         _load(-1.0),
     ),
-    Mistake("the load times 1000", "is it in kN and kN m?", _load(1e3)),
-    Mistake("the load times 9.81", "is it in kilograms?", _load(9.80665)),
+    Mistake("the load times 1000", "is it in kN and kN m?", _load(1e3), unit=True),
+    Mistake("the load times 9.81", "is it in kilograms?", _load(9.80665), unit=True),
+    Mistake("the load times 4.45", "is it in pounds (lbf)?", _load(4.4482216), unit=True),
     Mistake(
         "the load in the other frame",
         "does the load sensor turn with the platform (wrist_platform) or not (wrist_base)?",
@@ -119,11 +126,23 @@ MISTAKES = (
         "--joint names motor 1 first",
         lambda block: replace(block, theta=block.theta[:, ::-1]),
     ),
-    Mistake("positions divided by 1000", "are they in mm? A recording has m", shift_factor=1e-3),
+    Mistake(
+        "positions divided by 1000",
+        "are they in mm? A recording has m",
+        shift_factor=1e-3,
+        unit=True,
+    ),
     Mistake(
         "positions times 1000",
         "are they in m where mm belong, as in the _mm columns of a table?",
         shift_factor=1e3,
+        unit=True,
+    ),
+    Mistake(
+        "positions times 25.4",
+        "are they in inches where mm belong, as in the _mm columns of a table?",
+        shift_factor=25.4,
+        unit=True,
     ),
 )
 
@@ -141,14 +160,17 @@ class Suspicion:
     Parameters
     ----------
     mistake : Mistake
-        The one that explains most.
+        The most probable one.
+    probability : float
+        Of it, against all others and none.
     share : float
-        What is left without it of s or of phi, whichever falls more.
+        What is left without it of what s or phi has above noise and drift, whichever falls more.
     fall : str
         How the error falls.
     """
 
     mistake: Mistake
+    probability: float
     share: float
     fall: str
 
@@ -159,18 +181,24 @@ class Suspicion:
 
     def told(self, fall: str) -> str:
         """Return the sentence for a technician, with this or another account of the fall."""
-        return f"{LOOK_FIRST}: with {self.mistake.without} {fall}; {self.mistake.check}"
+        sure = percent(self.probability)
+        return (
+            f"{LOOK_FIRST}: with {self.mistake.without} {fall} ({sure} sure); {self.mistake.check}"
+        )
 
 
 def suspected(
     model: ErrorModel,
     observed: Observed,
     calibrated: Sequence[str],
-    left: Observations,
-    noise: dict[str, float],
+    left: Explained,
     mistakes: Sequence[Mistake] = MISTAKES,
 ) -> Suspicion | None:
-    """Return the mistake that explains most of the error, None if none explains any of it.
+    """Return the mistake that most probably was made, None if most probably none was.
+
+    What was measured is the model's prediction, in the unit and with the sign of the mistake, and
+    noise of a size that nobody knows: so the likelihood of a mistake goes with the error that it
+    leaves in the unit of the instrument, to the power of minus the numbers measured.
 
     Parameters
     ----------
@@ -180,34 +208,44 @@ def suspected(
         The sessions as they were recorded, and what the model predicts of them.
     calibrated : sequence of str
         Effects of the set-up that are not refitted.
-    left : Observations
-        Residuals of the units after the refit.
-    noise : dict of str to float
-        Of the instrument, by the key of the quantity.
+    left : Explained
+        What the units leave after the refit.
     mistakes : sequence of Mistake, optional
         Those that are tried.
     """
-    before = {key: size.rms for key, size in sizes(left).items()}
-    over = _over(before, noise)
-    if max(over.values(), default=0.0) < WORTH_ASKING:
-        return None
-    best = None
+    before, count = left.error, _independent(left.observations)
     read = observed.sessions[0].readings
-    for mistake in (*mistakes, *(map(_turned, read.gauges) if read is not None else ())):
+    mistakes = (*mistakes, *(map(_turned, read.gauges) if read is not None else ()))
+
+    def gains(mistake: Mistake) -> dict[str, float]:
+        """Return the logarithm of its likelihood against that of none, by quantity."""
         after = _without(mistake, model, observed, calibrated)
-        if any(after[key] > LARGER * before[key] for key in after):
-            continue
-        over_after = _over(after, noise, mistake.shift_factor)
-        share = _share(over, over_after)
-        if share < (best.share if best else HINTED):
-            fall = " and ".join(
-                f"from {_times(over[q.key])} to {_times(over_after[q.key])} the noise of {q.name}"
-                if q.key == "s_um" and mistake.shift_factor > 1.0
-                else f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
-                for q in left.reported
-            )
-            best = Suspicion(mistake, share, f"the error falls {fall}")
-    return best
+        return {key: count[key] * np.log(before[key] / size) for key, size in after.items() if size}
+
+    found = {mistake: gain for mistake in mistakes if (gain := gains(mistake))}
+    logs = np.array([sum(gain.values()) for gain in found.values()])
+    weights = np.exp(logs - max(logs, default=0.0)) * (1.0 - RIGHT) / len(mistakes)
+    total = weights.sum() + RIGHT * np.exp(-max(logs, default=0.0))
+    if not len(logs) or weights.max() < NAMING * total:
+        return None
+    mistake = list(found)[int(np.argmax(logs))]
+    if mistake.unit and any(
+        sum(gains(mistake.with_load(times)).values()) > logs.max() for times in BESIDE
+    ):
+        return None
+    after = {key: before[key] * np.exp(-gain / count[key]) for key, gain in found[mistake].items()}
+    floor = {key: float(np.hypot(left.noise[key], left.drift[key])) for key in before}
+    shares = [
+        _above(after[key], floor[key]) / _above(before[key], floor[key])
+        for key in after
+        if before[key] > floor[key]
+    ]
+    share = min(shares, default=1.0)
+    fall = " and ".join(
+        f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
+        for q in left.observations.reported
+    )
+    return Suspicion(mistake, float(weights.max() / total), share, f"the error falls {fall}")
 
 
 def told_mistake(suspicion: Suspicion | None) -> str:
@@ -215,28 +253,16 @@ def told_mistake(suspicion: Suspicion | None) -> str:
     return suspicion.told(suspicion.fall) if suspicion and suspicion.clear else ""
 
 
-def _times(ratio: float) -> str:
-    """Return a ratio with three digits and no exponent."""
-    return f"{float(f'{ratio:.3g}'):g} x"
+def _independent(left: Observations) -> dict[str, float]:
+    """Return how many numbers of each quantity count for themselves."""
+    units = np.minimum(np.bincount(left.sessions), INDEPENDENT) / np.bincount(left.sessions)
+    known = np.isfinite(left.values) * units[left.sessions, None]
+    return {q.key: float(known[:, list(q.components)].sum()) for q in left.reported}
 
 
-def _over(
-    rms: dict[str, float], floor: dict[str, float], shift_factor: float = 1.0
-) -> dict[str, float]:
-    """Return the errors over their floors."""
-    # A smaller unit makes noise and error smaller alike.
-    scale = {"s_um": shift_factor}
-    return {k: rms[k] / (floor[k] * scale.get(k, 1.0)) for k in rms if floor[k] > 0.0}
-
-
-def _share(before: dict[str, float], after: dict[str, float]) -> float:
-    """Return what is left of s or of phi, whichever falls more; 1 where the other grows.
-
-    One of them is enough: backlash makes a phi that no sign of the load changes.
-    """
-    if any(after[k] > max(GROWN * before[k], WORTH_ASKING) for k in after):
-        return 1.0
-    return min((after[k] / before[k] for k in after if before[k] >= WORTH_ASKING), default=1.0)
+def _above(rms: float, floor: float) -> float:
+    """Return what of an error is above noise and drift."""
+    return float(np.sqrt(max(rms**2 - floor**2, 0.0)))
 
 
 def _without(
@@ -245,7 +271,7 @@ def _without(
     observed: Observed,
     calibrated: Sequence[str],
 ) -> dict[str, float]:
-    """Return the error that is left without a mistake, empty where it cannot be one."""
+    """Return the error left without a mistake, in units of the instrument; empty if it is none."""
     if not all(mistake.concerns(session) for session in observed.sessions):
         return {}
     right = tuple(mistake.put_right(session) for session in observed.sessions)
@@ -254,4 +280,5 @@ def _without(
     same = all(a.block is b.block for a, b in zip(right, observed.sessions, strict=True))
     predicted = observed.predicted if same else None
     _, refitted, _ = without_set_up(model, right, calibrated, predicted)
-    return {key: size.rms for key, size in sizes(refitted).items()}
+    left = refitted.rms(np.nan_to_num(refitted.values) ** 2)
+    return {k: size / (mistake.shift_factor if k == "s_um" else 1.0) for k, size in left.items()}
