@@ -50,7 +50,7 @@ from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.contents import Contents, contents_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import SET_UP, names_of
-from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.sessions.unit_session import all_units
 
 
 class Cancelled(WristError):
@@ -168,7 +168,7 @@ class Analysis:
         self.sessions = tuple(sessions)
         self._progress, self._tell = progress, tell
         self._stop, self._again = Event(), again
-        self._units = tuple(as_units(model, each) for each in sessions)
+        self._units = all_units(model, sessions)
         self._problems: list[WristProblem] = []
         self._versions = [Version("as given", model, {})]
         error = Judge(self._problem().begin().base).of_model(model)

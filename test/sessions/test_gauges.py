@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.errors import InputError
@@ -244,6 +245,27 @@ def test_a_wrong_description_is_refused(tmp_path, was, now, told):
     table.write_text(f"{SETTINGS},a_um,b_um,c_um,d_um,e_um,level_mdeg\n")
     with pytest.raises(InputError, match=told):
         import_csv(table, tmp_path / "bag.mcap", gauges_file=gauges)
+
+
+@pytest.mark.parametrize(
+    "ask", [calibrate, diagnose_sessions, lambda model, both: compare_models([("m", model)], both)]
+)
+def test_gauges_and_poses_are_asked_one_after_the_other(tmp_path, model, table, ask, in_the_cell):
+    session = in_the_cell(table, CellSettings(rate_hz=10.0, program_seconds=20.0), 3)
+    block = conditions(30)
+    read = read_session(imported(tmp_path, block, readings_of(model, block)), table)
+    told = r"bag.mcap was measured by gauges \(a, b, c, d, e, level\), .* by poses: ask of them"
+    with pytest.raises(InputError, match=told):
+        ask(model, [read, session])
+
+
+def test_where_gauges_stand_no_registration_says(tmp_path, model, capsys):
+    block = conditions(30)
+    imported(tmp_path, block, readings_of(model, block))
+    names = ["gauges.csv", "-o", "bag", "--gauges", "gauges.yaml"]
+    options = [str(tmp_path / each) if "." in each or each == "bag" else each for each in names]
+    assert main(["import", *options, "--register"]) == 2
+    assert "--register belongs to poses" in capsys.readouterr().err
 
 
 def test_the_page_says_that_its_pictures_need_poses(tmp_path, model):

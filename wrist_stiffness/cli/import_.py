@@ -6,6 +6,7 @@ import argparse
 
 from wrist_stiffness.cli.output import say
 from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 LONG_DAYS = 1.0
@@ -65,6 +66,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.commands.import_csv import import_csv
 
+    if arguments.register and arguments.gauges:
+        raise InputError("--register belongs to poses: where gauges stand, says --gauges")
     found = import_csv(
         arguments.table,
         arguments.output,

@@ -24,7 +24,7 @@ from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import Observed
 from wrist_stiffness.sessions.repeatability import by_side, repeatability
-from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Prepared = tuple[Observed, Explained, tuple[str, ...]]
 
@@ -58,7 +58,7 @@ def compare_models(
     steps = len(models) + 1
     progress(0, steps)
     first = models[0][1]
-    cuts = tuple(as_units(first, session) for session in sessions)
+    cuts = all_units(first, sessions)
     calibrated = said_calibrated(sessions)
     compared = []
     for name, model in models:
@@ -100,7 +100,7 @@ def suspicion_in(
     InputError
         If there is too little to compare.
     """
-    cuts = tuple(as_units(model, session) for session in sessions)
+    cuts = all_units(model, sessions)
     calibrated = said_calibrated(sessions)
     observed, left, _ = _prepared(model, sessions, cuts, calibrated)
     return suspected(model, observed, calibrated, left, mistakes)

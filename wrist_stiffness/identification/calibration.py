@@ -19,7 +19,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.sessions.unit_session import all_units
 
 NEGLIGIBLE = 0.01
 """Of a prior's standard deviation: a smaller move of a parameter that the data do not tell is none.
@@ -105,7 +105,7 @@ def calibrate(
             f"nothing is left to calibrate: the notes of the recordings say under {CALIBRATED!r} "
             f"that {', '.join(calibrated)} need no fit"
         )
-    units = tuple(as_units(model, session) for session in sessions)
+    units = all_units(model, sessions)
     problem = FitProblem(start.with_effects(*held), units, free)
     require_units(problem)
     progress(0, STEPS)

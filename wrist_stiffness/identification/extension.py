@@ -26,7 +26,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import AXES, TOLERATED
-from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 STEPS = 5
 """That are told of."""
@@ -191,7 +191,7 @@ def extend(
     others = tuple(each for each in free if each.effect.name != effect.name)
     if known is None or not known.asks(model, (others, held)):
         known = None
-        units = tuple(as_units(model, session) for session in sessions)
+        units = all_units(model, sessions)
     else:
         units = known.begin().base.problem.sessions
     _require_signals(model, effect, units)

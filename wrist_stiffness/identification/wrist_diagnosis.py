@@ -39,7 +39,7 @@ from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.refitted import TOLERATED
-from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Tell = Callable[[str], None]
 
@@ -144,7 +144,7 @@ def diagnose_sessions(
         raise InputError(f"naming probability {naming:g} is not between 0 and 1 (0 to 100 %)")
     if not seconds > 0.0:
         raise InputError(f"{seconds:g} seconds for a diagnosis: must be above 0")
-    units = tuple(as_units(model, session) for session in sessions)
+    units = all_units(model, sessions)
     chosen = units[:-1] if len(units) > 1 else units
     problem = WristProblem(model, chosen)
     require_units(problem.begin().base.problem)

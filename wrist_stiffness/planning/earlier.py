@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.planning.timeline import Experiment
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -32,8 +33,10 @@ def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
     Raises
     ------
     InputError
-        If no measurement lies in the table's domain and load range.
+        If no measurement lies in the table's domain and load range, or gauges measured.
     """
+    if session.readings is not None:
+        raise InputError(f"{session.name}: readings of gauges; plans are made for measured poses")
     parts = as_units(model, session).cut
     in_unit = np.flatnonzero(parts.unit >= 0)
     # The heaviest moment of each unit stands for its mean.

@@ -109,12 +109,21 @@ def _members(node: Node) -> tuple[Effect, ...]:
     return (effects[0].with_values(values), *effects[1:])
 
 
+def _noise(node: Node) -> dict[str, float]:
+    floor = mapping_of(lambda inner: inner)(node)
+    if not {"s_um", "phi_mdeg"} <= set(floor):
+        raise node.refuse(
+            f"only {', '.join(floor)} was measured; experiments are planned for an instrument that "
+            "measures position and rotation"
+        )
+    known = dict.fromkeys(("s_um", "phi_mdeg"), Quantity(number(above=0.0)))
+    return dict(record(known, others=True)(node))
+
+
 DIAGNOSIS = record(
     {
         "schema": version(SCHEMA),
-        "noise": record(
-            dict.fromkeys(("s_um", "phi_mdeg"), Quantity(number(above=0.0))), others=True
-        ),
+        "noise": _noise,
         "findings": list_of(_members),
         "suspects": list_of(_members),
         "not_excited": list_of(_effect),

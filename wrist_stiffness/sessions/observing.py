@@ -14,7 +14,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import cleared
 from wrist_stiffness.sessions.hidden_counts import hidden_counts, stands_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.unit_session import UnitSession, as_units
+from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 from wrist_stiffness.sessions.units import Labels
 
 WANDER = {"um": 0.5e-6, "mdeg": 5e-6}
@@ -83,7 +83,7 @@ def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
     """
     if not sessions:
         raise InputError("no session to compare the model with")
-    cuts = tuple(as_units(model, session) for session in sessions)
+    cuts = all_units(model, sessions)
     predicted = np.concatenate([predict_units(model, each) for each in cuts])
     return tabulate(model, cuts, predicted)
 
@@ -108,9 +108,8 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     Raises
     ------
     InputError
-        If no unit was measured, or not all by instruments of one kind.
+        If no unit was measured.
     """
-    _require_alike(sessions)
     units = [len(each) for each in sessions]
     ends = np.cumsum(units)
     parts = np.split(predicted, ends[:-1])
@@ -152,17 +151,6 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     )
     kept = replace(observations.take(used), row=None)
     return Observed(sessions, predicted, kept, labels)
-
-
-def _require_alike(sessions: Sequence[UnitSession]) -> None:
-    """Refuse sessions whose numbers are not of one kind."""
-    first = sessions[0]
-    for other in sessions[1:]:
-        if other.instruments != first.instruments:
-            raise InputError(
-                f"{first.name} was measured by {first.instruments}, {other.name} by "
-                f"{other.instruments}: ask of them one after the other"
-            )
 
 
 def _common(sessions: Sequence[UnitSession]) -> Array | None:

@@ -368,3 +368,21 @@ def _rounding(steps: Sequence[Array], quantities: Sequence[Quantity]) -> Array:
     for at in (list(each.components) for each in quantities):
         digit[at] = digit[at].max()
     return digit / np.sqrt(12.0)
+
+
+def all_units(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> tuple[UnitSession, ...]:
+    """Cut sessions into units that are looked at together.
+
+    Raises
+    ------
+    InputError
+        As `as_units`, or if they were not all measured by instruments of one kind.
+    """
+    units = tuple(as_units(model, session) for session in sessions)
+    for other in units[1:]:
+        if other.instruments != units[0].instruments:
+            raise InputError(
+                f"{units[0].name} was measured by {units[0].instruments}, {other.name} by "
+                f"{other.instruments}: ask of them one after the other"
+            )
+    return units
