@@ -16,7 +16,8 @@ import numpy as np
 from wrist_stiffness.fem.components import SHIPPED_SIZES
 from wrist_stiffness.fem.parts import Solid, assemble_body
 from wrist_stiffness.fem.superelement import Superelement, condense
-from wrist_stiffness.mechanism.geometry import BushingDimensions, Material
+from wrist_stiffness.mechanism.geometry import BushingDimensions
+from wrist_stiffness.mechanism.material import Material
 
 
 @dataclass(frozen=True)

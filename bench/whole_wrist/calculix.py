@@ -21,6 +21,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.fem.solids import MILLIMETRES
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
+from wrist_stiffness.mechanism.material import AnyMaterial, Material, OrthotropicMaterial
 from wrist_stiffness.mechanism.modes import RigidBody
 
 TONNES = 1e-3
@@ -248,13 +249,34 @@ def _elements(model: WristAtPose, first: NDArray[np.int64]) -> Iterator[str]:
         for number, nodes in enumerate(elements + int(start), start_element):
             yield f"{number}," + ",".join(map(str, nodes))
         start_element += len(elements)
-        material = part.body.solid.material
-        yield f"*MATERIAL, NAME=M_{part.name.upper()}"
-        yield "*ELASTIC"
-        yield f"{_number(material.young * MEGAPASCALS)},{_number(material.poisson)}"
+        material, name = part.body.solid.material, part.name.upper()
+        section = f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}"
+        if isinstance(material, OrthotropicMaterial):
+            # Two points of the axis that the material's axes turn about.
+            turn = part.turn[:3, :3].toarray()
+            origin = part.nodes[0] - turn @ part.body.mesh.nodes[0]
+            axis = (*MILLIMETRES * origin, *(MILLIMETRES * origin + turn[:, 2]))
+            yield f"*ORIENTATION, NAME=O_{name}, SYSTEM=CYLINDRICAL"
+            yield ",".join(map(_number, axis))
+            section += f", ORIENTATION=O_{name}"
+        yield f"*MATERIAL, NAME=M_{name}"
+        yield from _elasticity(material)
         yield "*DENSITY"
         yield _number(material.density * TONNES / MILLIMETRES**3)
-        yield f"*SOLID SECTION, ELSET={part.name.upper()}, MATERIAL=M_{part.name.upper()}"
+        yield section
+
+
+def _elasticity(material: AnyMaterial) -> Iterator[str]:
+    if isinstance(material, Material):
+        yield "*ELASTIC"
+        yield f"{_number(material.young * MEGAPASCALS)},{_number(material.poisson)}"
+        return
+    young, shear = (MEGAPASCALS * np.array(moduli) for moduli in (material.young, material.shear))
+    # Eight numbers have to fit into a line of 132 characters.
+    constants = [f"{value:.8e}" for value in (*young, *material.poisson, *shear)]
+    yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
+    yield ",".join(constants[:8])
+    yield constants[8]
 
 
 def _right_handed(nodes: Array, elements: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -18,9 +18,9 @@ from wrist_stiffness.mechanism.geometry import (
     Geometry,
     Limits,
     LinkDimensions,
-    Material,
     PlatformDimensions,
 )
+from wrist_stiffness.mechanism.material import Material
 
 STEEL = Material(young=200e9, poisson=0.3, density=7850.0, expansion=12e-6)
 POLYMER = Material(young=2.4e9, poisson=0.35, density=1460.0, expansion=1e-4)

@@ -12,6 +12,7 @@ from whole_wrist.solve import Disturbance, solve_pose
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
+from wrist_stiffness.mechanism.material import OrthotropicMaterial
 
 AGREEMENT = 1e-4
 """CalculiX prints seven digits; own weight is integrated differently in curved elements."""
@@ -24,9 +25,24 @@ needs_ccx = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module", params=["rigid", "sliding"])
+LAYERS = OrthotropicMaterial(
+    young=(2.0e9, 9.0e9, 3.5e9),
+    poisson=(0.1, 0.2, 0.4),
+    shear=(0.9e9, 0.6e9, 1.7e9),
+    density=1400.0,
+    expansion=3e-5,
+)
+
+
+@pytest.fixture(scope="module", params=["rigid", "sliding", "layers"])
 def model(make_wrist, coarse, request):
     wrist = make_wrist(gap=2e-6, skew=0.15)
+    if request.param == "layers":
+        wrist = replace(
+            wrist,
+            links={**wrist.links, "link_2": replace(wrist.links["link_2"], material=LAYERS)},
+            bushings={key: replace(part, material=LAYERS) for key, part in wrist.bushings.items()},
+        )
     pose = mechanism_of(wrist).forward([0.3, -0.2])
     return factor_pose(build_wrist(wrist, coarse, request.param == "sliding"), pose)
 

@@ -20,7 +20,7 @@ from wrist_stiffness.fem.mesh import mesh_solid
 from wrist_stiffness.fem.parts import ElasticBody, Solid, assemble_body
 from wrist_stiffness.fem.solids import MeshSettings, bushing_section
 from wrist_stiffness.fem.superelement import condense
-from wrist_stiffness.mechanism.geometry import Material
+from wrist_stiffness.mechanism.material import Material
 
 FOUR_CODES = np.array([1.469, 3.317, 3.673]) * 1e-6
 """Displacement of the oracle link's free bore along a unit force there, x, y, z, at about 5k
@@ -177,7 +177,7 @@ def frictionless_annulus(material, inner, outer):
 def test_swept_bushing_agrees_with_a_meshed_cad_solid(plain_sleeve, coarse):
     """The same section revolved by the CAD kernel and meshed as a solid, without our sweep."""
     dimensions = plain_sleeve.solid.dimensions
-    section = bushing_section(dimensions, coarse).shape
+    section = bushing_section(dimensions, coarse, 1).shape
     # The section is drawn in the xy-plane with its axis on y; turn y to z.
     solid = section.Revolve(Axis((0, 0, 0), Y), 360).Rotate(Axis((0, 0, 0), X), 90)
     solid.maxh = 0.9

@@ -30,6 +30,15 @@ COARSE = BuildSettings(
 AGREEMENT = 1e-6
 """Of twists; what is left is the rounding of two solvers."""
 
+LAYERS = {
+    "young_GPa": [2.0, 9.0, 3.5],
+    "poisson": [0.1, 0.2, 0.4],
+    "shear_GPa": [0.9, 0.6, 1.7],
+    "density_kg_m3": 1400.0,
+    "expansion_1e-6_K": 30.0,
+    "source": "assumed",
+}
+
 LOAD = np.array([1.0, -2.0, 1.5, 0.02, 0.01, -0.03])
 
 
@@ -66,19 +75,22 @@ def store(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arcs", "motors", "askew"),
+    ("arcs", "motors", "askew", "layered"),
     [
-        ((60.0, 60.0, 60.0), 90.0, 0.0),
-        ((75.0, 75.0, 75.0), 75.0, 40.0),
-        ((90.0, 90.0, 90.0), 120.0, -20.0),
-        ((105.0, 105.0, 105.0), 60.0, 20.0),
-        ((120.0, 120.0, 120.0), 90.0, 0.0),
-        ((60.0, 90.0, 120.0), 120.0, -20.0),
-        ((105.0, 75.0, 90.0), 60.0, 20.0),
+        ((60.0, 60.0, 60.0), 90.0, 0.0, ()),
+        ((75.0, 75.0, 75.0), 75.0, 40.0, ()),
+        ((90.0, 90.0, 90.0), 120.0, -20.0, ()),
+        ((105.0, 105.0, 105.0), 60.0, 20.0, ()),
+        ((120.0, 120.0, 120.0), 90.0, 0.0, ()),
+        ((60.0, 90.0, 120.0), 120.0, -20.0, ()),
+        ((105.0, 75.0, 90.0), 60.0, 20.0, (("links", "link_2"), ("bushings", "joint_3"))),
     ],
 )
-def test_other_links_and_axes_are_built(store, arcs, motors, askew):
+def test_other_links_and_axes_are_built(store, arcs, motors, askew, layered):
     values = wrist(arcs, motors, askew)
+    values["materials"]["layers"] = LAYERS
+    for group, part in layered:
+        values[group][part]["material"] = "layers"
     geometry = checked(values)
     table = build_table(values, COARSE, condenser=store)
     poses = table.workspace.grid(5)

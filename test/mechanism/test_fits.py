@@ -142,3 +142,34 @@ def test_bars_in_one_shell_that_never_meet_are_not_refused():
     values = copy.deepcopy(VALUES)
     values["links"]["link_1"]["arc_radius_mm"] = values["links"]["link_2"]["arc_radius_mm"]
     checked(values)
+
+
+LAYERS = {
+    "young_GPa": [2.0, 9.0, 3.5],
+    "poisson": [0.1, 0.2, 0.4],
+    "shear_GPa": [0.9, 0.6, 1.7],
+    "density_kg_m3": 1400.0,
+    "expansion_1e-6_K": 30.0,
+    "source": "assumed",
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"poisson": [0.5, 0.2, 0.4]}, "poisson: 0.5 of axes 1 and 2 is not within 0.4714, the ro"),
+        ({"poisson": [0.4, 0.6, 0.9]}, r"poisson: \[0.4, 0.6, 0.9\] .* negative work: .* is -"),
+        ({"young_GPa": [2.0, 9000.0, 3.5]}, r"young_GPa.* 9000.0 is not below 2000"),
+        ({"shear_GPa": [0.9, 0.6]}, r"shear_GPa: \[0.9, 0.6\] is not a list of 3 finite numbers"),
+        ({"poisson": 0.3}, "poisson: 0.3 is not a list of 3"),
+        ({"young_GPa": [1500.0] * 3}, "1500 with 1400 kg/m.3 makes a speed of sound"),
+    ],
+)
+def test_layers_that_cannot_be_are_refused(change, message):
+    values = copy.deepcopy(VALUES)
+    values["materials"]["layers"] = LAYERS
+    values["bushings"]["joint_1"]["material"] = values["links"]["link_2"]["material"] = "layers"
+    checked(values)
+    values["materials"]["layers"] = LAYERS | change
+    with pytest.raises(GeometryError, match=message):
+        checked(values)

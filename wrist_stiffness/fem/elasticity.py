@@ -15,7 +15,7 @@ from skfem.refdom import RefTri
 
 from wrist_stiffness.fem.mesh import SolidMesh
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.geometry import Material
+from wrist_stiffness.mechanism.material import AnyMaterial, Material, OrthotropicMaterial
 
 FOUR_POINTS = 2
 """Order of the quadrature of a ten-node tetrahedron's stiffness: four points, as in other codes."""
@@ -30,21 +30,36 @@ def lame(material: Material) -> tuple[float, float]:
     return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))
 
 
-def stiffness_matrix(mesh: SolidMesh, material: Material) -> sparse.csr_matrix:
+def stiffness_matrix(mesh: SolidMesh, material: AnyMaterial) -> sparse.csr_matrix:
     """Stiffness of a solid.
 
     Parameters
     ----------
     mesh : SolidMesh
         Its mesh.
-    material : Material
-        Its isotropic material.
+    material : Material or OrthotropicMaterial
+        Its material; the axes of an orthotropic one turn about z.
 
     Returns
     -------
     sparse.csr_matrix
         (3 n, 3 n) symmetric positive semi-definite [N/m].
     """
+    if isinstance(material, Material):
+        block = _isotropic_blocks(mesh, material)
+    else:
+        block = _orthotropic_blocks(mesh, material)
+    count = len(block)
+    unknowns = (3 * mesh.elements[:, None, :] + np.arange(3)[None, :, None]).reshape(count, 30)
+    rows = np.repeat(unknowns, 30, axis=1).ravel()
+    columns = np.tile(unknowns, (1, 30)).ravel()
+    size = 3 * len(mesh.nodes)
+    matrix = sparse.csr_matrix((block.ravel(), (rows, columns)), shape=(size, size))
+    return (matrix + matrix.T) * 0.5
+
+
+def _isotropic_blocks(mesh: SolidMesh, material: Material) -> Array:
+    """Stiffness of each element (e, 3, 10, 3, 10) [N/m]."""
     first, shear = lame(material)
     gradient, volume = _gradients(mesh, FOUR_POINTS)
     count = gradient.shape[0]
@@ -56,12 +71,34 @@ def stiffness_matrix(mesh: SolidMesh, material: Material) -> sparse.csr_matrix:
     block = first * products + shear * products.transpose(0, 3, 2, 1, 4)
     for a in range(3):
         block[:, a, :, a, :] += shear * laplacian
-    unknowns = (3 * mesh.elements[:, None, :] + np.arange(3)[None, :, None]).reshape(count, 30)
-    rows = np.repeat(unknowns, 30, axis=1).ravel()
-    columns = np.tile(unknowns, (1, 30)).ravel()
-    size = 3 * len(mesh.nodes)
-    matrix = sparse.csr_matrix((block.ravel(), (rows, columns)), shape=(size, size))
-    return (matrix + matrix.T) * 0.5
+    return np.asarray(block)
+
+
+def _orthotropic_blocks(mesh: SolidMesh, material: OrthotropicMaterial) -> Array:
+    """Stiffness of each element (e, 30, 30) [N/m]; its axes turn about z from point to point."""
+    elastic = np.linalg.inv(material.compliance)
+    basis = Basis(mesh.tets, ElementTetP2(), intorder=FOUR_POINTS)
+    place = np.asarray(basis.global_coordinates())
+    gradient, volume = _gradients(mesh, FOUR_POINTS)
+    count = len(gradient)
+    block = np.zeros((count, 30, 30))
+    for q in range(volume.shape[1]):
+        # Columns are the axes, as `cylindrical_axes` has them at the nodes.
+        axes = np.zeros((count, 3, 3))
+        cosine, sine = place[:2, :, q] / np.hypot(*place[:2, :, q])
+        axes[:, 0, 0], axes[:, 0, 1], axes[:, 1, 0], axes[:, 1, 1] = cosine, -sine, sine, cosine
+        axes[:, 2, 2] = 1.0
+        slope = axes.transpose(0, 2, 1) @ gradient[..., q]
+        # Strains 11, 22, 33, 23, 13, 12 by motion along each axis of each node.
+        strain = np.zeros((count, 6, 3, 10))
+        for a in range(3):
+            strain[:, a, a] = slope[:, a]
+        for row, (a, b) in enumerate(((1, 2), (0, 2), (0, 1)), 3):
+            strain[:, row, a], strain[:, row, b] = slope[:, b], slope[:, a]
+        turned = np.einsum("esmi,eam->esai", strain, axes).reshape(count, 6, 30)
+        stress = (elastic * volume[:, q, None, None]) @ turned
+        block += turned.transpose(0, 2, 1) @ stress
+    return block
 
 
 def _gradients(mesh: SolidMesh, order: int) -> tuple[Array, Array]:

@@ -26,8 +26,8 @@ from wrist_stiffness.mechanism.geometry import (
     BushingDimensions,
     Geometry,
     LinkDimensions,
-    Material,
 )
+from wrist_stiffness.mechanism.material import AnyMaterial
 from wrist_stiffness.mechanism.vectors import skew
 
 RINGS = 2
@@ -101,7 +101,7 @@ class Solid:
     rings: int = RINGS
 
     @property
-    def material(self) -> Material:
+    def material(self) -> AnyMaterial:
         """What it is made of."""
         return self.dimensions.material
 

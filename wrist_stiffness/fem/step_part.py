@@ -19,6 +19,7 @@ from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.fits import WIDEST_FIT
 from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.material import OrthotropicMaterial
 
 COARSER = 1.25
 """Element sizes of the second mesh, as between the levels of a table's mesh study."""
@@ -69,6 +70,11 @@ def step_part(path: Path, geometry: Geometry, link: str, sizes: MeshSettings) ->
         If the file is no such solid, or its bores are not where the geometry has them.
     """
     solid = wrist_parts(geometry)[ELASTIC.index(link)].solid
+    if isinstance(solid.material, OrthotropicMaterial):
+        raise GeometryError(
+            f"{path}: {link} is of an orthotropic material, whose axes follow the arc of a bar; "
+            "a STEP file may have any shape"
+        )
     found = []
     for factor in (COARSER, 1.0):
         mesh = _mesh(path, sizes.times(factor))

@@ -36,6 +36,8 @@ UNIT_TOLERANCE = 1e-6
 """Axes are typed with finite digits: they are made unit if their length is this close to 1."""
 
 SOURCE = "source"
+SOURCES = ("paper", "assumed", "calibrated", "measured")
+"""What a geometry file may say of where its values are from."""
 
 T = TypeVar("T")
 Schema = Callable[[Node], T]

@@ -118,7 +118,12 @@ def _place_of(body: str, geometry: Geometry) -> tuple[tuple[str, ...], str]:
 
 
 def _check_material(name: str, material: Node) -> None:
-    young, density = (material[key].value for key in ("young_GPa", "density_kg_m3"))
+    moduli, density = (material[key].plain for key in ("young_GPa", "density_kg_m3"))
+    for young in moduli if isinstance(moduli, list) else [moduli]:
+        _check_density(name, material, young, density)
+
+
+def _check_density(name: str, material: Node, young: float, density: float) -> None:
     for metal, usual in NAMED.items():
         for key, value, normal in zip(
             ("young_GPa", "density_kg_m3"), (young, density), usual, strict=True

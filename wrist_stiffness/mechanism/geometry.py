@@ -11,32 +11,11 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ENDS, Array
+from wrist_stiffness.mechanism.material import AnyMaterial
 from wrist_stiffness.mechanism.own_stiffness import OwnStiffness
 
 ROUNDING = 1e-9
 """Share by which a number may pass a limit that it stands at."""
-
-
-@dataclass(frozen=True)
-class Material:
-    """Linear isotropic material.
-
-    Parameters
-    ----------
-    young : float
-        Young's modulus [Pa].
-    poisson : float
-        Poisson's ratio [-].
-    density : float
-        [kg/m^3].
-    expansion : float
-        Coefficient of linear thermal expansion [1/K].
-    """
-
-    young: float
-    poisson: float
-    density: float
-    expansion: float
 
 
 @dataclass(frozen=True)
@@ -53,7 +32,7 @@ class LinkDimensions:
         Arc length of the bar past each bore's centre [m].
     motor_bore, platform_bore : float
         Diameter of the radial bore at the motor-side and platform-side joint [m].
-    material : Material
+    material : Material or OrthotropicMaterial
         Material of the bar.
     stiffness : OwnStiffness or None
         Given by the file instead of the bar's; the bar still says what it weighs.
@@ -65,7 +44,7 @@ class LinkDimensions:
     overhang: float
     motor_bore: float
     platform_bore: float
-    material: Material
+    material: AnyMaterial
     stiffness: OwnStiffness | None = None
 
 
@@ -90,7 +69,7 @@ class BushingDimensions:
         Of each flange present [m].
     inner_gap, outer_gap : float or None
         Gap between flange and hub face [m]; None where there is no flange.
-    material : Material
+    material : Material or OrthotropicMaterial
         Material of the sleeve.
     stiffness : OwnStiffness or None
         Given by the file, or of its ball bearings, instead of the sleeve's, where no flange takes
@@ -105,7 +84,7 @@ class BushingDimensions:
     flange_thickness: float
     inner_gap: float | None
     outer_gap: float | None
-    material: Material
+    material: AnyMaterial
     stiffness: OwnStiffness | None = None
 
 

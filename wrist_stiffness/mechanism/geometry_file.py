@@ -19,6 +19,7 @@ import numpy as np
 from wrist_stiffness.errors import GeometryError
 from wrist_stiffness.inputs.document import Node, node_of, read_yaml
 from wrist_stiffness.inputs.schema import (
+    SOURCES,
     Quantity,
     Schema,
     direction,
@@ -37,15 +38,14 @@ from wrist_stiffness.mechanism.geometry import (
     Geometry,
     Limits,
     LinkDimensions,
-    Material,
     PlatformDimensions,
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
+from wrist_stiffness.mechanism.material import AnyMaterial, read_material
 from wrist_stiffness.mechanism.own_stiffness import bearing_pair, own_stiffness
 from wrist_stiffness.mechanism.vectors import unit
 
 SCHEMA = 1
-SOURCES = ("paper", "assumed", "calibrated", "measured")
 READOUT_SPREAD = 0.1
 """Least ratio of the readout points' spreads: Eqs. (1)-(10) amplify errors on flat sets."""
 
@@ -54,18 +54,6 @@ LENGTH = Quantity(number(above=0.0))
 # Read when the rest of its part is known.
 OWN: dict[str, Schema[Any]] = {"stiffness": lambda node: None}
 
-# From soft rubber and light foam to beyond diamond and osmium: what lies outside is another unit.
-# Re-entrant foam has the least ratio of any isotropic solid (R. Lakes, Science 235, 1987).
-MATERIAL = record(
-    {
-        "young_GPa": Quantity(number(above=1e-4, below=2000.0)),
-        "poisson": number(at_least=-0.7, below=0.5),
-        "density_kg_m3": Quantity(number(above=10.0, below=25000.0)),
-        "expansion_1e-6_K": Quantity(number()),
-    },
-    sources=SOURCES,
-    make=Material,
-)
 SITE = record(
     {
         "gravity_m_s2": Quantity(vector()),
@@ -136,13 +124,13 @@ def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> 
 
 def geometry_of(root: Node) -> Geometry:
     """Build a geometry from an opened file; as `load_geometry`."""
-    materials: dict[str, Material] = {}
+    materials: dict[str, AnyMaterial] = {}
 
-    def material(node: Node) -> Material:
+    def material(node: Node) -> AnyMaterial:
         return materials[text(*materials)(node)]
 
     def read_materials(node: Node) -> None:
-        materials.update(mapping_of(MATERIAL, SOURCES)(node))
+        materials.update(mapping_of(read_material, SOURCES)(node))
 
     axes: dict[str, Array] = {}
 
@@ -218,7 +206,7 @@ def _axis(node: Node) -> Array:
     return unit(direction(node))
 
 
-def _link(material: Schema[Material]) -> Schema[LinkDimensions]:
+def _link(material: Schema[AnyMaterial]) -> Schema[LinkDimensions]:
     lengths = ("arc_radius_mm", "section_radial_mm", "section_axial_mm", "overhang_mm")
     bores = ("motor_bore_mm", "platform_bore_mm")
     schema = record(
@@ -253,7 +241,7 @@ def _with_own(node: Node, part: P, distance: float, free: Array) -> P:
     return replace(part, stiffness=own_stiffness(node["stiffness"], distance, free))
 
 
-def _bushing(material: Schema[Material], axes: dict[str, Array]) -> Schema[BushingDimensions]:
+def _bushing(material: Schema[AnyMaterial], axes: dict[str, Array]) -> Schema[BushingDimensions]:
     lengths = ("pin_diameter_mm", "length_mm", "wall_mm", "flange_diameter_mm")
     keys: dict[str, Any] = dict.fromkeys((*lengths, "flange_thickness_mm"), LENGTH)
     keys |= {"radius_mm": Quantity(number()), "material": material}
@@ -290,7 +278,9 @@ def _bushing(material: Schema[Material], axes: dict[str, Array]) -> Schema[Bushi
     return read
 
 
-def _platform(material: Schema[Material]) -> Schema[tuple[PlatformDimensions, Array]]:
+def _platform(
+    material: Schema[AnyMaterial],
+) -> Schema[tuple[PlatformDimensions, Array]]:
     return record(
         {
             "normal": _axis,
@@ -306,7 +296,12 @@ def _platform(material: Schema[Material]) -> Schema[tuple[PlatformDimensions, Ar
 
 
 def _plate(
-    material: Material, load_at: str, normal: Array, centre: Array, thickness: float, **others: Any
+    material: AnyMaterial,
+    load_at: str,
+    normal: Array,
+    centre: Array,
+    thickness: float,
+    **others: Any,
 ) -> tuple[PlatformDimensions, Array]:
     # The plate is rigid; its mass follows from its size, hubs and screws are not modelled.
     platform = PlatformDimensions(
