@@ -3,8 +3,9 @@
     python bench/paper_calibration/wall_contact.py [-o docs]
 
 The hub is moved; forces on the pin answer.  CalculiX presses every node of the wall against a ring
-of rigid elements (`*CONTACT PAIR`, node to surface), `fem/one_sided.py` its patches.  Writes the
-block "contact" of docs/walls.md.  Needs CalculiX; three minutes.
+of rigid elements (`*CONTACT PAIR`, node to surface).  `mechanism/contact.py` solves contact of the
+same nodes, and of the patches of `fem/one_sided.py`: the first must agree, the second shows
+what patches leave.  Writes the block "contact" of docs/walls.md.  Needs CalculiX; three minutes.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from pathlib import Path
 
 import numpy as np
 from paper_page import insert_blocks
-from walls import scaled
+from wall_models import scaled
 
 from wrist_stiffness.fem.elasticity import rigid_motion
+from wrist_stiffness.fem.factor import factorise
 from wrist_stiffness.fem.one_sided import patch_bushing
 from wrist_stiffness.fem.parts import ElasticBody, assemble_body, wrist_parts
 from wrist_stiffness.mechanism.components import Array
@@ -49,24 +51,45 @@ def main() -> None:
     solid = next(part.solid for part in parts if part.name == JOINT)
     arc = FINER_AROUND * asdict(scaled(1.0))["bushing_arc"]
     body = assemble_body(solid, replace(scaled(3.0), bushing_arc=arc))
-    bushing = patch_bushing(body, RINGS, 1)
+    bushing = patch_bushing(body, RINGS)
     wall = bushing.surface == "wall"
-    flexibility, wrench = bushing.flexibility[np.ix_(wall, wall)], bushing.wrench[:, wall]
+    patches = bushing.flexibility[np.ix_(wall, wall)], bushing.wrench[:, wall]
+    nodes = node_flexibility(body)
     rows = []
     for name, motion in MOTIONS.items():
         screw = np.array(motion)
-        lifted = -screw @ wrench @ settle(flexibility, wrench.T @ screw, None)[0]
-        both = screw @ wrench @ np.linalg.solve(flexibility, wrench.T @ screw)
+        by_patches, by_nodes = (
+            -screw @ wrench @ settle(flexibility, wrench.T @ screw, None)[0]
+            for flexibility, wrench in (patches, nodes)
+        )
         judged = -screw @ by_calculix(body, screw)
         rows.append(
-            f"| {name} | {1e6 * both:.2f} | {1e6 * lifted:.2f} | {1e6 * judged:.2f} | "
-            f"{100 * (lifted / judged - 1):+.1f} % |"
+            f"| {name} | {1e6 * judged:.2f} | {1e6 * by_nodes:.2f} | "
+            f"{100 * (by_nodes / judged - 1):+.1f} % | {1e6 * by_patches:.2f} | "
+            f"{100 * (by_patches / judged - 1):+.1f} % |"
         )
         print(rows[-1], flush=True)
-    head = "| hub moved by | two-sided [µJ] | lifts off | CalculiX contact | difference |"
-    block = "\n".join([head, "| --- | --- | --- | --- | --- |", *rows])
+    head = "| hub moved by | CalculiX contact [µJ] | nodes | | patches | |"
+    block = "\n".join([head, "| --- | --- | --- | --- | --- | --- |", *rows])
     page = Path(arguments.output) / "walls.md"
     page.write_text(insert_blocks(page.read_text(), {"contact": block}))
+
+
+def node_flexibility(body: ElasticBody) -> tuple[Array, Array]:
+    """Retreat of each node of the wall for radial forces of 1 N, and their wrenches on the hub."""
+    mesh, solid = body.mesh, body.solid
+    held = (3 * mesh.surface_nodes(solid.motor_wall)[:, None] + np.arange(3)).ravel()
+    free = np.setdiff1d(np.arange(3 * len(mesh.nodes)), held)
+    on_wall = mesh.surface_nodes(solid.platform_wall)
+    outwards = mesh.nodes[on_wall] * [1.0, 1.0, 0.0]
+    outwards /= np.linalg.norm(outwards, axis=1)[:, None]
+    loads = np.zeros((len(mesh.nodes), 3, len(on_wall)))
+    loads[on_wall, :, np.arange(len(on_wall))] = -outwards
+    loads = loads.reshape(-1, len(on_wall))
+    moved = factorise(body.stiffness[free][:, free], free).solve(loads[free])
+    flexibility = loads[free].T @ moved
+    wrench = -rigid_motion(mesh.nodes).T @ loads
+    return (flexibility + flexibility.T) / 2.0, wrench
 
 
 def by_calculix(body: ElasticBody, screw: Array) -> Array:

@@ -1,6 +1,7 @@
 """How the wall of a bushing is held: judged, refined, and lifted off, on the shipped wrist.
 
-    python bench/paper_calibration/wall_models.py judge | mesh | patches | lifting | pressure
+    python bench/paper_calibration/wall_models.py judge | mesh | rings | patches | lifting
+        | pressure
 
 Each word writes one block or picture of docs/walls.md; none does all; `patches` only prints.
 `judge` needs CalculiX (Debian package calculix-ccx).  Minutes each.
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from paper_page import insert_blocks
 
+from wrist_stiffness.fem import parts, revolve
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
 from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.one_sided import PatchedBushing, PatchedWrist, patch_bushing, solve_patches
@@ -26,6 +28,7 @@ from wrist_stiffness.fem.parts import assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.lookup.rated_load import rated_map, rated_wrench
 from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.verification import random_loads, relative_misses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
@@ -52,6 +55,7 @@ def main() -> None:
     stages: dict[str, Callable[[Geometry], str]] = {
         "judge": judge,
         "mesh": mesh,
+        "rings": rings,
         "patches": patches,
         "lifting": lifting,
     }
@@ -143,6 +147,31 @@ def mesh(geometry: Geometry) -> str:
             rows.append(f"| `{interface}` | {name} | {cells} | {more:+.2f} % |")
     head = "| wall | mean | 2.25 × | 1.5 × | shipped sizes | 0.64 × | last step |"
     return "\n".join([head, "| --- | --- | --- | --- | --- | --- | --- |", *rows])
+
+
+def rings(geometry: Geometry) -> str:
+    """Contact modes over the width of the flanges and around: what 8 rings of 16 change."""
+    thetas, rng = poses(geometry, 400, 14), np.random.default_rng(14)
+    loads = random_loads(geometry.limits, len(thetas), rng)
+    configuration = mechanism_of(geometry).forward(thetas)
+
+    def twist(across: int, around: int) -> Array:
+        # The number around is no option of a table.
+        revolve.SECTORS = parts.SECTORS = around
+        components, _ = elastic_components(geometry, scaled(PATCHED), rings=across)
+        operators = contact_operators(configuration, components, geometry.gravity)
+        return respond(operators, loads).twist
+
+    finest, rows = twist(8, 16), []
+    for across, around in ((1, 8), (1, 4), (2, 4), (2, 8), (4, 4), (4, 8), (8, 4)):
+        misses = 100 * relative_misses(twist(across, around), finest)
+        cells = " | ".join(
+            f"{half.mean():.2f} / {np.quantile(half, 0.99):.2f} %" for half in misses.T
+        )
+        rows.append(f"| {around} × {across} | {cells} |")
+        print(rows[-1], flush=True)
+    head = "| around × over the width | s: mean / 99 of 100 | phi: mean / 99 of 100 |"
+    return "\n".join([head, "| --- | --- | --- |", *rows])
 
 
 def patched(
