@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.identification.base_fit import fit_cleaned
+from wrist_stiffness.identification.base_fit import best_valley, fit_cleaned
 from wrist_stiffness.identification.calibration import fitted, told_model
 from wrist_stiffness.identification.free_effects import FreeEffect, commissioning, free_all
 from wrist_stiffness.identification.problem import FitProblem
@@ -330,17 +330,12 @@ def test_what_a_user_typed_without_uncertainty_is_believed(model):
     assert dict(free[-1].scale) == {"width_mdeg": 20.0}
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [
-        pytest.param(
-            10, marks=pytest.mark.xfail(reason="open: with 4 x 2 flange modes it ends elsewhere")
-        ),
-        23,
-    ],
-)
-def test_rough_data_lead_into_the_valley_of_the_true_flanges(model, seed):
-    """From there a fit ends where one ends that begins at the truth; else flanges touch wrongly."""
+@pytest.mark.parametrize("seed", [7, 15, 16, 18, 20, 23, 28, 33, 37])
+def test_rough_data_lead_into_the_best_valley_of_the_flanges(model, seed):
+    """A fit ends no worse than one that begins at the truth; else flanges touch wrongly.
+
+    From the means of the priors, 28 of 90 drawn wrists end elsewhere, these among them.
+    """
     rng = np.random.default_rng(seed)
     block = poses(rng, 24, 0.1)
     joints = ("joint_2", "joint_3", "joint_4")
@@ -350,10 +345,8 @@ def test_rough_data_lead_into_the_valley_of_the_true_flanges(model, seed):
     true = rng.normal(size=len(drawn.unknowns))
     session = measured(model.with_effects(*drawn.effects(true, 0)), block, rng)
     problem = problem_of(model, [session], free)
-    led, best = fit(problem), fit(problem, true)
-    apart = led.z - best.z
-    # Where a flange is about to touch, steps end at a kink.
-    assert apart @ np.linalg.solve(best.covariance, apart) < 2.0
+    led, best = (fit_cleaned(problem, start)[0] for start in (best_valley(problem), true))
+    assert led.cost < best.cost + 2.0
 
 
 def test_what_the_fit_cannot_follow_widens_its_uncertainty(model):

@@ -46,6 +46,9 @@ BEGUN_WITH = 60
 """Measured units of each session, evenly spread, with which a fit begins: registrations are far off
 at first, and few units bring them near."""
 
+ELSEWHERE = 1.5
+"""Standard deviations from the mean at which a gap begins again (1, 1.5 and 2 lead as far)."""
+
 MOST_CLEANINGS = 3
 """Fits after which lost beams are looked for."""
 
@@ -238,7 +241,10 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     int
         How many there were.
     """
-    z, total = _begun(problem) if start is None else start, 0
+    z, total = (
+        _led(_few(problem), np.zeros(len(problem.unknowns)))[1] if start is None else start,
+        0,
+    )
     usual = len(problem.free)
     z, residual, columns, arrived = _descended(problem, problem, z, usual)
     for _ in range(MOST_CLEANINGS):
@@ -257,10 +263,35 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     return BaseFit(problem, z, residual, (), cost, problem, problem, arrived, columns), total
 
 
-def _begun(problem: FitProblem) -> Array:
-    """Return where a fit to a few units of each session ends, from the means of the priors."""
-    few = replace(problem, sessions=tuple(each.thinned(BEGUN_WITH) for each in problem.sessions))
-    return _descended(few, few, np.zeros(len(few.unknowns)), len(few.free), NEARLY)[0]
+def best_valley(problem: FitProblem) -> Array:
+    """Return where the best of several fits to a few units of each session ends, (p,) steps.
+
+    Where gaps are free by more than shims leave, a flange touches or does not: the sum of squares
+    has a minimum each, and steps do not go from one to the other.  So the fit begins again with
+    each gap on either side.
+    """
+    few = _few(problem)
+    found = [_led(few, np.zeros(len(few.unknowns)))]
+    for place, unknown in enumerate(few.unknowns):
+        effect = few.free[unknown.free].effect
+        linear = next(p.linear for p in effect.parameters if p.key == unknown.key)
+        if not (linear or effect.law.smooth):
+            for side in (-ELSEWHERE, ELSEWHERE):
+                start = found[0][1].copy()
+                start[place] = side
+                found.append(_led(few, np.clip(start, *few.bounds)))
+    return min(found, key=lambda each: each[0])[1]
+
+
+def _few(problem: FitProblem) -> FitProblem:
+    """Return the problem of a few units of each session."""
+    return replace(problem, sessions=tuple(s.thinned(BEGUN_WITH) for s in problem.sessions))
+
+
+def _led(problem: FitProblem, start: Array) -> tuple[float, Array]:
+    """Return the cost where steps end nearly, and that place."""
+    z, residual, _, _ = _descended(problem, problem, start, len(problem.free), NEARLY)
+    return _cost(problem.whiten(residual), z, problem.weights, 1.0), z
 
 
 def _lost(table: Observations, columns: Array) -> Mask:
