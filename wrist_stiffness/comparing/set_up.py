@@ -21,6 +21,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import cleared
 from wrist_stiffness.sessions.observing import Observed, predict_units, tabulate, usual_wander
+from wrist_stiffness.sessions.refitted import REGISTRATIONS
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 GROUPS = {
@@ -94,6 +95,7 @@ class SetUp:
             f"{name} {1e6 * np.linalg.norm(six[:3]):.1f} um and "
             f"{1e3 * np.degrees(np.linalg.norm(six[3:])):.1f} mdeg"
             for name, six in (("instrument", x), ("target", y))
+            if six.any()
         ]
         angles = " and ".join(f"{1e3 * angle:.1f}" for angle in np.degrees(zero))
         parts.append(f"zeros of the motors {angles} mdeg")
@@ -125,7 +127,8 @@ def refit_set_up(
     ends = np.cumsum([len(each) for each in observed.sessions])
     parts = np.split(observed.predicted, ends[:-1])
     free = np.ones(len(PLAUSIBLE), dtype=bool)
-    for effect in calibrated:
+    gauges = observed.sessions[0].readings is not None
+    for effect in (*calibrated, *(REGISTRATIONS if gauges else ())):
         free[GROUPS.get(effect, slice(0))] = False
     return tuple(
         _refit(model, session, predicted, free)

@@ -19,6 +19,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.observing import Observed, tabulate, usual_wander
+from wrist_stiffness.sessions.refitted import REGISTRATIONS
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 NO_PRIOR = 1e-3
@@ -131,7 +132,7 @@ class FitProblem:
         found = []
         for session in (None, *range(len(self.sessions))):
             for place, free in enumerate(self.free):
-                if free.per_session == (session is None):
+                if free.per_session == (session is None) or self._mounted(free):
                     continue
                 bounds = {p.key: p for p in free.effect.parameters}
                 found += [
@@ -148,6 +149,11 @@ class FitProblem:
                     for key in free.scale
                 ]
         return tuple(found)
+
+    def _mounted(self, free: FreeEffect) -> bool:
+        """Tell whether the mountings of gauges are all that an effect could be."""
+        gauges = self.sessions[0].readings is not None
+        return gauges and free.effect.law.id in REGISTRATIONS
 
     @property
     def bounds(self) -> tuple[Array, Array]:

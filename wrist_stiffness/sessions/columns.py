@@ -96,7 +96,7 @@ class SessionModel:
         self._rests[moments] = found[0].guesses
         if moments is Moments.MEAN:
             return [each.measured for each in found]
-        return [session.mean(each.measured) for each in found]
+        return [session.mean_twist(each.measured) for each in found]
 
     @cached_property
     def _without_path(self) -> UnitSession:

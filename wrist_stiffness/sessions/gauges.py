@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.inference import Quantity
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
+from wrist_stiffness.sessions.in_pieces import in_pieces
 
 GAUGES = Quantity("gauges", "um", (), 1e6)
 TILTS = Quantity("tilts", "mdeg", (), 180e3 / np.pi)
@@ -140,6 +142,8 @@ class Readings:
     ----------
     gauges : tuple of Gauge
         K of them, as they stand.
+    mechanism : Mechanism
+        The rigid wrist.
     up : (3,) float
         Unit vector against gravity in F.
     values : (n, K) float
@@ -147,6 +151,7 @@ class Readings:
     """
 
     gauges: tuple[Gauge, ...]
+    mechanism: Mechanism
     up: Array
     values: Array
 
@@ -159,8 +164,13 @@ class Readings:
         """Return those of some samples, in their order."""
         return replace(self, values=self.values[rows])
 
-    def predicted(self, twist: Array, rigid: Array) -> Array:
-        """Return by how much twists (..., n, 6) at O of rigid poses change them, (..., n, K)."""
+    def rigid(self, theta: Array) -> Array:
+        """Return the rotation U -> F of the rigid wrist at angles (n, 2) [rad], (n, 3, 3)."""
+        return in_pieces(self.mechanism.platform_rotation, theta)
+
+    def predicted(self, twist: Array, theta: Array) -> Array:
+        """Return by how much twists (..., n, 6) at O change them at angles (n, 2), (..., n, K)."""
+        rigid = self.rigid(theta)
         rotation, shift = exp_twist(twist)
         rotation = rotation @ rigid
         changes = [
@@ -169,15 +179,17 @@ class Readings:
         ]
         return np.stack(changes, axis=-1)
 
-    def rows(self, rotation: Array) -> Array:
+    def rows(self, theta: Array) -> Array:
         """Return by how much a twist at O in F changes the readings, (n, K, 6)."""
+        rotation = self.rigid(theta)
         return np.stack([each.row(rotation, self.up) for each in self.gauges], axis=1)
 
-    def common(self, rotation: Array) -> Array:
+    def common(self, theta: Array) -> Array:
         """Return what standard deviations of all mountings do to the readings, (n, K, q)."""
+        rotation = self.rigid(theta)
         own = [each.mounting(rotation, self.up) for each in self.gauges]
         ends = np.cumsum([each.shape[1] for each in own])
-        out = np.zeros((len(rotation), len(own), ends[-1]))
+        out = np.zeros((len(theta), len(own), ends[-1]))
         for number, (each, end) in enumerate(zip(own, ends, strict=True)):
             out[:, number, end - each.shape[1] : end] = each
         return out

@@ -90,7 +90,7 @@ def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
 
 def predict_units(model: ErrorModel, session: UnitSession) -> Array:
     """Return the predicted pose error of each unit as the sensor says it, (u, 6) [m, rad]."""
-    return session.mean(model.batch(session.block).measured)
+    return session.mean_twist(model.batch(session.block).measured)
 
 
 def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:

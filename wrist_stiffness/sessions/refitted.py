@@ -8,9 +8,12 @@ from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_
 
 AXES, GAPS = "axis_misalignment", "flange_contact"
 
+REGISTRATIONS = ("measurement_frame", "target_mounting")
+"""Of what measures poses.  Gauges have a mounting each instead, of which these are a part: see
+`UnitSession.common`."""
+
 SET_UP = (
-    ("measurement_frame", ("pose_sensor",)),
-    ("target_mounting", ("pose_sensor",)),
+    *((law, ("pose_sensor",)) for law in REGISTRATIONS),
     ("encoder_offset", MOTORS),
     ("load_bias", ("load_sensor",)),
 )

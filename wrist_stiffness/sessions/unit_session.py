@@ -70,8 +70,6 @@ class UnitSession:
         beyond the white scatter, or what its digits hide where they hide that one [m, rad].
     readings : Readings, optional
         Mean readings of gauges, (u, K), in place of `shift` and `turn`: then m is K, else 6.
-    rigid : (u, 3, 3) float, optional
-        Rotation U -> F of the rigid wrist, where gauges read it.
     """
 
     name: str
@@ -83,7 +81,6 @@ class UnitSession:
     white: Array
     wander: Array
     readings: Readings | None = None
-    rigid: Array | None = None
 
     def __len__(self) -> int:
         """Return the number of units."""
@@ -134,18 +131,23 @@ class UnitSession:
         """Return the same of columns of twists, (u, 6, k) -> (u, m, k)."""
         return twists if self.readings is None else np.asarray(self._rows @ twists)
 
-    @property
+    @cached_property
     def common(self) -> Array:
-        """What standard deviations of the gauges' mountings do to the units, (u, m, q)."""
-        if self.readings is None or self.rigid is None:
+        """What standard deviations of the gauges' mountings do to the units, (u, m, q).
+
+        In motion the mean of that is not what they do at the mean angles: a ball a millimetre off
+        goes along a bow.
+        """
+        if self.readings is None:
             return np.empty((len(self), 6, 0))
-        return self.readings.common(self.rigid)
+        return self.mean(self.readings.common(self.block.theta))
 
     def moves(self, gauge: str) -> bool:
         """Tell whether a gauge of this name followed motions of the rigid wrist."""
-        read, rigid = self.readings, self.rigid
-        if read is None or rigid is None:
+        read = self.readings
+        if read is None:
             return False
+        rigid = read.rigid(self._theta)
         return any(
             each.name == gauge and each.follows(each.reading(np.zeros(3), rigid, read.up))
             for each in read.gauges
@@ -154,9 +156,14 @@ class UnitSession:
     @cached_property
     def _rows(self) -> Array:
         """By how much a twist changes each reading, (u, m, 6)."""
-        if self.readings is None or self.rigid is None:
+        if self.readings is None:
             return np.broadcast_to(np.eye(6), (len(self), 6, 6))
-        return self.readings.rows(self.rigid)
+        return self.readings.rows(self._theta)
+
+    @cached_property
+    def _theta(self) -> Array:
+        """Mean angles of the units, (u, 2) [rad]."""
+        return self.mean(self.block.theta)
 
     @property
     def block(self) -> Block:
@@ -199,7 +206,6 @@ class UnitSession:
             turn=self.turn[own],
             samples=self.samples[own],
             readings=self.readings and replace(self.readings, values=self.readings.values[own]),
-            rigid=None if self.rigid is None else self.rigid[own],
         )
 
     def mean(self, values: Array) -> Array:
@@ -209,6 +215,18 @@ class UnitSession:
         weighted = flat[used] * self.cut.weight[used, None]
         sums = [np.bincount(self.cut.unit[used], column, units) for column in weighted.T]
         return np.asarray(np.stack(sums, axis=1).reshape(units, *values.shape[1:]), dtype=float)
+
+    def mean_twist(self, twist: Array) -> Array:
+        """Return the twist at O of each unit, (u, 6), from those at the kept moments, (k, 6).
+
+        Where gauges read, it is one that at the mean angles reads as all moments do on average.
+        """
+        mean = self.mean(twist)
+        if self.readings is None:
+            return mean
+        shown = self.mean(self.readings.predicted(twist, self.block.theta))
+        off = shown - self.readings.predicted(mean, self._theta)
+        return np.asarray(mean + (np.linalg.pinv(self._rows) @ off[..., None])[..., 0])
 
     @cached_property
     def _turned(self) -> tuple[Mask, Array]:
@@ -229,8 +247,8 @@ class UnitSession:
         (..., u, m) float
             Of gauges what they read less what they should.
         """
-        if self.readings is not None and self.rigid is not None:
-            return self.readings.values - self.readings.predicted(twist, self.rigid)
+        if self.readings is not None:
+            return self.readings.values - self.readings.predicted(twist, self._theta)
         rotation, shift = exp_twist(twist)
         known, measured = self._turned
         # Without a measured rotation the predicted one stands in: then s is compared with s.
@@ -285,7 +303,7 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     beside = np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0))
     none = np.full((units, 3), np.nan)
     quantities = QUANTITIES if read is None else read.quantities
-    found = UnitSession(
+    return UnitSession(
         session.name,
         parts,
         mean[:, :3] if read is None else none,
@@ -296,9 +314,6 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         np.maximum(beside, np.where(white == 0.0, _rounding(steps, quantities), 0.0)),
         read and replace(read, values=mean),
     )
-    if read is None:
-        return found
-    return replace(found, rigid=in_pieces(rigid, found.mean(found.block.theta)))
 
 
 def _means(values: Array, label: Labels, units: int) -> tuple[Array, Array]:

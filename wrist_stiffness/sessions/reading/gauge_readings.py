@@ -118,7 +118,7 @@ def held_to(
             own = own - zero - each.reading(np.zeros(3), rotation, up)
         found.append(each)
         left.append(own)
-    return Readings(tuple(found), up, np.stack(left, axis=1)), remarks
+    return Readings(tuple(found), table.mechanism, up, np.stack(left, axis=1)), remarks
 
 
 def _require_right(gauge: Gauge, values: Array, rigid: Array) -> None:
