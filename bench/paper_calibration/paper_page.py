@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,11 +88,14 @@ def published_block(found: PaperExperiment) -> str:
     for column in ROWS:
         for i, statistic in enumerate(STATISTICS):
             values = [figures.operative[i, column] for figures in (PUBLISHED, *ways)]
-            rows.append([f"{COLUMNS[column]} {statistic} [{UNITS[column]}]", *values])
+            rows.append(
+                [f"{COLUMNS[column]} {statistic} [{UNITS[column]}]", *_numbers(values, column)]
+            )
     for i, column in enumerate((3, 4)):
         values = [figures.map_maximum[i] for figures in (PUBLISHED, *ways)]
-        rows.append([f"{COLUMNS[column]} whole-map max [{UNITS[column]}]", *values])
-    return _table(["figure", *lines], [[name, *map(_number, values)] for name, *values in rows])
+        name = f"{COLUMNS[column]} whole-map max [{UNITS[column]}]"
+        rows.append([name, *_numbers(values, column)])
+    return _table(["figure", *lines], rows)
 
 
 def load_point_block(found: PaperExperiment) -> str:
@@ -153,12 +156,14 @@ MEANS_AND_MAXIMA = ("mean s", "mean phi", "mean s_z", "map max s", "map max phi"
 
 
 def _means_and_maxima(figures: Figures) -> list[str]:
-    mean = figures.operative[0]
-    return [_number(value) for value in (mean[3], mean[4], mean[2], *figures.map_maximum)]
+    mean, most = figures.operative[0], figures.map_maximum
+    columns = ((mean[3], 3), (mean[4], 4), (mean[2], 2), (most[0], 3), (most[1], 4))
+    return [cell for value, column in columns for cell in _numbers([value], column)]
 
 
-def _number(value: float) -> str:
-    return f"{value:.2f}"
+def _numbers(values: Sequence[float], column: int) -> list[str]:
+    """Print um to two digits behind the point and mdeg to one, as the paper does."""
+    return [f"{value:.{1 if UNITS[column] == 'mdeg' else 2}f}" for value in values]
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

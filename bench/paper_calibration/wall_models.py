@@ -76,11 +76,6 @@ def main() -> None:
         page.write_text(insert_blocks(page.read_text(), {stage: block}))
 
 
-def scaled(factor: float) -> MeshSettings:
-    """Return element sizes that are a multiple of the shipped ones."""
-    return MeshSettings(**{name: factor * size for name, size in asdict(SHIPPED_SIZES).items()})
-
-
 def poses(geometry: Geometry, count: int, seed: int) -> Array:
     """Return random poses of the operative workspace (n, 2) [rad]."""
     workspace = Workspace(mechanism_of(geometry), geometry.limits)
@@ -91,7 +86,7 @@ def poses(geometry: Geometry, count: int, seed: int) -> Array:
 
 def judge(geometry: Geometry) -> str:
     """Condensed, solved whole and by CalculiX: the same mesh, 20 random poses and loads."""
-    sizes, mechanism = scaled(5.0), mechanism_of(geometry)
+    sizes, mechanism = SHIPPED_SIZES.times(5.0), mechanism_of(geometry)
     rng = np.random.default_rng(20)
     limits = (geometry.limits.force, geometry.limits.moment)
     rows = []
@@ -137,7 +132,7 @@ def mesh(geometry: Geometry) -> str:
     for interface in ("rigid", "sliding"):
         values = []
         for factor in (2.25, 1.5, 1.0, 0.64):
-            components, _ = elastic_components(geometry, scaled(factor), interface)
+            components, _ = elastic_components(geometry, SHIPPED_SIZES.times(factor), interface)
             operators = contact_operators(configuration, components, np.zeros(3))
             values.append(rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0))
         for k, name in enumerate(("s [µm]", "phi [mdeg]")):
@@ -158,7 +153,7 @@ def rings(geometry: Geometry) -> str:
     def twist(across: int, around: int) -> Array:
         # The number around is no option of a table.
         revolve.SECTORS = parts.SECTORS = around
-        components, _ = elastic_components(geometry, scaled(PATCHED), rings=across)
+        components, _ = elastic_components(geometry, SHIPPED_SIZES.times(PATCHED), rings=across)
         operators = contact_operators(configuration, components, geometry.gravity)
         return respond(operators, loads).twist
 
@@ -203,7 +198,7 @@ def rated(wrist: PatchedWrist, thetas: Array, clearance: float = 0.0, lifts: boo
 def patches(geometry: Geometry) -> str:
     """Patches along the wall, over the flange and around: what each step changes."""
     thetas, rows = poses(geometry, 6, 13), []
-    coarse = asdict(scaled(PATCHED))
+    coarse = asdict(SHIPPED_SIZES.times(PATCHED))
     for arc, wall, flange in (
         (1.0, 2, 1), (1.0, 4, 1), (1.0, 8, 1), (1.0, 16, 1), (1.0, 4, 2), (1.0, 4, 4), (0.5, 4, 1)
     ):  # fmt: skip
@@ -216,7 +211,9 @@ def patches(geometry: Geometry) -> str:
             f"{one[0]:.2f} / {one[1]:.2f} | {one[0] / two[0]:.3f} |"
         )
         print(rows[-1], flush=True)
-    components, _ = elastic_components(geometry, scaled(PATCHED), "sliding", condenser=CONDENSE)
+    components, _ = elastic_components(
+        geometry, SHIPPED_SIZES.times(PATCHED), "sliding", condenser=CONDENSE
+    )
     configuration = mechanism_of(geometry).forward(thetas)
     operators = contact_operators(configuration, components, np.zeros(3))
     nodal = rated_map(configuration, operators, geometry)[:, 3:].mean(axis=0) * [UM, MDEG]
@@ -227,7 +224,7 @@ def patches(geometry: Geometry) -> str:
 
 def lifting(geometry: Geometry) -> str:
     """Compare a table's two-sided walls with those that lift off, with and without clearance."""
-    wrist, thetas = patched(geometry, scaled(PATCHED), 8, 2), poses(geometry, 24, 14)
+    wrist, thetas = patched(geometry, SHIPPED_SIZES.times(PATCHED), 8, 2), poses(geometry, 24, 14)
     rows = []
     two = rated(wrist, thetas, lifts=False)
     rows.append(f"| two-sided (`sliding`) | {two[0]:.1f} | {two[1]:.1f} | 1 |")
@@ -244,7 +241,7 @@ def draw_pressure(geometry: Geometry, path: Path) -> None:
     from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
     joint = "joint_2"
-    wrist = patched(geometry, scaled(1.0), 12, 2)
+    wrist = patched(geometry, SHIPPED_SIZES.times(1.0), 12, 2)
     pose = mechanism_of(geometry).forward(np.zeros(2))
     load = rated_wrench(pose, geometry)
     figure = new_figure(13.0, 4.2)
@@ -262,18 +259,27 @@ def draw_pressure(geometry: Geometry, path: Path) -> None:
     for axes, (name, field) in zip(
         figure.subplots(1, len(cases), sharey=True), fields.items(), strict=True
     ):
-        # The singular ends would hide the rest.
-        most = float(np.quantile(np.abs(field[field != 0.0]), 0.9))
-        drawn = draw_patches(axes, bushing, on_wall, field, most)
-        figure.colorbar(drawn, ax=axes, extend="both", label="pressure [MPa]")
+        drawn = draw_patches(axes, bushing, on_wall, field)
+        figure.colorbar(drawn, ax=axes, label="pressure [MPa]")
         axes.set_title(f"{name}\n{field.min():.2f} to {field.max():.2f} MPa", fontsize=10)
         axes.set_xlabel("around the pin [deg]")
     figure.axes[0].set_ylabel("along the bushing [mm]")
     save_figure(figure, path)
 
 
-def draw_patches(axes, bushing: PatchedBushing, which: Array, field: Array, most: float):  # type: ignore[no-untyped-def]
-    """Draw a field over the patches of a wall, one coloured cell each."""
+def draw_patches(axes, bushing: PatchedBushing, which: Array, field: Array):  # type: ignore[no-untyped-def]
+    """Draw a pressure over the patches of a wall, one cell each, coloured by its square root.
+
+    Its ends are singular; on an even scale they would hide the rest.
+    """
+    from matplotlib.colors import FuncNorm
+
+    most, pulls = np.abs(field).max(), field.min() < 0.0
+    roots = FuncNorm(
+        (lambda p: np.sign(p) * np.sqrt(np.abs(p)), lambda r: r * np.abs(r)),
+        vmin=-most if pulls else 0.0,
+        vmax=most,
+    )
     angles = np.unique(bushing.angle[which].round(9))
     heights = bushing.height[which].reshape(len(angles), -1)[0]
     order = np.argsort(heights)
@@ -284,7 +290,9 @@ def draw_patches(axes, bushing: PatchedBushing, which: Array, field: Array, most
     turn = angles[1] - angles[0]
     around = np.degrees(np.concatenate([angles - turn / 2.0, angles[-1:] + turn / 2.0]))
     cells = field.reshape(len(angles), -1)[:, order].T
-    return axes.pcolormesh(around, 1e3 * edges, cells, cmap="RdBu_r", vmin=-most, vmax=most)
+    return axes.pcolormesh(
+        around, 1e3 * edges, cells, cmap="RdBu_r" if pulls else "Reds", norm=roots
+    )
 
 
 if __name__ == "__main__":

@@ -2,6 +2,11 @@
 
 import copy
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from functools import partial
 
@@ -14,6 +19,8 @@ from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.lookup.table_file import load_table, save_table
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
+
+DEADLINE_S = 120.0
 
 CHECKS = {
     "file",
@@ -108,6 +115,36 @@ def test_damaged_table_is_refused(small_table, tmp_path, refused, action, how):
 def test_foreign_npz_is_refused(tmp_path, refused):
     np.savez(tmp_path / "foreign.npz", nodes=np.zeros((3, 2)))
     assert "not a table of this program" in refused("table", "check", tmp_path / "foreign.npz")
+
+
+@pytest.mark.slow
+def test_a_stopped_build_says_what_it_keeps(tmp_path):
+    """Stopped by a real signal as soon as one part is condensed."""
+    pytest.importorskip("netgen")
+    command = [sys.executable, "-m", "wrist_stiffness", "table", "build", "-o", tmp_path / "t.npz"]
+    end_s = time.monotonic() + DEADLINE_S
+    with subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        # Tests that run in the background are started deaf to SIGINT, and hand that on.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        try:
+            while not (kept := list(tmp_path.glob(".t.parts/*.npz"))):
+                assert process.poll() is None
+                assert time.monotonic() < end_s
+                os.sched_yield()
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=DEADLINE_S)
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    parts = len(list(tmp_path.glob(".t.parts/*.npz")))
+    assert parts >= len(kept)
+    kept = f"stopped; condensed parts kept: {parts}; the same command goes on from there"
+    assert said.splitlines()[-1] == f"wrist-stiffness: {kept}"
+    assert "Traceback" not in said
 
 
 def coloured(pixels):

@@ -36,6 +36,7 @@ from wrist_stiffness.cli.parser import (
     Commands,
     OneLineParser,
 )
+from wrist_stiffness.cli.progress import bars_ended
 from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.python_laws import python_laws
@@ -162,7 +163,7 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
         for option, begins in RESULTS.items():
             _require_place(getattr(arguments, option, None), option, begins)
         _require_places_apart(arguments)
-        with cleaned_up_on_sigterm(), python_laws(arguments.allow_python_laws):
+        with cleaned_up_on_sigterm(), python_laws(arguments.allow_python_laws), bars_ended():
             code: int = arguments.run(arguments)
         for option in RESULTS:
             path = getattr(arguments, option, None)
@@ -178,7 +179,9 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
             raise
         advice = f"pip install 'wrist_stiffness[{EXTRA_OF[library]}]'"
         return _refuse(f"{library} is not installed; {advice}")
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if str(stop):  # What it leaves behind
+            print(f"{PROG}: {stop}", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         _discard_output()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 SHOWN_AFTER_S = 2.0
@@ -32,10 +33,23 @@ class _Lines:
         self._stream = stream
 
     def write(self, text: str) -> None:
-        self._stream.write(text.replace("\r", "\n") if text.strip() else "")
+        self._stream.write(f"{text.strip()}\n" if text.strip() else "")
 
     def flush(self) -> None:
         self._stream.flush()
+
+
+_begun: list[Any] = []
+
+
+@contextmanager
+def bars_ended() -> Iterator[None]:
+    """End the lines of bars that a `with` block leaves before their end."""
+    try:
+        yield
+    finally:
+        while _begun:
+            _begun.pop().close()
 
 
 class Progress:
@@ -43,6 +57,8 @@ class Progress:
 
     def __init__(self, label: str, stream: TextIO | None = None) -> None:
         self._bar = _bar(stream, desc=label)
+        if self._bar is not None:
+            _begun.append(self._bar)
 
     def __call__(self, done: int, total: int) -> None:
         """Take notice that `done` of `total` steps are behind us."""

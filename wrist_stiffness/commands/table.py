@@ -71,6 +71,8 @@ def build(
     ------
     WristError
         If the geometry is wrong, the tolerance is not met or the file cannot be written.
+    KeyboardInterrupt
+        Says what is kept.
     """
     from wrist_stiffness.fem.condensed_store import CondensedStore
     from wrist_stiffness.fem.sweep import BuildSettings, build_table
@@ -97,7 +99,12 @@ def build(
         kernel=kernel,
     )
     store = CondensedStore(output.with_name(f".{output.stem}.parts"))
-    table = with_second_order(build_table(root.plain, settings, progress, store))
+    try:
+        table = with_second_order(build_table(root.plain, settings, progress, store))
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(
+            f"stopped; condensed parts kept: {store.kept()}; the same command goes on from there"
+        ) from stop
     table = save_table(table, output)
     store.remove()
     return table

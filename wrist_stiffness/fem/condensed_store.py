@@ -101,6 +101,10 @@ class CondensedStore:
             raise TableError(f"{self.folder}: cannot be written: {error.strerror}") from error
         return condensed
 
+    def kept(self) -> int:
+        """Return the number of solids in the folder."""
+        return len(list(self.folder.glob("*.npz")))
+
     def remove(self) -> None:
         """Take the folder away."""
         shutil.rmtree(self.folder, ignore_errors=True)

@@ -157,7 +157,7 @@ def draw_mode_shapes(
         plot: Any = figure.add_subplot(2, 2, number + 1, projection="3d")
         shapes = moved_shapes(table, pose, modes.screws[0, number])
         largest = max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
-        _draw_shapes(plot, shapes, SHOWN_M / largest, colours, 1.0 / largest)
+        _draw_shapes(plot, shapes, SHOWN_M / largest, colours, 1.0 / largest, number == 0)
         plot.set_title(f"mode {number + 1}: {modes.frequency[0, number]:.0f} Hz", fontsize=10)
     degrees = np.degrees(pose.theta)
     figure.suptitle(
@@ -169,7 +169,12 @@ def draw_mode_shapes(
 
 
 def _draw_shapes(
-    plot: Any, shapes: list[Shape], factor: float, colours: Any, colour_per_metre: float
+    plot: Any,
+    shapes: list[Shape],
+    factor: float,
+    colours: Any,
+    colour_per_metre: float,
+    named: bool = True,
 ) -> None:
     label = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
     for name, shape in zip((*LINKS, *JOINTS, "platform"), shapes, strict=True):
@@ -184,8 +189,9 @@ def _draw_shapes(
         plot.plot_wireframe(
             *np.moveaxis(rigid, -1, 0), color="grey", linewidth=0.3, rstride=2, cstride=3, alpha=0.5
         )
-        middle = bent[len(bent) // 2].mean(axis=0)
-        plot.text(*middle, name, fontsize=8, ha="center", va="center", bbox=label, zorder=1000)
+        if named:
+            middle = bent[len(bent) // 2].mean(axis=0)
+            plot.text(*middle, name, fontsize=8, ha="center", va="center", bbox=label, zorder=1000)
     plot.set_aspect("equal")
     plot.set_xlabel("x [mm]")
     plot.set_ylabel("y [mm]")
