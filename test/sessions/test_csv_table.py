@@ -225,11 +225,13 @@ def changed(row, column, value):
         (table_of(), "nothing measured"),
         (table_of(FULL, full_cells).splitlines()[0], "no rows below the column names"),
         ("", "no column names in the first line"),
+        ("0,1.5,-2\n5,1.6,-2\n", "no column names in the first line"),
+        (changed(3, "z_mm", "0,02"), "row 3: 20 cells for 19 columns; decimal commas need semico"),
         (table_of(",p999999999x_mm", lambda i: ",1"), "p1x_mm, p1y_mm, p1z_mm of the markers"),
         (table_of(",p" + "9" * 5000 + "x_mm", lambda i: ",1"), "p1x_mm, p1y_mm, p1z_mm of the"),
         (table_of(",x_mm", lambda i: ",1e99999"), "column x_mm: '1e99999' is not finite"),
         (table_of(",x_mm", lambda i: ",1e400"), "column x_mm: '1e400' is not finite"),
-        (table_of(",x_mm", lambda i: ",1").replace("10,", "1e999999,", 1), "1e999999' is no"),
+        (table_of(",x_mm", lambda i: ",1").replace("10,", "1e999999,", 1), "1e999999' is nei"),
         (table_of(",x_mm", lambda i: ',"' + "1" * 200_000 + '"'), "row 2: field larger than"),
         (f"{MACHINE},{'x' * 200_000}", "row 1 has more than 131072 characters"),
         (changed(1, "x_mm", "x_m"), "column x_m is neither of the load nor of the pose.*x_mm"),
@@ -340,7 +342,9 @@ def test_a_date_is_a_time(date, ns):
 
 @pytest.mark.parametrize("date", ["2026-02-30T10:00:00", "02.03.2026 10:15:00", "2026-03-02"])
 def test_a_date_that_is_none_is_refused(date):
-    with pytest.raises(ValueError, match="is no number|day is out of range"):
+    with pytest.raises(
+        ValueError, match="neither seconds nor a date like 2026|day is out of range"
+    ):
         nanoseconds(date)
 
 

@@ -229,7 +229,7 @@ def _survey(table: Path) -> _Form:
     except OSError as error:
         raise InputError(f"{table}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{table}: is no text in UTF-8") from error
+        raise InputError(f"{table}: is no text in UTF-8; save it as such") from error
     separator = next((mark for mark in SEPARATORS if mark in first), ",")
     try:
         header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
@@ -275,7 +275,9 @@ def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) != len(header):
-                raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns")
+                decimal = len(cells) > len(header) and form.separator == ","
+                why = "; decimal commas need semicolons or tabs between columns" if decimal else ""
+                raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns{why}")
             text = dict(zip(header, map(_blank_if_nan, cells), strict=True))
             if form.separator != ",":
                 mark = _with_points(place, text, mark)

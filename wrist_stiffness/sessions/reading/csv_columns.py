@@ -124,17 +124,19 @@ def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
         If a column is missing, named twice or has no unit or a wrong one, or nothing measured is
         there.
     """
+    if not any(letter.isalpha() for name in header for letter in name):
+        raise InputError("no column names in the first line")
     for name, times in Counter(header).items():
         if times > 1:
             raise InputError(f"column {name or '(without a name)'} is there twice")
-    if not any(header):
-        raise InputError("no column names in the first line")
     if missing := [name for name in (TIME, *MOTORS) if name not in header]:
         raise InputError(f"column {', '.join(missing)} is missing (found: {', '.join(header)})")
     loads = [name for name in LOAD if name in header]
     if 0 < len(loads) < len(LOAD):
         missing = [name for name in LOAD if name not in header]
-        raise InputError(f"column {', '.join(missing)} of the load is missing")
+        raise InputError(
+            f"column {', '.join(missing)} of the load is missing (found: {', '.join(header)})"
+        )
     turned = [name for name in QUATERNION if name in header]
     if 0 < len(turned) < len(QUATERNION):
         missing = [name for name in QUATERNION if name not in header]
@@ -258,7 +260,9 @@ def nanoseconds(text: str) -> int:
     try:
         exact = EXACT.multiply(Decimal(text.strip()), NANOSECONDS)
     except (InvalidOperation, Overflow) as error:
-        raise ValueError(f"{text!r} is no number{with_a_point(text)}") from error
+        raise ValueError(
+            f"{text!r} is neither seconds nor a date like 2026-03-02T10:15:00{with_a_point(text)}"
+        ) from error
     if (
         not exact.is_finite()
         or exact.adjusted() > LARGEST_EXPONENT
