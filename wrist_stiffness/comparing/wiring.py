@@ -224,8 +224,9 @@ def suspected(
 
     found = {mistake: gain for mistake in mistakes if (gain := gains(mistake))}
     logs = np.array([sum(gain.values()) for gain in found.values()])
-    weights = np.exp(logs - max(logs, default=0.0)) * (1.0 - RIGHT) / len(mistakes)
-    total = weights.sum() + RIGHT * np.exp(-max(logs, default=0.0))
+    largest = logs.max(initial=0.0)
+    weights = np.exp(logs - largest) * (1.0 - RIGHT) / len(mistakes)
+    total = weights.sum() + RIGHT * np.exp(-largest)
     if not len(logs) or weights.max() < NAMING * total:
         return None
     mistake = list(found)[int(np.argmax(logs))]
