@@ -146,7 +146,9 @@ def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
     if pose and markers:
         raise InputError(f"columns {pose[0]} and p1x_mm: a pose and markers exclude each other")
     if missing := [name for name in gauges if name not in header]:
-        raise InputError(f"column {', '.join(missing)} of the gauges is missing")
+        raise InputError(
+            f"column {', '.join(missing)} of the gauges is missing (found: {', '.join(header)})"
+        )
     if gauges and (pose or markers):
         raise InputError(
             f"columns {gauges[0]} and {(*pose, 'p1x_mm')[0]}: gauges and a pose exclude each other "
@@ -155,7 +157,7 @@ def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
     if not pose and not markers and not gauges:
         raise InputError(
             f"nothing measured: none of {', '.join((*POSITION, *QUATERNION))} or p1x_mm ... "
-            f"among {', '.join(header)}"
+            f"among {', '.join(header)}; dial gauges and inclinometers need --gauges"
         )
     known = {TIME, *MOTORS, *LOAD, *pose, *marker_columns(markers), *gauges}
     temperatures, covariates = {}, {}
