@@ -106,6 +106,26 @@ def test_a_better_nominal_fit_is_asked_anew(rng):
     assert max(promised) == pytest.approx(max(gains), abs=1.0)
 
 
+def test_nothing_is_named_that_the_nominal_fit_does_without(rng):
+    """Fits get on with every effect less; a search that ends early names who came along."""
+
+    class Slow(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            self.noise, self.astray = rng.normal(size=ROWS), self.whole["law_0@place"][:, 0]
+            self.left = self.noise + 3.0 * self.astray
+
+        def without(self, fit, name):
+            self.left = self.noise + 0.5 * (self.left - self.noise)
+            return super().without(fit, name)
+
+    problem = Slow(rng)
+    search = Search(problem, most_effects=1)
+    search.run()
+    assert not search.best.names
+    assert np.std(search.base.fit.point.left) < 1.1 * np.std(problem.noise)
+
+
 def _rest(point):
     return point.columns, point.z, point.weight, point.effects, point.inexact, point.varied
 

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wrist_stiffness.inference.evidence import Array, Evidence, evidence
+from wrist_stiffness.inference.evidence import ENOUGH, Array, Evidence, evidence
 from wrist_stiffness.inference.point import Background, Point
 
 LEADERS = 6
@@ -189,16 +189,15 @@ class Search:
 
     def run(self) -> None:
         """Search until no move gains, or the time is over."""
-        best = self._deepened(self.base)
-        for _ in range(self._most):
+        best, before = self._deepened(self.base), -np.inf
+        while best.log > before + ENOUGH:
             for name in sorted(best.names):
                 less = self._less(best, name)
                 if self._may_lead_further(less, best):
                     self._grown(less, best.names)
-            better = self.best
-            if better.log <= best.log:
-                break
-            best = self._deepened(better)
+            before = best.log
+            if self.best.log > before:
+                best = self._deepened(self.best)
 
     def _may_lead_further(self, less: State, best: State) -> bool:
         """Tell whether something else in place of an effect might be as probable as the best set.
