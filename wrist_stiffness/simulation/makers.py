@@ -55,8 +55,6 @@ from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, 
 from wrist_stiffness.simulation.laws.time_delay import TimeDelay
 from wrist_stiffness.simulation.seat import Seat
 
-GROWING = ("link_1", "link_2", "frame", "platform")
-
 
 def spring(d: Draw, place: Array) -> Array:
     """Flexibility (6, 6) at O of a bracket at a place, of 1 in translation, in a random frame."""
