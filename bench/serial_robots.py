@@ -2,8 +2,10 @@
 
 Usage: ``python bench/serial_robots.py FOLDER`` with the four CSV files of
 pauljac7700/serial_robots_datasets (P. Jacobi, Tsinghua University 2025).  The diagnosis sees the
-grid poses only; the 20 random poses are predicted at the end, by the base alone and by all sets of
-effects with their probabilities, with the published figures beside them.
+grid poses only.  Lengths, offsets and twists that it names are built into the kinematics, where
+they are exact, and it is asked again until it names none.  The 20 random poses are predicted at the
+end, by the base alone and by all that was learned, with the published figures beside them.  It ends
+with exit code 1 if a robot is predicted worse than it was.
 
 Conventions, checked on the data: the target is the nominal forward kinematics of the commanded
 angles, with a tool of 31 mm (UR5) and 44 mm (WAM) along the last axis and the base at the identity;
@@ -13,9 +15,10 @@ The files tell an order of the poses but no times: what follows it is misfit, no
 """
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +31,7 @@ from wrist_stiffness.inference import (
     Parameter,
     Predictor,
     Quantity,
+    TableDiagnosis,
     diagnose,
 )
 from wrist_stiffness.inference.predictor import predicted_set
@@ -53,6 +57,8 @@ class Robot:
         Length along the last axis [m].
     published : str
         Mean error on the unseen poses, raw and best.
+    reached_mm : float
+        Mean error on the unseen poses that was reached here once.
     """
 
     name: str
@@ -61,6 +67,7 @@ class Robot:
     d: np.ndarray
     tool: float
     published: str
+    reached_mm: float
 
     @property
     def joints(self) -> int:
@@ -77,6 +84,7 @@ ROBOTS = (
         np.array([0.089159, 0, 0, 0.10915, 0.09465, 0.0823]),
         0.031,
         "2.566 mm raw, 0.155 mm with geometry and a neural network",
+        0.1,
     ),
     Robot(
         "WAM",
@@ -85,6 +93,7 @@ ROBOTS = (
         np.array([0, 0, 0.55, 0, 0.3, 0, 0.06]),
         0.044,
         "17.77 mm raw, 2.92 mm with geometry and a neural network",
+        2.8,
     ),
 )
 
@@ -252,26 +261,70 @@ def mean_error_mm(values: np.ndarray) -> float:
     return float(np.linalg.norm(values, axis=1).mean()) / MM
 
 
-def main() -> None:
+def main() -> int:
     """Diagnose both robots."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--robot", choices=[each.name for each in ROBOTS], action="append")
     arguments = parser.parse_args()
-    for robot in ROBOTS:
-        if robot.name in (arguments.robot or [each.name for each in ROBOTS]):
-            tell(robot, arguments.folder)
+    asked = [r for r in ROBOTS if r.name in (arguments.robot or [each.name for each in ROBOTS])]
+    errors = [learned(each, arguments.folder) / each.reached_mm for each in asked]
+    return int(max(errors) > 1.0)
 
 
-def tell(robot: Robot, folder: Path) -> None:
-    """Diagnose one robot, and predict the poses that no fit has seen."""
-    seen, unseen = read(folder, robot, "grid", 0), read(folder, robot, "random", 0)
-    began = time.process_time()
-    result = diagnose(seen, catalogue(robot), base(robot))
+GEOMETRY = {"link_length": "a", "link_offset": "d", "link_twist": "alpha"}
+"""Effects that are numbers of the kinematics."""
+
+
+def built_in(robot: Robot, result: TableDiagnosis) -> Robot:
+    """Return a robot with the geometry that a diagnosis names."""
+    for finding in result.findings:
+        effect, joint = finding.names[0].split("@joint_")
+        if effect in GEOMETRY:
+            numbers = getattr(robot, GEOMETRY[effect]).copy()
+            ((value, _),) = finding.parameters.values()
+            numbers[int(joint) - 1] += value
+            robot = replace(robot, **{GEOMETRY[effect]: numbers})
+    return robot
+
+
+def beside(robot: Robot, nominal: Robot, measured: Observations) -> Observations:
+    """Return what was measured beside the tip of a robot, not that of the nominal one."""
+    angles = angles_of(robot, measured)
+    moved = chain(robot, angles).tip - chain(nominal, angles).tip
+    return replace(measured, values=measured.values - moved)
+
+
+def learned(nominal: Robot, folder: Path) -> float:
+    """Diagnose one robot, predict poses that no fit has seen, and return their mean error [mm]."""
+    grid, unseen = (read(folder, nominal, kind, 0) for kind in ("grid", "random"))
+    raw, robot = unseen, nominal
+    while True:
+        seen, unseen = beside(robot, nominal, grid), beside(robot, nominal, raw)
+        began = time.process_time()
+        result = diagnose(seen, catalogue(robot), base(robot))
+        tell(robot, result, time.process_time() - began)
+        nothing = Predictor((predicted_set(result.search.base, 1.0),), (), base(robot))
+        alone, error = (
+            mean_error_mm(unseen.values - each.predict(unseen))
+            for each in (nothing, result.predictor)
+        )
+        print(
+            f"  20 unseen poses: raw {mean_error_mm(raw.values):.3f} mm, base {alone:.3f} mm, "
+            f"predicted {error:.3f} mm (published, for the compensated robot: {robot.published})"
+        )
+        better = built_in(robot, result)
+        if better is robot:
+            return error
+        robot = better
+
+
+def tell(robot: Robot, result: TableDiagnosis, seconds: float) -> None:
+    """Print what a diagnosis found."""
     print(
         f"{robot.name}: {result.verdict} ({result.probability:.2f}), {len(result.lost)} lost, "
         f"noise {result.noise}, discrepancy {result.discrepancy}, "
-        f"held out {result.before} -> {result.after}, {time.process_time() - began:.0f} CPU s"
+        f"held out {result.before} -> {result.after}, {seconds:.0f} CPU s"
     )
     for kind, group in (("named", result.findings), ("suspected", result.suspects)):
         for each in group:
@@ -285,15 +338,7 @@ def tell(robot: Robot, folder: Path) -> None:
         print(f"  {note}")
     print(f"  unexplained {result.unexplained:.3f}, depends on {dict(result.depends_on)}")
     print(f"  not excited {[f'{e.effect}@{e.component}' for e in result.not_excited]}")
-    nothing = Predictor((predicted_set(result.search.base, 1.0),), (), base(robot))
-    errors = [unseen.values - each.predict(unseen) for each in (nothing, result.predictor)]
-    print(
-        f"  20 unseen poses: raw {mean_error_mm(unseen.values):.3f} mm, "
-        f"base {mean_error_mm(errors[0]):.3f} mm, "
-        f"predicted {mean_error_mm(errors[1]):.3f} mm "
-        f"(published, for the compensated robot: {robot.published})"
-    )
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -268,8 +268,26 @@ def test_what_was_learned_predicts_what_no_fit_has_seen(size, seed):
     assert np.sqrt(np.mean(error**2)) < 0.4
 
 
+OUTSIDE = law("outside", lambda c: np.cos(2.0 * c["x"] + 0.7) * np.exp(-2.0 * c["z"] ** 2))
+
+
+def test_what_no_law_explains_is_predicted_from_its_conditions(rng):
+    laws = (LINEAR, SIGN)
+    result = diagnose(planted(table(rng, 200), (OUTSIDE, 8.0), (SIGN, 3.0)), laws, (ZERO,))
+    unseen = table(rng, 300)
+    truth = planted(unseen.with_values(np.zeros((300, 2))), (OUTSIDE, 8.0), (SIGN, 3.0)).values
+    sets = tuple(replace(each, smooth=(), beside=()) for each in result.predictor.sets)
+    by_laws, whole = (
+        np.sqrt(np.mean((each.predict(unseen) - truth)[:, 0] ** 2))
+        for each in (replace(result.predictor, sets=sets), result.predictor)
+    )
+    assert whole < 0.3 * by_laws
+
+
 def test_a_saved_predictor_predicts_the_same(rng, tmp_path):
-    result = diagnose(planted(table(rng), (WAVE, 4.0, 3.3)), LAWS, (ZERO,))
+    units = planted(table(rng, 200), (WAVE, 4.0, 3.3), (OUTSIDE, 8.0))
+    result = diagnose(units, LAWS, (ZERO,))
+    assert any(each.smooth for each in result.predictor.sets)
     assert sum(each.probability for each in result.predictor.sets) == pytest.approx(1.0)
     result.predictor.save(tmp_path / "lever.json")
     unseen = table(rng)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lstsq
 from scipy.optimize import minimize
 
 from wrist_stiffness.inference.candidates import Candidate
@@ -17,6 +18,7 @@ from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisan
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.projection import SQUARED_ROUNDING
 from wrist_stiffness.inference.search import Ranked, Trial
 
 FREE = 30.0
@@ -151,17 +153,38 @@ class LinearProblem:
         return self._base.shape[1]
 
     @cached_property
-    def background(self) -> Background:
-        """What has no name."""
-        blocks = []
+    def _named(self) -> tuple[list[Term], Array]:
+        """Candidates at the points of their grids, and the columns of base and these, whitened."""
+        terms = []
         for each in self._trials:
-            for shape, columns in each.blocks:
+            for shape, _ in each.blocks:
                 term = Term(self._by_name[each.name], shape)
                 alone = self.fitted({each.name: term})
                 # What its bounds forbid explains nothing, and leaves that to the discrepancy.
                 if not self.held(alone)[alone.places[each.name]].all():
-                    blocks.append(columns)
-        return self.table.background(np.concatenate([self._base, *blocks], axis=1))
+                    terms.append(term)
+        return terms, self.columns(terms)
+
+    @cached_property
+    def background(self) -> Background:
+        """What has no name."""
+        return self.table.background(self._named[1])
+
+    def named_share(self, change: Array) -> tuple[Array, list[tuple[Term, Array]]]:
+        """Return what base (b,) and candidates (k,) can do of a change of the observations (n, m).
+
+        No discrepancy is what they can do, so a discrepancy that is told for other units lacks it.
+        """
+        terms, columns = self._named
+        norm = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+        target = self.table.whiten(change)
+        found = lstsq(columns / norm, target, cond=SQUARED_ROUNDING)[0] / norm
+        sizes = [self.sizes[each.candidate.name] for each in terms]
+        ends = np.cumsum([self.n_nuisances, *map(len, sizes)])[:-1]
+        base, *own = np.split(found, ends)
+        return base * self.base_sizes, [
+            (term, size * z) for term, size, z in zip(terms, sizes, own, strict=True)
+        ]
 
     def begin(self) -> LinearFit:
         """Return the base alone."""

@@ -13,12 +13,14 @@ import numpy as np
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.candidates import Candidate
-from wrist_stiffness.inference.linear import LinearFit
+from wrist_stiffness.inference.evidence import OFF
+from wrist_stiffness.inference.linear import LinearFit, Shape
 from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.search import State
+from wrist_stiffness.inference.smooth import Smooth
 
-SCHEMA = 1
+SCHEMA = 2
 """Of the file."""
 
 LEAST = 1e-3
@@ -27,7 +29,7 @@ LEAST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class PredictedSet:
-    """One set of effects with its values.
+    """One set of effects with its values, and what it leaves that depends on the conditions.
 
     Parameters
     ----------
@@ -37,11 +39,18 @@ class PredictedSet:
         Shape and parameters of each effect.
     nuisances : dict of (str, int or None, int) to float
         Values by group, session and place in the group.
+    smooth : tuple of (Smooth, (k, m) float)
+        The discrepancy: smooth functions of the conditions with their values.
+    beside : tuple of (str, (s,) floats, (k,) floats)
+        What of these functions candidates could do, by name, shape and parameters: it is no
+        discrepancy, and is taken out again.
     """
 
     probability: float
-    effects: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]]
+    effects: Mapping[str, tuple[Shape, Shape]]
     nuisances: Mapping[tuple[str, int | None, int], float]
+    smooth: tuple[tuple[Smooth, Array], ...] = ()
+    beside: tuple[tuple[str, Shape, Shape], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +87,11 @@ class Predictor:
         for each in self.sets:
             values = np.array([each.nuisances.get(key, 0.0) for key in base.keys])
             change = base.columns @ values
-            for name, (shape, sizes) in each.effects.items():
+            named = [(name, *effect) for name, effect in each.effects.items()]
+            for name, shape, sizes in (*named, *each.beside):
                 change = change + laws[name].evaluate(units, shape) @ np.array(sizes)
+            for question, own in each.smooth:
+                change = change + question.features(units.covariates) @ own
             total += each.probability * change
         return total
 
@@ -90,6 +102,8 @@ class Predictor:
                 "probability": each.probability,
                 "effects": {n: [list(s), list(v)] for n, (s, v) in each.effects.items()},
                 "nuisances": [[*key, value] for key, value in each.nuisances.items()],
+                "smooth": [[q.as_dict(), own.tolist()] for q, own in each.smooth],
+                "beside": each.beside,
             }
             for each in self.sets
         ]
@@ -126,19 +140,32 @@ def load_predictor(
                     (name, session, place): value
                     for name, session, place, value in each["nuisances"]
                 },
+                tuple((Smooth.from_dict(q), np.array(own)) for q, own in each["smooth"]),
+                tuple((name, tuple(s), tuple(v)) for name, s, v in each["beside"]),
             )
             for each in content["sets"]
         )
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: no saved predictor ({error})") from error
-    unknown = {name for each in sets for name in each.effects} - {c.name for c in candidates}
+    named = {name for each in sets for name in (*each.effects, *(b[0] for b in each.beside))}
+    unknown = named - {c.name for c in candidates}
     if unknown:
         raise InputError(f"{path}: {sorted(unknown)[0]} is not among the candidates")
     return Predictor(sets, candidates, nuisances)
 
 
-def predicted_set(state: State, probability: float) -> PredictedSet:
-    """Return a set of the search at its most probable values."""
+def predicted_set(state: State, probability: float, whole: bool = False) -> PredictedSet:
+    """Return a set of the search at its most probable values.
+
+    Parameters
+    ----------
+    state : State
+        A set that was fitted.
+    probability : float
+        Its share in the predictions.
+    whole : bool
+        Whether the discrepancy that it leaves is predicted too.
+    """
     fit: LinearFit = state.fit
     problem, found = fit.problem, state.evidence
     z = (found.point.z + found.step)[: len(fit.z)]
@@ -147,6 +174,31 @@ def predicted_set(state: State, probability: float) -> PredictedSet:
         name: (term.shape, tuple((problem.sizes[name] * z[fit.places[name]]).tolist()))
         for name, term in fit.terms.items()
     }
-    values = (problem.base_sizes * z[: problem.n_nuisances]).tolist()
-    nuisances = dict(zip(problem.nuisances.keys, values, strict=True))
-    return PredictedSet(probability, effects, nuisances)
+    base = problem.base_sizes * z[: problem.n_nuisances]
+    smooth = _discrepancy(state) if whole else []
+    beside = []
+    if smooth:
+        conditions = problem.table.observations.covariates
+        change = np.sum([q.features(conditions) @ own for q, own in smooth], axis=0)
+        of_base, of_laws = problem.named_share(change)
+        base = base - of_base
+        for term, sizes in of_laws:
+            beside.append((term.candidate.name, term.shape, tuple((-sizes).tolist())))
+    nuisances = dict(zip(problem.nuisances.keys, base.tolist(), strict=True))
+    return PredictedSet(probability, effects, nuisances, tuple(smooth), tuple(beside))
+
+
+def _discrepancy(state: State) -> list[tuple[Smooth, Array]]:
+    """Return the smooth functions that are there, with their most probable values (k, m)."""
+    found, ground = state.evidence, state.evidence.background
+    asked = {each.name: each for each in state.fit.problem.table.questions}
+    smooth = []
+    for number, group in enumerate(ground.groups):
+        if found.amplitude[number] > OFF and group.name in asked:
+            at = np.flatnonzero(group.size)
+            own = found.unnamed[ground.group == number].reshape(-1, len(at))
+            values = np.zeros((len(own), len(group.size)))
+            # What is left and this add up to noise.
+            values[:, at] = -own * group.size[at]
+            smooth.append((asked[group.name], values))
+    return smooth

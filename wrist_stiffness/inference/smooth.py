@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -75,6 +76,20 @@ class Smooth:
     def features(self, conditions: Mapping[str, Array]) -> Array:
         """Return the columns for units under any conditions, (u, k)."""
         return (self._raw(conditions) - self.centre) / self.size
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for a JSON file."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in own.items()}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Smooth:
+        """Return it as it was written."""
+        tuples = {key: tuple(values[key]) for key in ("of", "lengths")}
+        arrays = {
+            key: np.array(values[key]) for key in ("mean", "spread", "marks", "factor", "centre")
+        }
+        return cls(**{**values, **tuples, **arrays})
 
     def _raw(self, conditions: Mapping[str, Array]) -> Array:
         values = np.stack([conditions[name] for name in self.of], axis=1)

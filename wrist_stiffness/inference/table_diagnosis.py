@@ -44,8 +44,8 @@ class TableDiagnosis(Diagnosis):
     Parameters
     ----------
     predictor : Predictor
-        What was learned, averaged over the sets of effects; the base alone where what was found
-        made the held-out part worse.
+        What was learned, averaged over the sets of effects, the discrepancy included; without
+        effects where what was found made the held-out part worse.
     search : Search
         With every set that was fitted.
     lost : tuple of int
@@ -316,10 +316,10 @@ def _not_excited(problem: LinearProblem, search: Search) -> tuple[NotExcited, ..
 def _sets(search: Search, refused: bool) -> tuple[PredictedSet, ...]:
     """Return the sets that predict, with their probabilities."""
     if refused:
-        return (predicted_set(search.base, 1.0),)
+        return (predicted_set(search.base, 1.0, whole=True),)
     known = probabilities(search)
     weights = {n: known[n] for n in search.states if known[n] >= LEAST}
     if not weights:
-        return (predicted_set(search.best, 1.0),)
+        return (predicted_set(search.best, 1.0, whole=True),)
     total = sum(weights.values())
-    return tuple(predicted_set(search.states[n], w / total) for n, w in weights.items())
+    return tuple(predicted_set(search.states[n], w / total, True) for n, w in weights.items())
