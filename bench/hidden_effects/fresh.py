@@ -2,6 +2,8 @@
 
     python bench/hidden_effects/fresh.py run --output results.jsonl [--part 0/2] [--only KIND]
 
+With `--names` answers are judged by their names alone: the dictionary of all effects costs hours.
+
 `fresh_cases.json` was drawn with `draw` and committed before any search was asked.  The same file
 runs in an older checkout: each line holds a digest of what was measured, so that two files can be
 seen to be about the same riddles.  Stop and start again at will.
@@ -139,8 +141,8 @@ def digest(sessions: Sequence[MeasuredSession]) -> str:
     return found.hexdigest()[:12]
 
 
-def answer(group: str, case: Case, days: int, stated: bool) -> dict[str, Any]:
-    """Return the line of one riddle."""
+def answer(group: str, case: Case, days: int, stated: bool, names: bool) -> dict[str, Any]:
+    """Return the line of one riddle, judged by a dictionary of all effects or by names alone."""
     line: dict[str, Any] = {"group": group, "key": case.key, "seed": case.seed, "size": case.size}
     riddle = None
     try:
@@ -165,6 +167,8 @@ def answer(group: str, case: Case, days: int, stated: bool) -> dict[str, Any]:
     line |= found.details
     if riddle is None:
         return line
+    if names:
+        return line | by_names(line, riddle)
     words = dictionary(design_of(case), Path(os.environ.get("DICTIONARIES", ".")))
     score = asdict(Judge(riddle, words).line("own", found, "", line["seconds"]))
     kept = ("kind", "plausible", "excitation", "detectability", "top", "inside", "found")
@@ -172,7 +176,17 @@ def answer(group: str, case: Case, days: int, stated: bool) -> dict[str, Any]:
     return line | {name: score[name] for name in kept}
 
 
-def run(output: Path, part: tuple[int, int], only: str) -> None:
+def by_names(line: dict[str, Any], riddle: Riddle) -> dict[str, Any]:
+    """Return what names alone tell of an answer, the size of the effect aside."""
+    hits = [any(name in names for names in line["named"]) for name in line["truth"]]
+    kind = ("none", "single", "double")[len(hits)]
+    if any(each.effect in {one[0] for one in searched(STRANGERS)} for each in riddle.hidden):
+        kind = "stranger"
+    found = float(np.mean(hits)) if hits else 0.0
+    return {"kind": kind, "plausible": True, "inside": any(hits), "found": found}
+
+
+def run(output: Path, part: tuple[int, int], only: str, names: bool) -> None:
     """Ask all riddles of a part that have no line yet."""
     done = set()
     if output.exists():
@@ -180,7 +194,7 @@ def run(output: Path, part: tuple[int, int], only: str) -> None:
     for number, (group, case, days, stated) in enumerate(listed()):
         if number % part[1] != part[0] or case.seed in done or only not in group:
             continue
-        line = answer(group, case, days, stated)
+        line = answer(group, case, days, stated, names)
         with output.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
         print(number, json.dumps(line)[:300], flush=True)
@@ -193,13 +207,16 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("fresh.jsonl"))
     parser.add_argument("--part", default="0/1", help="which of how many parts of the list")
     parser.add_argument("--only", default="", help="only groups whose name holds this")
+    parser.add_argument(
+        "--names", action="store_true", help="judge names alone; a dictionary costs hours"
+    )
     given = parser.parse_args()
     if given.what == "draw":
         rows = [json.dumps(each) for each in draw()]
         LIST.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
         return
     first, count = map(int, given.part.split("/"))
-    run(given.output, (first, count), given.only)
+    run(given.output, (first, count), given.only, given.names)
 
 
 if __name__ == "__main__":
