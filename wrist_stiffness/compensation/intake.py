@@ -249,16 +249,8 @@ class Frames:
         FrameError
             If the frame is neither `wrist_platform` nor mapped to it.
         """
-        known = {PLATFORM_FRAME: ON_PLATFORM} | {
-            own: frame for own, frame in self.sensors.items() if frame.parent == PLATFORM_FRAME
-        }
-        name = self.own_name(frame_id)
-        if name not in known:
-            raise FrameError(
-                f"{what}: frame '{frame_id}' is neither {PLATFORM_FRAME} nor mapped to it "
-                f"(known: {', '.join(known)})"
-            )
-        x, y, z = (known[name].rotation @ np.array(point) + known[name].position).tolist()
+        frame = self._mapped(frame_id, PLATFORM_FRAME, ON_PLATFORM, what)
+        x, y, z = (frame.rotation @ np.array(point) + frame.position).tolist()
         return x, y, z
 
     def in_base(self, frame_id: str, what: str) -> tuple[Array, Array]:
@@ -283,13 +275,18 @@ class Frames:
         FrameError
             If the frame is neither `wrist_base` nor mapped to it.
         """
-        known = {BASE_FRAME: IN_BASE} | {
-            own: frame for own, frame in self.sensors.items() if frame.parent == BASE_FRAME
+        frame = self._mapped(frame_id, BASE_FRAME, IN_BASE, what)
+        return frame.rotation, frame.position
+
+    def _mapped(self, frame_id: str, parent: str, itself: SensorFrame, what: str) -> SensorFrame:
+        """Return a frame that is the parent or mapped to it (FrameError if neither)."""
+        known = {parent: itself} | {
+            own: frame for own, frame in self.sensors.items() if frame.parent == parent
         }
         name = self.own_name(frame_id)
         if name not in known:
             raise FrameError(
-                f"{what}: frame '{frame_id}' is neither {BASE_FRAME} nor mapped to it "
+                f"{what}: frame '{frame_id}' is neither {parent} nor mapped to it "
                 f"(known: {', '.join(known)})"
             )
-        return known[name].rotation, known[name].position
+        return known[name]
