@@ -334,8 +334,6 @@ def tell(robot: Robot, result: TableDiagnosis, seconds: float) -> None:
             )
             for name, (value, error) in each.parameters.items():
                 print(f"      {name} = {value:.5g} +- {error:.2g}")
-    for note in result.notes:
-        print(f"  {note}")
     print(f"  unexplained {result.unexplained:.3f}, depends on {dict(result.depends_on)}")
     print(f"  not excited {[f'{e.effect}@{e.component}' for e in result.not_excited]}")
 

@@ -40,7 +40,7 @@ def main() -> None:
         steps = (
             ("open, to the first map", lambda: bench.open_named([path.name], "")),
             ("calibrate", bench.calibrate),
-            ("what the error depends on", bench.compare),
+            ("what the error depends on", lambda: bench.compare(1)),
             (f"look at {EFFECT}", lambda: bench.look_at(EFFECT)),
             ("add it, to the fallen error", bench.add),
         )

@@ -219,9 +219,16 @@ class Analysis:
         """Let what is being done end with `Cancelled` at its next step; call it from anywhere."""
         self._stop.set()
 
-    def compare(self) -> Comparison:
-        """Say how far every version is off, where and under which condition."""
-        models = [(each.name, each.model) for each in self._versions]
+    def compare(self, number: int | None = None) -> Comparison:
+        """Say how far every version, or one of them, is off, where and under which condition.
+
+        Parameters
+        ----------
+        number : int, optional
+            Place of the one.
+        """
+        asked = self._versions if number is None else [self._versions[number]]
+        models = [(each.name, each.model) for each in asked]
         return compare_models(models, self.sessions, self._watched(self._progress))
 
     def calibrate(self) -> Version:

@@ -193,7 +193,9 @@ def test_what_makes_another_session_worse_is_not_handed_over(rng):
     bad = diagnose(good.with_values(turned), LAWS, (ZERO,))
     assert (bad.verdict, bad.findings, bad.scope) == ("unknown", (), "another session")
     assert bad.after == bad.before
-    assert any("worse" in note for note in bad.notes)
+    (refused,) = [each for each in bad.standings if each.name == "cross@part"]
+    assert refused.why_not == "makes the held-out error grow"
+    assert refused.probability == pytest.approx(bad.suspects[0].probability)
     assert not any(each.effects for each in bad.predictor.sets)
     kept = diagnose(good, LAWS, (ZERO,))
     assert named(kept) == {"cross@part"}

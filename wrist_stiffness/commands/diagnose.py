@@ -105,7 +105,7 @@ class Diagnosed:
             "set_up_mistake": self.mistake,
             "strain": asdict(self.answer.strain) if self.answer.strain else None,
             "proposals": self.answer.proposals.as_values() if self.answer.proposals else None,
-            "notes": [*self.result.notes, *self.remarks],
+            "notes": [*self.remarks],
             "provenance": self.provenance.as_values(),
         }
         if ranking:

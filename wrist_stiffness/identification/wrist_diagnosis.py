@@ -242,13 +242,7 @@ class _Judged:
         if not reading.named or not refuted(self.stages[0], self.stages[-1]):
             return reading
         self.stages = self.stages[:1]
-        return replace(
-            reading,
-            state=search.base,
-            named=(),
-            verdict="unknown",
-            unexplained=1.0,
-        )
+        return reading.refute(search.base)
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
         """Return what is left without one of the effects."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -50,6 +50,8 @@ class Class:
         Probability of each to be the one, most probable first.
     probability : float
         That one of them is missing in the model.
+    itself : float
+        That it is no stand-in for something outside the catalogue; a factor of `probability`.
     rest : float
         How much of it is left in its own shape: see `Evidence.rest`.
     left : float
@@ -60,6 +62,7 @@ class Class:
 
     members: Mapping[str, float]
     probability: float
+    itself: float
     rest: float
     left: float
     log_gain: float
@@ -116,6 +119,8 @@ class Reading:
         On what that which is left depends: share of its energy by question, largest first.
     unexplained : float
         Share of what the nominal model left above the noise that is left, in [0, 1].
+    refuted : tuple of Class
+        What would be named, but makes the held-out error grow.
     """
 
     state: State
@@ -125,6 +130,13 @@ class Reading:
     probability: float
     depends_on: Mapping[str, float]
     unexplained: float
+    refuted: tuple[Class, ...] = ()
+
+    def refute(self, nominal: State) -> Reading:
+        """Return the same without what is named: it makes the held-out error grow."""
+        return replace(
+            self, state=nominal, named=(), verdict="unknown", unexplained=1.0, refuted=self.named
+        )
 
 
 def probabilities(search: Search) -> dict[Names, float]:
@@ -213,8 +225,9 @@ def _class_of(search: Search, weights: Mapping[Names, float], best: State, name:
     before, after = without.evidence.unexplained, best.evidence.unexplained
     left = min(after / before, 1.0) if before > 0.0 else 0.0
     rest = best.evidence.rest(name) if best.rough else 0.0
-    sure = present * (1.0 - stands_in(rest))
-    return Class(members, sure, rest, left, best.evidence.log - without.evidence.log)
+    itself = 1.0 - stands_in(rest)
+    gain = best.evidence.log - without.evidence.log
+    return Class(members, present * itself, itself, rest, left, gain)
 
 
 def _depends_on(state: State) -> dict[str, float]:
@@ -246,6 +259,8 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
     weights = probabilities(search)
     nominal = search.base.evidence.log
     named = {name for each in reading.named for name in each.members}
+    refuted = {name for each in reading.refuted for name in each.members}
+    itself = {name: each.itself for each in reading.classes for name in each.members}
     chance = {
         name: sum(w for names, w in weights.items() if name in names)
         for name in {name for names in weights for name in names}
@@ -258,8 +273,10 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
     found = []
     for name in {**fitted, **search.promised}:
         gain = fitted[name] if name in fitted else search.promised[name]
-        probability = chance.get(name, 0.0)
+        probability = chance.get(name, 0.0) * itself.get(name, 1.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
+        if name in refuted:
+            why = "makes the held-out error grow"
         if name not in fitted and gain >= CHANCE and not search.in_time:
             why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))
@@ -366,8 +383,6 @@ class Diagnosis:
         What calibration took up, largest first.
     scope : str
         What the held-out units are.
-    notes : tuple of str
-        What a person should know of it.
     complete : bool
         Whether every candidate worth a fit was fitted; if not, more time may change the answer.
     """
@@ -386,7 +401,6 @@ class Diagnosis:
     not_excited: tuple[NotExcited, ...]
     absorbed: tuple[str, ...] = ()
     scope: str = ""
-    notes: tuple[str, ...] = field(default=())
     complete: bool = True
 
     @property

@@ -135,10 +135,9 @@ def diagnose(
     refused = bool(reading.named) and refuted(before, after)
     if refused:
         after = before
-        reading = replace(reading, state=search.base, named=(), verdict="unknown", unexplained=1.0)
+        reading = reading.refute(search.base)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
-    refusal = "what was found made the held-out part worse: it is not handed over"
     answer = Diagnosis(
         reading.verdict,
         reading.probability,
@@ -156,7 +155,6 @@ def diagnose(
         standings(search, reading),
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
-        notes=(refusal,) if refused else (),
         complete=search.in_time,
     )
     return TableDiagnosis(

@@ -28,14 +28,18 @@ def diagnosis_lines(found: Diagnosed) -> list[str]:
     for place, finding in enumerate(result.findings, 1):
         out += ["", *_finding_lines(f"{place}. ", finding)]
     if result.suspects:
-        out += ["", "not sure enough to be named:"]
-        out += [f"  {class_of(e)}: {percent(e.probability)} sure" for e in result.suspects]
+        why = {each.name: each.why_not for each in result.standings}
+        out += ["", "not named:"]
+        out += [
+            f"  {class_of(e)}, {percent(e.probability)} sure: {why[e.name]}"
+            for e in result.suspects
+        ]
     if result.not_excited:
         out += ["", "these recordings cannot show:"]
         out += [f"  {', '.join(names)}: {needs}" for needs, names in needs_of(result).items()]
     out += ["", "absorbed by calibration, largest first:", *absorbed_lines(found.answer.absorbed)]
     out.append(f"held out was {result.scope}")
-    return [*out, *(f"note: {remark}" for remark in (*result.notes, *found.remarks))]
+    return [*out, *(f"note: {remark}" for remark in found.remarks)]
 
 
 def verdict_lines(result: Diagnosis) -> list[str]:

@@ -189,7 +189,6 @@ def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
 
 def _absorbed(result: Diagnosis, notes: Sequence[str]) -> tuple[Part, ...]:
     parts: list[Part] = [Bullets(tuple(typeset(line) for line in result.absorbed))]
-    told = (*result.notes, *notes)
-    if told:
-        parts += [Text("To be kept in mind:"), Bullets(told)]
+    if notes:
+        parts += [Text("To be kept in mind:"), Bullets(tuple(notes))]
     return tuple(parts)

@@ -18,7 +18,7 @@ from wrist_stiffness.analysis import Analysis, Version
 from wrist_stiffness.commands.extend import FormulaEffect
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
-from wrist_stiffness.comparing.comparison import ComparedModel
+from wrist_stiffness.comparing.comparison import Comparison
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError, WristError
@@ -72,6 +72,10 @@ class Row:
     held_out: Mapping[str, float]
     warnings: tuple[str, ...]
     parameters: Mapping[str, tuple[float, float]]
+
+    def titled(self, place: int) -> str:
+        """Return the name of the version that stands at a place."""
+        return f"version {place}: {self.name}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +134,14 @@ class Depends:
         By condition.
     not_varied : tuple of str
         Conditions of which nothing can be said.
+    mistake : str
+        A sentence on a sign, unit or name that may be wrong in the recordings; empty for none.
     """
 
     sentences: tuple[str, ...]
     curves: Mapping[str, Curve]
     not_varied: tuple[str, ...]
+    mistake: str
 
 
 class Bench:
@@ -204,7 +211,7 @@ class Bench:
             "contents": self._analysis.contents(),
             "remarks": tuple(line for each in sessions.values() for line in each.remarks),
             "views": {},
-            "depends": (),
+            "depends": {},
             **self._newest(),
         }
 
@@ -220,10 +227,10 @@ class Bench:
         self._opened.calibrate()
         return self._newest()
 
-    def compare(self) -> Changes:
-        """Ask on what the rest of every version depends."""
+    def compare(self, number: int) -> Changes:
+        """Ask on what the rest of a version depends."""
         self._tell("asking on what the error depends")
-        return {"depends": tuple(_depends(each) for each in self._opened.compare().models)}
+        return {"depends_on": (number, _depends(self._opened.compare(number)))}
 
     def rank(self) -> Changes:
         """Ask what is missing."""
@@ -337,10 +344,10 @@ def _offer(law: Proposal, role: str) -> Offer:
     return Offer(law.sentence, law.formula, law.component, law.way, law.probability, role)
 
 
-def _depends(model: ComparedModel) -> Depends:
-    told = model.explained.told
-    curves = {each.name: each.curve for each in told if len(each.curve.names) == 1}
-    return Depends(sentences(model.explained), curves, model.explained.not_varied)
+def _depends(found: Comparison) -> Depends:
+    explained = found.models[0].explained
+    curves = {each.name: each.curve for each in explained.told if len(each.curve.names) == 1}
+    return Depends(sentences(explained), curves, explained.not_varied, found.mistake)
 
 
 class Stopped(WristError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,9 @@ UNITS = "units"
 
 UNNAMED = {"showlegend": False}
 
+REMOVED = ("zoom2d", "zoomIn2d", "zoomOut2d", "autoScale2d")
+"""Buttons on a picture of what the wheel and a double click do: Tab would stop at each."""
+
 BREAK_MIN = 0.3
 """Gap between two recordings on one axis of time."""
 
@@ -45,9 +49,9 @@ class Shown:
     view : View
         Of the version that is looked at.
     after : (u, 6) float or None
-        What would be left with the chosen candidate [m, rad].
-    candidate : str
-        Its name, empty for none.
+        What would be left with the chosen candidate, or what another version leaves [m, rad].
+    name : str
+        Of that, empty for none.
     quantity : Quantity
         Shift or rotation.
     axis : int
@@ -62,7 +66,7 @@ class Shown:
 
     view: View
     after: Array | None
-    candidate: str
+    name: str
     quantity: Quantity
     axis: int
     scale: float
@@ -195,7 +199,7 @@ def time_line(shown: Shown) -> Figure:
     if shown.after is not None:
         after = shown.part(shown.after)
         with_it = predicted + left - after
-        traces.insert(2, _line(time, with_it, f"with {shown.candidate}", RED, breaks))
+        traces.insert(2, _line(time, with_it, shown.name, RED, breaks))
         traces.append(_dots(time, after, "left", RED, shown, "y2", 4) | UNNAMED)
     label = f"{SYMBOL[shown.quantity.name]} [{shown.unit}]"
     figure = _figure(traces, "time [min]", label, "time")
@@ -226,20 +230,20 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
     told : Curve, optional
         Of the comparison, where it is of this condition and version.
     """
-    table = shown.view.left
-    values = condition_shown(table, condition)
-    if told is not None and shown.after is None and len(told.measured) == table.n_units:
-        values, label = told.values[:, 0], f"{SYMBOL[told.quantity.name]} {told.where}"
-        known = [_dots(values, told.measured, "remaining error", BLUE, shown)]
-        law = _line(told.places[:, 0], told.mean, "its mean", RED, ())
-        label += f" [{unit_of(told.quantity)}]"
-        figure = _figure([*known, law], told.labels[0], label, condition)
+    table, part, label = shown.view.left, shown.part, shown.part_label
+    if told is not None and len(told.measured) == table.n_units:
+        label = f"{SYMBOL[told.quantity.name]} {told.where} [{unit_of(told.quantity)}]"
+        part = partial(_along, told)
     else:
-        traces = [_dots(values, shown.part(table.values), "remaining error", BLUE, shown)]
-        if shown.after is not None:
-            after = shown.part(shown.after)
-            traces.append(_dots(values, after, f"with {shown.candidate}", RED, shown))
-        figure = _figure(traces, condition_label(condition), shown.part_label, condition)
+        told = None
+    values = condition_shown(table, condition) if told is None else told.values[:, 0]
+    traces = [_dots(values, part(table.values), "remaining error", BLUE, shown)]
+    if shown.after is not None:
+        traces.append(_dots(values, part(shown.after), shown.name, RED, shown))
+    elif told is not None:
+        traces = [_dots(values, told.measured, "remaining error", BLUE, shown)]
+        traces.append(_line(told.places[:, 0], told.mean, "fitted law", RED, ()))
+    figure = _figure(traces, condition_label(condition), label, condition)
     figure["layout"] |= {
         "dragmode": "lasso",
         "showlegend": True,
@@ -280,6 +284,12 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     figure["layout"]["xaxis"] |= {"range": [0.0, top]}
     figure["layout"]["yaxis"] |= {"autorange": "reversed", "automargin": True}
     return figure
+
+
+def _along(told: Curve, values: Array) -> Array:
+    """Return the part of (u, 6) values along the way of a curve, in the unit of its quantity."""
+    columns = values[:, list(told.quantity.components)]
+    return np.asarray(columns @ told.direction * told.quantity.per_si)
 
 
 def _angles(table: Observations) -> Array:
@@ -364,5 +374,5 @@ def _figure(traces: Sequence[Figure], x: str, y: str, kept: str) -> Figure:
         "xaxis": _axis(x),
         "yaxis": _axis(y),
     }
-    config = {"displaylogo": False, "scrollZoom": True}
+    config = {"displaylogo": False, "scrollZoom": True, "modeBarButtonsToRemove": REMOVED}
     return {"data": list(traces), "layout": layout, "config": config}

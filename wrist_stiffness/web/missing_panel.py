@@ -32,7 +32,8 @@ class MissingPanel:
         self._tab = tab
         self._all = False
         self._last: Seen | None = None
-        self._grams = 50.0
+        self._rival, self._grams = "", 50.0
+        self._drawn: tuple[object, ...] = ()
         self._body = ui.column().classes("w-full gap-2")
         self._formula = FormulaForm(tab)
         self._list = ui.column().classes("w-full gap-2")
@@ -40,7 +41,12 @@ class MissingPanel:
         self.draw()
 
     def draw(self) -> None:
-        """Say anew what is missing."""
+        """Say anew what is missing, where it is something else."""
+        tab = self._tab
+        told = tab.rows, tab.version, tab.told, tab.diagnosis, tab.seen, tab.planned, self._all
+        if told == self._drawn:
+            return
+        self._drawn = told
         for part, fill in ((self._body, self._fill), (self._list, self._ranking)):
             part.clear()
             with part:
@@ -52,10 +58,10 @@ class MissingPanel:
             ui.label("Open a recording first.")
             return
         with ui.expansion("What the error depends on", value=result is None).classes("w-full"):
-            for line in tab.sentences or ("Not compared yet.",):
+            for line in tab.told.sentences if tab.told else ("Not asked yet.",):
                 ui.label(spelled(line)).classes("text-sm mb-1")
         ask = ui.button("What is missing?", on_click=lambda: tab.work(("rank",)))
-        ask.classes("w-full").props("outline" if result else "")
+        ask.classes("w-full").props("data-focus=ask").props("outline" if result else "")
         if result is not None:
             for line in verdict_lines(result):
                 ui.label(spelled(line)).classes("font-bold")
@@ -105,6 +111,7 @@ class MissingPanel:
         chosen = name == tab.candidate
         button = ui.button(on_click=lambda: tab.work(("look_at", name), then=("", DEPENDS)))
         button.props(f"align=left dense {'unelevated' if chosen else 'outline'}")
+        button.props(f"data-focus={name} {'aria-current=true' if chosen else ''}")
         button.classes("w-full")
         with button, ui.column().classes("w-full gap-0 items-start text-left px-1"):
             with ui.row().classes("w-full justify-between no-wrap"):
@@ -112,7 +119,7 @@ class MissingPanel:
                 ui.label(percent(standing.probability))
             if standing.probability >= 0.01:
                 ui.linear_progress(standing.probability, show_value=False).props(
-                    "color=orange-9 track-color=grey-4"
+                    "color=orange-9 track-color=grey-4 aria-hidden=true"
                 )
             if alike:
                 ui.label(f"not distinguishable from {alike}").classes("text-xs")
@@ -138,9 +145,9 @@ class MissingPanel:
                 ui.label(f"{name} = {value:.3g}").classes("text-sm")
             if seen.check:
                 ui.label(f"Check on the machine: {seen.check}.").classes("text-sm")
-            calls, then = (("add",), ("compare",)), ("Models", VERSIONS)
-            add = ui.button("Add it", on_click=lambda: tab.work(*calls, then=then))
-            add.classes("w-full").props("color=deep-orange-9")
+            then = "Models", VERSIONS
+            add = ui.button("Add it", on_click=lambda: tab.work(("add",), then=then))
+            add.classes("w-full").props("color=deep-orange-9 data-focus=add")
             self._deciding(seen)
 
     def _deciding(self, seen: Seen) -> None:
@@ -152,15 +159,17 @@ class MissingPanel:
         names.remove(seen.name)
         text, folder = tab.planned
         with ui.expansion("Which experiment would decide?", value=bool(text)).classes("w-full"):
-            rival = ui.select(names, value=names[0], label="against").classes("w-full")
+            first = self._rival if self._rival in names else names[0]
+            rival = ui.select(names, value=first, label="against").classes("w-full")
             grams = ui.number("weight that you can hang on [g]", value=self._grams)
             grams.classes("w-full").props("dense")
 
             def plan() -> None:
-                self._grams = float(grams.value or 0.0)
-                tab.work(("plan", [seen.name, str(rival.value)], self._grams))
+                self._rival, self._grams = str(rival.value), float(grams.value or 0.0)
+                tab.work(("plan", [seen.name, self._rival], self._grams))
 
-            ui.button("Plan it", on_click=plan).props("outline dense").classes("w-full mt-2")
+            button = ui.button("Plan it", on_click=plan).classes("w-full mt-2")
+            button.props("outline dense data-focus=plan")
             if text:
                 ui.label(spelled(text)).classes("text-sm whitespace-pre-line")
             if folder:

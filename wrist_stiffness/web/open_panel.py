@@ -65,7 +65,7 @@ class OpenPanel:
         tab.listeners.append(self.draw)
 
     def _begin(self, *call: object) -> None:
-        self._tab.work(call, ("calibrate",), ("compare",))
+        self._tab.work(call, ("calibrate",))
 
     def _open(self) -> None:
         model = self._model.value
@@ -102,10 +102,12 @@ class OpenPanel:
                     ui.label(name).classes("text-gray-600")
                     for each in rows:
                         ui.label(each[name]).classes("break-words")
-            if tab.depends:
-                idle = ", ".join(tab.not_varied)
+            if tab.told is not None:
+                idle = ", ".join(tab.told.not_varied)
                 text = f"Not varied, so nothing can be said of: {idle}."
                 ui.label(text if idle else "Every recorded condition was varied.")
+                if tab.told.mistake:
+                    ui.label(spelled(tab.told.mistake)).classes("font-bold text-orange-900")
             for remark in tab.remarks:
                 ui.label(spelled(remark)).classes("text-xs text-orange-800")
 
@@ -118,7 +120,7 @@ def _told(each: Contents) -> dict[str, str]:
     return {
         "recording": each.name,
         "duration": f"{each.duration_s / 60.0:.1f} min",
-        "measured poses": f"{each.measured:,}, {each.rate_hz:.3g} Hz",
+        "pose samples": f"{each.measured:,} at {each.rate_hz:.3g} Hz",
         "poses held": f"{each.dwells:,}",
         "motor 1": f"{low_1:.0f} to {high_1:.0f}°",
         "motor 2": f"{low_2:.0f} to {high_2:.0f}°",

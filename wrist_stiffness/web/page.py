@@ -22,8 +22,24 @@ body { background: #f3f4f6; }
 .q-expansion-item .q-item { padding: 4px; min-height: 32px; font-weight: 600; }
 .q-expansion-item__content .nicegui-expansion-content { padding: 4px; gap: 4px; }
 .drop .q-uploader__list { min-height: 48px; padding: 4px; }
-*:focus-visible { outline: 3px solid #d55e00 !important; outline-offset: 1px; }
+@layer overrides {
+  *:focus-visible { outline: 3px solid #d55e00 !important; outline-offset: 1px; }
+}
 """
+
+FOCUS = """
+let last = null;
+document.addEventListener("focusin", event => {
+  last = event.target.closest("[data-focus]")?.dataset.focus || null;
+});
+document.addEventListener("pointerdown", () => { last = null; });
+new MutationObserver(() => {
+  if (last === null || document.activeElement !== document.body) return;
+  const again = document.querySelector(`[data-focus="${last}"]`);
+  (again || document.querySelector("[aria-current=true]"))?.focus();
+}).observe(document.body, {childList: true, subtree: true});
+"""
+"""What is drawn anew keeps the keyboard's focus; where it is gone, what is chosen takes it."""
 
 START = (
     "Open a recording of your wrist, or an example. The workbench registers the instrument, "
@@ -47,6 +63,7 @@ def build_page(workspace: Workspace, largest: int) -> None:
     """
     tab = Tab(workspace)
     ui.add_css(STYLE)
+    ui.add_body_html(f"<script>{FOCUS}</script>")
     ui.colors(primary="#0072b2")
     with ui.row().classes("w-full items-center no-wrap px-3 py-1 gap-4 bg-white shadow-1"):
         ui.label("Wrist workbench").classes("text-lg font-bold whitespace-nowrap")

@@ -16,7 +16,6 @@ import numpy as np
 from nicegui import background_tasks, run, ui
 
 from wrist_stiffness.analysis import View
-from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.inference.answer import Diagnosis
 from wrist_stiffness.inference.observations import Mask, Quantity
 from wrist_stiffness.lookup.table import Table
@@ -112,7 +111,7 @@ class Tab:
         self.remarks: tuple[str, ...] = ()
         self.rows: tuple[Row, ...] = ()
         self.views: dict[int, View] = {}
-        self.depends: tuple[Depends, ...] = ()
+        self.depends: dict[int, Depends] = {}
         self.diagnosis: Diagnosis | None = None
         self.offers: tuple[Offer, ...] = ()
         self.seen: Seen | None = None
@@ -135,6 +134,8 @@ class Tab:
     def work(self, *calls: Sequence[Any], then: tuple[str, str] = ("", "")) -> None:
         """Do things that take long, one after the other, everything drawn anew after each.
 
+        At the end it asks on what the error of the version that is then shown depends.
+
         Parameters
         ----------
         calls : tuples
@@ -149,8 +150,9 @@ class Tab:
         background_tasks.create(self._work(calls, then))
 
     async def _work(self, calls: Sequence[Sequence[Any]], then: tuple[str, str]) -> None:
-        why = ""
-        for method, *arguments in calls:
+        why, left = "", [tuple(call) for call in calls]
+        while left or (self.rows and self.told is None):
+            method, *arguments = left.pop(0) if left else ("compare", self.version)
             found = await run.io_bound(self.worker.call, self._hear, method, *arguments)
             changes, why = found or ({}, "The workbench is being ended.")
             if why:
@@ -172,14 +174,17 @@ class Tab:
             self.done, self.total = message[1:]
 
     def _take(self, changes: Changes) -> None:
-        view = changes.pop("view", None)
+        view, told = changes.pop("view", None), changes.pop("depends_on", None)
         for name, value in changes.items():
             setattr(self, name, value)
         if view is not None:
             number, seen = view
             self.against = None
             self.views = {n: v for n, v in self.views.items() if n < number} | {number: seen}
-            self.depends = self.depends[: number + 1]
+            self.depends = {n: told for n, told in self.depends.items() if n < number}
+        if told is not None:
+            place, what = told
+            self.depends[place] = what
         if "contents" in changes:
             self.chosen, self.axis, self.planned, self.written = None, None, ("", ""), ()
             self.lower = DEPENDS
@@ -202,9 +207,10 @@ class Tab:
 
     def look(self, version: int) -> None:
         """Look at a version."""
-        if not self.busy:
-            self.version, self.seen, self.against = version, None, None
-            self.draw()
+        self.version, self.seen, self.against = version, None, None
+        self.draw()
+        if self.told is None and not self.busy:
+            self.work()
 
     @property
     def candidate(self) -> str:
@@ -223,12 +229,12 @@ class Tab:
             return None
         view, quantity = self.views[self.version], self.quantities[self.quantity]
         values = view.left.values
-        after, name = None, self.candidate
+        after, name = None, ""
         if self.seen is not None:
-            after = values - self.seen.change
+            after, name = values - self.seen.change, f"with {self.candidate}"
         elif self.against in self.views:
             after = self.views[self.against].left.values
-            name = self.rows[self.against].name
+            name = self.rows[self.against].titled(self.against)
         # One scale of colours and one direction for all versions: so the error is seen to fall.
         first = self.views[0].left.values
         scale = float(np.nanpercentile(length(first, quantity), ASIDE))
@@ -236,21 +242,11 @@ class Tab:
         return Shown(view, after, name, quantity, axis, scale, self.chosen, self.moment)
 
     @property
-    def curves(self) -> dict[str, Curve]:
-        """What was drawn of the version that is shown, by condition."""
-        return dict(self.depends[self.version].curves) if self.version < len(self.depends) else {}
-
-    @property
-    def not_varied(self) -> Sequence[str]:
-        """Conditions of which these recordings say nothing."""
-        return self.depends[self.version].not_varied if self.version < len(self.depends) else ()
+    def told(self) -> Depends | None:
+        """On what the rest of the version that is shown depends; None where it was not asked."""
+        return self.depends.get(self.version)
 
     @property
     def noise(self) -> dict[str, float]:
         """Noise floor as the newest version tells it, by the key of the quantity."""
         return dict(self.views[max(self.views)].noise)
-
-    @property
-    def sentences(self) -> Sequence[str]:
-        """On what the rest of the version that is shown depends."""
-        return self.depends[self.version].sentences if self.version < len(self.depends) else ()

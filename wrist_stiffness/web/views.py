@@ -57,7 +57,7 @@ class Views:
                     ui.label("along").classes("text-xs")
                     axes = {-1: "strongest", **dict(enumerate(AXES))}
                     axis = ui.toggle(axes, value=-1, on_change=self._axis_chosen)
-                    axis.props("dense")
+                    axis.props("dense aria-label=along")
                     self._all = ui.button("Show all", on_click=lambda: tab.choose(None))
                     self._all.props("dense flat")
         height = "height: calc((100vh - 156px) * "
@@ -104,7 +104,7 @@ class Views:
 
     def _plot(self, name: str, shows: str) -> ui.plotly:
         plot = ui.plotly({"data": [], "layout": {}}).classes("w-full grow").style("min-height: 0")
-        return plot.props(f'id=plot-{name} role=img aria-label="{shows}"')
+        return plot.props(f'id=plot-{name} role=group aria-label="{shows}"')
 
     def draw(self) -> None:
         """Draw all pictures anew."""
@@ -113,16 +113,12 @@ class Views:
             return
         self._tell_numbers(shown)
         self._all.set_enabled(tab.chosen is not None)
-        what = tab.rows[tab.version].name
-        if tab.seen is not None:
-            what = f"if {tab.candidate} were added"
-        elif shown.after is not None:
-            what = shown.candidate
+        what = shown.name or tab.rows[tab.version].titled(tab.version)
         self._map_title.text = f"Where: remaining error, {what}"
         _show(self._map, error_map(shown, tab.table.workspace.operative_border))
         self._time_title.text = f"When: {shown.part_label.partition(' [')[0]}"
         _show(self._time, time_line(shown))
-        curves = tab.curves
+        curves = tab.told.curves if tab.told else {}
         ordered = {name: f"{name} (found)" for name in curves}
         others = [name for name in shown.view.left.covariates if name not in curves]
         ordered |= {name: condition_label(name) for name in others}
@@ -157,9 +153,7 @@ class Views:
                 what = f"Remaining {SYMBOL[shown.quantity.name]}, {every}"
                 ui.label(what).classes("text-xs whitespace-nowrap")
                 ui.label(f"{path} {shown.unit}").classes("text-xl whitespace-nowrap")
-                ui.label(f"with {shown.candidate}" if shown.candidate else "\u00a0").classes(
-                    "text-xs"
-                )
+                ui.label(shown.name or "\u00a0").classes("text-xs")
 
     def _draw_lower(self) -> None:
         tab, shown = self._tab, self._tab.shown
@@ -168,7 +162,7 @@ class Views:
         if tab.lower == VERSIONS:
             _show(self._lower, waterfall(tab.rows, tab.noise, shown.quantity))
             return
-        told = tab.curves.get(str(self._condition.value))
+        told = tab.told.curves.get(str(self._condition.value)) if tab.told else None
         name = str(self._condition.value) if told is None else told.names[0]
         if name in shown.view.left.covariates:
             _show(self._lower, contrast(shown, name, told))

@@ -22,6 +22,9 @@ SEEN_M = 0.008
 
 BENT, MEASURED = "platform under the load", "platform measured"
 EYE = np.array([1.0, 0.75, 0.85])
+REMOVED = ("zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraLastSave3d")
+"""Buttons of what the mouse does without them."""
+
 LEADER_PX = 18.0
 """Of the line from a part to its name."""
 
@@ -88,7 +91,7 @@ def wrist_figure(
         "uirevision": "kept",
         "legend": {"orientation": "h", "x": 0, "y": 0, "font": {"size": 11}},
     }
-    config = {"displaylogo": False}
+    config = {"displaylogo": False, "modeBarButtonsToRemove": REMOVED}
     return {"data": traces, "layout": layout, "config": config}, exaggeration
 
 
