@@ -49,10 +49,16 @@ class Figures:
     map_maximum: Array
 
     @classmethod
-    def of(cls, values: Array, operative: NDArray[np.bool_]) -> Figures:
-        """Take the figures of `COLUMNS` (n, 5) at n poses, of which some are `operative` (n,)."""
+    def of(
+        cls, values: Array, operative: NDArray[np.bool_], border: Array | None = None
+    ) -> Figures:
+        """Take the figures of `COLUMNS` (n, 5) at n poses, of which some are `operative` (n,).
+
+        Extremes are also looked for along its `border` (m, 5), where most of them are.
+        """
         inside = values[operative]
-        statistics = np.stack([inside.mean(axis=0), inside.min(axis=0), inside.max(axis=0)])
+        mean, held = inside.mean(axis=0), inside if border is None else np.vstack([inside, border])
+        statistics = np.stack([mean, held.min(axis=0), held.max(axis=0)])
         return cls(statistics, values[:, 3:].max(axis=0))
 
 
@@ -123,4 +129,6 @@ class PaperExperiment:
 
     def _figures(self, values_at: Callable[[Array], Array]) -> Figures:
         poses = self.fine_poses()
-        return Figures.of(values_at(poses), self.workspace.operative(poses))
+        workspace = self.workspace
+        border = values_at(workspace.operative_border)
+        return Figures.of(values_at(poses), workspace.operative(poses), border)

@@ -53,6 +53,24 @@ def test_a_pin_of_another_size_than_its_bore_is_refused(joint, change):
     )
 
 
+def test_pins_that_bend_may_be_long():
+    values = copy.deepcopy(VALUES)
+    values["bushings"]["joint_2"]["radius_mm"] = 12.0
+    with pytest.raises(GeometryError, match="taken as rigid; pins: {material: steel} lets"):
+        checked(values)
+    checked({**values, "pins": {"material": "steel", "source": "assumed"}})
+    values["materials"]["wound"] = {
+        "young_GPa": [10.0, 40.0, 10.0],
+        "poisson": [0.1, 0.3, 0.1],
+        "shear_GPa": [4.0, 4.0, 4.0],
+        "density_kg_m3": 1800.0,
+        "expansion_1e-6_K": 10.0,
+        "source": "assumed",
+    }
+    with pytest.raises(GeometryError, match="pins.material: wound is orthotropic"):
+        checked({**values, "pins": {"material": "wound", "source": "assumed"}})
+
+
 @pytest.mark.parametrize("joint", PINS)
 def test_a_loose_fit_is_not_refused(joint):
     values = copy.deepcopy(VALUES)

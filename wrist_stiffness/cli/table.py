@@ -153,10 +153,13 @@ def _build(arguments: argparse.Namespace) -> int:
         progress=Progress("sweep"),
     )
     lines = [*fact_lines(built)]
-    if (stated := built.header.errors["stated_relative"]) > arguments.tolerance:
+    errors = built.header.errors
+    if (stated := errors["stated_relative"]) > arguments.tolerance:
+        parts = ("mesh", "contact", "walls", "second_order")
+        largest = max(parts, key=lambda part: errors[f"{part}_relative"])
         lines.append(
             f"tolerance {100 * arguments.tolerance:g} % NOT met: the stated error is "
-            f"{100 * stated:.2f} %"
+            f"{100 * stated:.2f} %, most of it of the {largest.replace('_', ' ')}"
         )
     written = f"written: {arguments.output} (checksum {built.checksum[:12]})"
     values = asdict(built.header) | {"checksum": built.checksum}

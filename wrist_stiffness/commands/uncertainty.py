@@ -24,18 +24,23 @@ from wrist_stiffness.lookup.verification import (
     unseen_poses,
 )
 from wrist_stiffness.mechanism.components import (
+    ELASTIC,
     JOINTS,
     LINKS,
     PASSIVE_JOINTS,
     Array,
     ElasticComponents,
 )
+from wrist_stiffness.mechanism.material import Material
+from wrist_stiffness.mechanism.pins import pin_flexibilities
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.simulation.exact import ExactWrist
 
 DRAWS, EXACT_DRAWS = 400, 100
+
+STEEL = Material(young=200e9, poisson=0.3, density=7850.0, expansion=11.5e-6)
 
 SECOND_ORDER, SECOND_ORDER_NAME = "second_order", "second order: finite rotations"
 
@@ -159,9 +164,18 @@ def _tolerances(table: Table) -> Iterator[tuple[str, list[ElasticComponents]]]:
             f"{kind}s {percent:g} % off (assumed)",
             [law.changed(parts, table.geometry, place, values) for place in places],
         )
+    if table.geometry.pins is None:
+        yield "pins not rigid, of steel (assumed)", [_with_pins(table)]
     gaps = [joint for joint in PASSIVE_JOINTS if joint in parts.contact]
     if gaps:
         yield f"flange gaps {SHIM_UM:g} um off (assumed)", [_wider(parts, each) for each in gaps]
+
+
+def _with_pins(table: Table) -> ElasticComponents:
+    flexibility = table.components.flexibility.copy()
+    for link in LINKS:
+        flexibility[ELASTIC.index(link)] += sum(pin_flexibilities(table.geometry, link, STEEL))
+    return replace(table.components, flexibility=flexibility)
 
 
 def _wider(parts: ElasticComponents, joint: str) -> ElasticComponents:

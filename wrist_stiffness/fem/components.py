@@ -15,12 +15,14 @@ from wrist_stiffness.fem.parts import RINGS, Part, Solid, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
 from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
 from wrist_stiffness.mechanism.components import (
+    LINKS,
     PASSIVE_JOINTS,
     Array,
     ElasticComponents,
     FlangeContact,
 )
 from wrist_stiffness.mechanism.geometry import BushingDimensions, Geometry, PlatformDimensions
+from wrist_stiffness.mechanism.pins import in_series, pin_flexibilities
 from wrist_stiffness.mechanism.vectors import skew
 
 SHIPPED_SIZES = MeshSettings(
@@ -148,13 +150,18 @@ def place_components(
     for part in parts:
         element, home = condensed[part.solid], part.home
         own = (geometry.links | geometry.bushings)[part.name].stiffness
-        flexibility.append(
-            home.screw @ element.flexibility @ home.screw.T if own is None else own.flexibility
-        )
-        motor_side.append(home.wrench @ element.weight_motor_side @ home.rotation.T)
-        platform_side.append(home.wrench @ element.weight_platform_side @ home.rotation.T)
+        bends = home.screw @ element.flexibility @ home.screw.T if own is None else own.flexibility
         both = np.kron(np.eye(2), home.wrench)
-        mass.append(both @ element.mass @ both.T)
+        weights = np.vstack([element.weight_motor_side, element.weight_platform_side])
+        weight, inertia = both @ weights @ home.rotation.T, both @ element.mass @ both.T
+        if part.name in LINKS and geometry.pins is not None:
+            motor_pin, platform_pin = pin_flexibilities(geometry, part.name, geometry.pins)
+            bends, follow = in_series(motor_pin, bends, platform_pin)
+            weight, inertia = follow.T @ weight, follow.T @ inertia @ follow
+        flexibility.append(bends)
+        motor_side.append(weight[:6])
+        platform_side.append(weight[6:])
+        mass.append(inertia)
         if part.name in PASSIVE_JOINTS and part.solid.flanges:
             contact[part.name] = _flange_contact(part, element, geometry.bushings[part.name])
     return ElasticComponents(

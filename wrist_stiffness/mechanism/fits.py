@@ -12,6 +12,7 @@ from wrist_stiffness.mechanism.collisions import BOSS, collision
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 from wrist_stiffness.mechanism.kinematics import angles_text
+from wrist_stiffness.mechanism.pins import PINS, pin_length
 from wrist_stiffness.mechanism.workspace import Workspace
 
 POSES_PER_AXIS = 15
@@ -20,15 +21,6 @@ POSES_PER_AXIS = 15
 WIDEST_FIT = 0.37e-3
 """Most by which a bore and what sits in it may differ, and most play between a flange and its hub
 [m]: the largest clearance of H11/c11, the loosest preferred fit of ISO 286, at 30 mm."""
-
-PINS = {
-    ("link_1", "motor_bore"): "joint_1",
-    ("link_1", "platform_bore"): "joint_2",
-    ("link_2", "motor_bore"): "joint_5",
-    ("link_2", "platform_bore"): "joint_4",
-    ("link_3", "platform_bore"): "joint_3",
-}
-"""Bores that hold a joint's pin; link_3's other bore may hold the sleeve of joint_4."""
 
 NAMED = {
     "steel": (200.0, 7850.0),
@@ -161,12 +153,12 @@ def _check_bores(root: Node, geometry: Geometry) -> None:
 
 
 def _check_pins(root: Node, geometry: Geometry) -> None:
-    """Pins are taken as rigid, so none may bend more than the bar that holds it.
+    """Where pins are taken as rigid, none may bend more than the bar that holds it.
 
     Both as cantilevers of one material under a force along the radius of the bar's arc, without
     shear (W. C. Young, Roark's Formulas for Stress and Strain).
     """
-    for (name, _), joint in PINS.items():
+    for (name, _), joint in PINS.items() if geometry.pins is None else ():
         bar, bushing = geometry.links[name], geometry.bushings[joint]
         start, end = geometry.link_ends(name)
         cosine = float(start @ end)
@@ -174,13 +166,12 @@ def _check_pins(root: Node, geometry: Geometry) -> None:
         bends = bar.arc_radius**3 * arc / 2.0 / (bar.section_axial * bar.section_radial**3 / 12.0)
         inertia = math.pi / 64.0 * bushing.pin_diameter**4
         longest = (3.0 * inertia * bends) ** (1.0 / 3.0)
-        between = abs(abs(bushing.radius) - bar.arc_radius)
-        length = between - (bar.section_radial + bushing.length) / 2.0
+        length = pin_length(geometry, name, joint)
         if length > longest:
             raise root["bushings"][joint]["radius_mm"].refuse(
                 f"{1e3 * bushing.radius:g} leaves {1e3 * length:.1f} mm of pin between {name} and "
                 f"its bushing: it would bend more than {name} (at most {1e3 * longest:.1f} mm), "
-                "but is taken as rigid"
+                "but is taken as rigid; pins: {material: steel} lets all pins bend"
             )
 
 

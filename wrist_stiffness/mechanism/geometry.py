@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ENDS, Array
-from wrist_stiffness.mechanism.material import AnyMaterial
+from wrist_stiffness.mechanism.material import AnyMaterial, Material
 from wrist_stiffness.mechanism.own_stiffness import OwnStiffness
 
 ROUNDING = 1e-9
@@ -192,6 +192,8 @@ class Geometry:
         Where the rated 1 N load of the maps acts, in U [m].
     sha256 : str
         Checksum of the file's values, the same for the same values in any layout.
+    pins : Material, optional
+        Of which all pins are, as beams; None where they are taken as rigid.
     """
 
     name: str
@@ -205,6 +207,7 @@ class Geometry:
     reference_temperature: float
     load_point: Array
     sha256: str
+    pins: Material | None = None
 
     def joint_side(self, joint: str) -> Array:
         """Direction from O to the joint's bushing at home, unit vector in F (3,)."""

@@ -41,7 +41,7 @@ from wrist_stiffness.mechanism.geometry import (
     PlatformDimensions,
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.material import AnyMaterial, read_material
+from wrist_stiffness.mechanism.material import AnyMaterial, Material, read_material
 from wrist_stiffness.mechanism.own_stiffness import bearing_pair, own_stiffness
 from wrist_stiffness.mechanism.vectors import unit
 
@@ -129,6 +129,12 @@ def geometry_of(root: Node) -> Geometry:
     def material(node: Node) -> AnyMaterial:
         return materials[text(*materials)(node)]
 
+    def isotropic(node: Node) -> Material:
+        found = material(node)
+        if not isinstance(found, Material):
+            raise node.refuse(f"{node.plain} is orthotropic, pins are isotropic beams")
+        return found
+
     def read_materials(node: Node) -> None:
         materials.update(mapping_of(read_material, SOURCES)(node))
 
@@ -152,7 +158,7 @@ def geometry_of(root: Node) -> Geometry:
             "limits": _limits,
             "site": SITE,
         },
-        {"note": text()},
+        {"note": text(), "pins": record({"material": isotropic}, sources=SOURCES)},
     )(root)
     platform, load_point = values["platform"]
     geometry = Geometry(
@@ -161,6 +167,7 @@ def geometry_of(root: Node) -> Geometry:
         platform=platform,
         load_point=load_point,
         sha256=_checksum(root.plain),
+        pins=values.get("pins", {}).get("material"),
     )
     try:
         mechanism_of(geometry)

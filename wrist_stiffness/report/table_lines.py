@@ -62,7 +62,8 @@ def facts(table: Table) -> Iterable[tuple[str, str]]:
     yield "loads", f"up to {limits.force:g} N and {limits.moment:g} N m at O"
     yield (
         "parts",
-        f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces",
+        f"{sum(header.mesh['elements'].values())} elements, {header.interface} interfaces, "
+        f"pins {'rigid' if table.geometry.pins is None else 'bend'}",
     )
     sectors, rings = len(table.components.sectors.gap), header.mesh["rings"]
     yield "contact", f"{sectors} flange sectors in {rings} rings"
