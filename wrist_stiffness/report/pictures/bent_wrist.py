@@ -152,6 +152,8 @@ def draw_mode_shapes(
 
     colours = ScalarMappable(Normalize(0.0, 1.0), "viridis")
     figure = new_figure(10.0, 9.0)
+    # The layout does not see the names of vertical axes.
+    figure.get_layout_engine().set(rect=(0.0, 0.0, 0.96, 1.0))
     pose = Configuration.of_row(configuration.row)
     for number in range(4):
         plot: Any = figure.add_subplot(2, 2, number + 1, projection="3d")

@@ -32,7 +32,9 @@ def draw_uncertainty(table: Table, found: list[Contribution], path: Path) -> Non
         for bar, each in zip(bars, found, strict=True):
             bar.set_alpha(1.0 if each.stated else 0.4)
         for place, value in zip(places + offset, values, strict=True):
-            plot.text(value, place, f" {value:.2g} %", va="center", fontsize=7)
+            digits = 3 if value > 99.5 else 2
+            plot.text(value, place, f" {value:.{digits}g} %", va="center", fontsize=7)
+    plot.set_xscale("log")
     plot.set_yticks(places, [each.name for each in found])
     plot.invert_yaxis()
     plot.margins(x=0.12)
