@@ -359,7 +359,10 @@ def test_what_the_fit_cannot_follow_widens_its_uncertainty(model):
     free = (FreeEffect(effect(FRAME), {"shift_x_um": 1000.0}, True),)
     found = fit(problem_of(model, [session], free))
     assert found.rough
-    assert found.discrepancy["phi_mdeg"] > found.noise["phi_mdeg"]
+    values = as_units(model, session).values
+    repeats = np.linalg.norm(np.std(values[:30] - values[30:], axis=0)[3:]) / np.sqrt(2.0)
+    assert found.noise["phi_mdeg"] == pytest.approx(1e3 * np.degrees(repeats), rel=0.25)
+    assert found.discrepancy["s_um"] > found.noise["s_um"]
     (shift,) = found.parameters
     assert abs(shift.value) < 3.0 * shift.sigma
     assert shift.sigma > 2.0 * 1e6 * SIGMA[0] / np.sqrt(60)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.inference import Observations
-from wrist_stiffness.inference.noise import replicate_variance, rich_basis
+from wrist_stiffness.inference import Observations, Quantity
+from wrist_stiffness.inference.noise import replicate_variance, rich_basis, scatter_of
 
 
 def test_structure_between_conditions_does_not_reach_the_scatter_of_repeats(rng):
@@ -76,3 +76,21 @@ def test_all_of_a_weak_base_is_in_the_rich_model_beside_strong_structure(rng):
     assert basis.shape == (100, 30)
     np.testing.assert_allclose(basis.T @ basis, np.eye(30), atol=1e-9)
     np.testing.assert_allclose(basis @ (basis.T @ base), base, atol=1e-9)
+
+
+def test_each_component_has_the_scatter_that_nothing_smooth_explains(rng):
+    n, sigma = 400, np.array([1.0, 0.2, 5.0])
+    x = np.linspace(-1.0, 1.0, n)
+    values = 30.0 * np.sin(3.0 * x)[:, None] + x[:, None] + sigma * rng.normal(size=(n, 3))
+    table = Observations(
+        values,
+        {"x": x},
+        quantities=tuple(Quantity(name, "um", (place,)) for place, name in enumerate("abc")),
+    )
+    spread = np.eye(3)[:, None, :]
+    base = (x[:, None, None, None] * spread.swapaxes(0, 1)).reshape(n, 3, -1)
+    waves = np.stack([np.sin((k + 1.0) * x) for k in range(6)], axis=1)
+    structure = (waves[:, None, :, None] * spread).reshape(n, 3, -1)
+    found, repeats = scatter_of(table, base, structure)
+    assert np.allclose(np.sqrt(found), sigma, rtol=0.1)
+    assert repeats == 0.0

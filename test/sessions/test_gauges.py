@@ -1,5 +1,6 @@
 """Dial gauges and inclinometers: rows of the error twist, imported, held to the wrist, compared."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
@@ -188,6 +190,22 @@ def test_a_wrong_sign_at_a_single_pose_is_told_by_the_loads(tmp_path, model, tab
     session = read_session(imported(tmp_path, block, readings), table)
     found = compare_models([("nominal", model)], [session])
     assert "with the sign of gauge b turned the error falls" in found.mistake
+
+
+@pytest.mark.parametrize(("percent", "told"), [(0.0, "nothing"), (200.0, "the load")])
+def test_what_is_told_of_a_sound_and_of_a_soft_link(tmp_path, model, table, percent, told):
+    """No dwell tells the noise: the level scatters four times what is usual, gauges half."""
+    soft = Effect(find_law("link_stiffness"), "link_1").with_values(
+        {"flexibility_percent": percent}
+    )
+    block = conditions(200)
+    path = imported(tmp_path, block, readings_of(model.with_effects(soft), block))
+    (found,) = compare_models([("nominal", model)], [read_session(path, table)]).models
+    said = sentences(found.explained)
+    assert f"depends on {told}" in said[0]
+    if percent:
+        assert re.search(r"moves by \S+ \+- \S+ um at most at gauge [abc]\.", said[0])
+    assert not any("with time" in each for each in said)
 
 
 def test_two_columns_that_changed_places_are_told(tmp_path, model, table):

@@ -22,7 +22,7 @@ from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.wiring import WORTH_ASKING, told_mistake
 from wrist_stiffness.comparing.wrong_load import wrong_load
 from wrist_stiffness.identification.free_effects import unfitted
-from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.inference import Diagnosis
 from wrist_stiffness.inference.answer import NAMING
@@ -81,7 +81,7 @@ class Diagnosed:
             problem.sessions,
             nominal.columns,
             nominal.z,
-            left.measured / WristTable(left, problem.sessions).variance,
+            left.measured / likelihood_of(nominal).variance,
             problem.weights,
         )
 

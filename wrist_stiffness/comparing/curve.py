@@ -85,8 +85,8 @@ class Curve:
         """The direction in words, as `extend --direction` takes it."""
         preposition = "along" if self.quantity.name == "s" else "about"
         axis = int(np.argmax(np.abs(self.direction)))
-        if self.quantity.name not in ("s", "phi"):
-            return f"at most at number {axis + 1} of the {self.quantity.name}"
+        if self.quantity.called:
+            return f"at most at gauge {self.quantity.called[axis]}"
         if abs(self.direction[axis]) >= ALONG_AXIS:
             return f"{preposition} {'+' if self.direction[axis] > 0.0 else '-'}{'xyz'[axis]}"
         return f"{preposition} ({', '.join(f'{value:.2f}' for value in self.direction)})"

@@ -10,7 +10,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import BaseFit, best_valley, fit_cleaned
 from wrist_stiffness.identification.free_effects import commissioning, unfitted
 from wrist_stiffness.identification.held_out import Judge
-from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem, require_units
 from wrist_stiffness.identification.result import Fit, FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
@@ -129,9 +129,7 @@ def calibrate(
 
 def fitted(base: BaseFit, lost: int) -> Fit:
     """Return what is known after a fit without effects beside it."""
-    return Fit(
-        WristFit(base, WristTable(base.problem.table, base.problem.sessions)).settled(), lost
-    )
+    return Fit(WristFit(base, likelihood_of(base)).settled(), lost)
 
 
 def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:

@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from wrist_stiffness.identification.base_fit import BaseFit
 from wrist_stiffness.identification.questions import Conditions, alike, passing, questions
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT, Question, background, low_rank
 from wrist_stiffness.inference.evidence import Evidence
+from wrist_stiffness.inference.noise import scatter_of
 from wrist_stiffness.inference.observations import Labels, Observations
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.shared import Apart, component_factors, own_covariance
@@ -31,6 +33,48 @@ LAW_RANK = 8
 """Columns of the error of one law."""
 
 
+def unstated(table: Observations, residual: Array, columns: Array) -> tuple[Array, float] | None:
+    """Return the variance of a unit, (m,), where nothing states it, and how well it is known.
+
+    By repeated conditions, or by what neither a fit nor any smooth law of the conditions explains.
+    How much in all remains to be found; how much more one gauge scatters than another, and angles
+    than lengths, does not.
+
+    Parameters
+    ----------
+    table : Observations
+        Conditions of u units.
+    residual : (u, m) float
+        What the fit leaves [m, rad].
+    columns : (u, m, p) float
+        Its slopes.
+
+    Returns
+    -------
+    ((m,) float, float) or None
+        The variance, and the standard deviation of its logarithm; None where it is stated.
+    """
+    if table.covariance is not None:
+        return None
+    common = np.zeros((*table.values.shape, 0)) if table.common is None else table.common
+    asked = [each.features(table.covariates) for each in questions(table.covariates)]
+    smooth = [np.zeros((table.n_units, 0)), *(each for each in asked if each is not None)]
+    spread = np.concatenate(smooth, axis=1)[:, None, :, None] * np.eye(table.n_components)[:, None]
+    base = np.concatenate([columns, common], axis=2)
+    structure = spread.reshape(*table.values.shape, -1)
+    variance, repeats = scatter_of(table.with_values(residual), base, structure)
+    if not repeats:
+        return variance, UNKNOWN
+    seen = table.measured.any(axis=0).sum()
+    return variance, max(float(np.sqrt(2.0 / (repeats * seen))), KNOWN)
+
+
+def likelihood_of(base: BaseFit) -> WristTable:
+    """Return the likelihood of the units of a fit."""
+    table = base.problem.table
+    return WristTable(table, base.problem.sessions, unstated(table, base.residual, base.columns))
+
+
 class WristTable:
     """The units of the sessions as whitened rows.
 
@@ -40,6 +84,8 @@ class WristTable:
         Of `observing.tabulate`.
     sessions : sequence of UnitSession
         Of which.
+    scatter : ((m,) float, float), optional
+        Variance of one unit and how well it is known, where nothing states it: see `unstated`.
     ask : callable, optional
         From the conditions to what is asked of the discrepancy.
     """
@@ -48,14 +94,14 @@ class WristTable:
         self,
         table: Observations,
         sessions: Sequence[UnitSession],
+        scatter: tuple[Array, float] | None = None,
         ask: Callable[[Conditions], Sequence[Question]] = questions,
     ) -> None:
         self.table: Observations = table
         stated = table.covariance
-        self._noise_width = UNKNOWN if stated is None else KNOWN
-        own = own_covariance(
-            table, np.diag(4.0 * usual_wander(table.quantities) ** 2) if stated is None else stated
-        )
+        variance, width = scatter or (4.0 * usual_wander(table.quantities) ** 2, UNKNOWN)
+        self._noise_width = width if stated is None else KNOWN
+        own = own_covariance(table, np.diag(variance) if stated is None else stated)
         # A drift that is stated has columns of its own.
         slow = np.concatenate(
             [np.broadcast_to(s.wander, (len(s), len(s.wander)))[s.measured] for s in sessions]
@@ -69,16 +115,16 @@ class WristTable:
         if table.shared is not None and table.stand is not None:
             shared = np.sum(table.shared**2, axis=2) * (table.stand >= 0)[:, None]
             self._scatter = self.variance + shared
-        scatter = np.sqrt(np.median(self.variance, axis=0))
+        usual = np.sqrt(np.median(self.variance, axis=0))
         each = [np.broadcast_to(s.white, (len(s), len(s.white)))[s.measured] for s in sessions]
         single = np.nan_to_num(np.median(np.concatenate(each), axis=0))
-        single = np.where(single > 0.0, single, scatter)
+        single = np.where(single > 0.0, single, usual)
         self.drift = np.maximum(DRIFT * single, slow.max(axis=0))
         self.background: Background = background(
             table,
             self.whiten,
             ask(table.covariates),
-            scatter,
+            usual,
             self.drift,
             self._noise_width,
             drifts=(passing(table.sessions),),

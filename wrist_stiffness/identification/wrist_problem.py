@@ -24,7 +24,7 @@ from wrist_stiffness.identification.candidates import (
     searched,
     wrist_candidates,
 )
-from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.identification.likelihood import WristTable, likelihood_of
 from wrist_stiffness.identification.own_law import Beyond
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.wrist_fit import WristFit
@@ -62,7 +62,7 @@ class WristProblem:
         free, held = self._base
         self._first, self.lost = fit_cleaned(FitProblem(model.with_effects(*held), sessions, free))
         self._sessions = self._first.problem.sessions
-        self.table = WristTable(self._first.problem.table, self._sessions)
+        self.table: WristTable = likelihood_of(self._first)
         self._extended: tuple[WristFit, Effect, WristFit] | None = None
         self._starts: dict[WristCandidate, Effect] = {}
         self._asked: dict[int, tuple[BaseFit, WristPoint, dict[str, WristCandidate]]] = {}

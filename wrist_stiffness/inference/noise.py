@@ -5,6 +5,12 @@ import numpy as np
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.projection import ABSORBED, leading_directions, orthonormal
 
+FEWEST_REPEATS = 6
+"""Degrees of freedom from which repeated conditions tell the noise."""
+
+POOLED = 10.0
+"""Degrees of freedom that the mean over the components of a quantity counts for in each of them."""
+
 RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
 
@@ -67,6 +73,52 @@ def replicate_variance(
     freedom = freedom - basis.shape[1] / seen.sum()
     variance = size**2 * np.sum(left.reshape(-1, m) ** 2, axis=0) / np.maximum(freedom, 1)
     return np.where(seen, variance, 1.0), float(freedom[seen].min())
+
+
+def scatter_of(observations: Observations, base: Array, structure: Array) -> tuple[Array, float]:
+    """Variance of one unit, by repeated conditions or else by what everything together leaves.
+
+    Parameters
+    ----------
+    observations : Observations
+        Values, to be explained.
+    base, structure : (n, m, p) and (n, m, q) array
+        Columns of what is refitted, and of what else could be behind the values.
+
+    Returns
+    -------
+    (m,) array
+        Variance of each component, drawn to the mean of its quantity.
+    float
+        Degrees of freedom of the repeats in each component, 0 where there are too few.
+    """
+    measured = observations.measured
+    values = np.where(measured, observations.values, 0.0)
+    columns = np.where(measured[:, :, None], np.concatenate([base, structure], axis=2), 0.0)
+    repeated, freedom = replicate_variance(values, columns, observations)
+    if freedom >= FEWEST_REPEATS:
+        return _shrunk(repeated, freedom, observations), freedom
+    count = np.maximum(measured.sum(axis=0), 1)
+    size = np.sqrt(np.sum(values**2, axis=0) / count)
+    size = np.where(size > 0.0, size, 1.0)
+    flat, p = (columns / size[:, None]).reshape(measured.size, -1), base.shape[2]
+    basis = rich_basis(flat[:, :p], flat[:, p:], int(measured.sum()))
+    target = (values / size).ravel()
+    left = (target - basis @ (basis.T @ target)).reshape(measured.shape) * size
+    share = 1.0 - basis.shape[1] / measured.sum()
+    freedom = count * max(share, 1.0 / measured.sum())
+    variance = np.sum(left**2 * measured, axis=0) / freedom
+    least = np.where(variance > 0.0, variance, (1e-9 * size) ** 2)
+    return _shrunk(least, float(freedom.mean()), observations), 0.0
+
+
+def _shrunk(variance: Array, freedom: float, observations: Observations) -> Array:
+    found = variance.copy()
+    for quantity in observations.reported:
+        at = [c for c in quantity.components if observations.measured[:, c].any()]
+        mean = float(np.mean(variance[at]))
+        found[at] = (freedom * variance[at] + POOLED * mean) / (freedom + POOLED)
+    return found
 
 
 def rich_basis(base: Array, structure: Array, n_measured: int) -> Array:

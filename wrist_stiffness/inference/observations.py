@@ -31,12 +31,15 @@ class Quantity:
         Which components make up the vector.
     per_si : float
         Report units in one unit of the table (1e6 for metres told in micrometres).
+    called : tuple of str, optional
+        What each component is called, where they are no vector.
     """
 
     name: str
     unit: str
     components: tuple[int, ...]
     per_si: float = 1.0
+    called: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.inference.candidates import Candidate
 from wrist_stiffness.inference.discrepancy import background
-from wrist_stiffness.inference.noise import replicate_variance, rich_basis
+from wrist_stiffness.inference.noise import scatter_of
 from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.outliers import lost_units
 from wrist_stiffness.inference.point import Background
@@ -27,12 +27,6 @@ from wrist_stiffness.inference.smooth import alike, questions, wander
 STATED, ESTIMATED = 0.2, 0.7
 """Standard deviation of the logarithm of the noise's variance where the table states it, and where
 only what everything together leaves tells it (assumed)."""
-
-FEWEST_REPEATS = 6
-"""Degrees of freedom from which repeated conditions tell the noise."""
-
-POOLED = 10.0
-"""Degrees of freedom that the mean over the components of a quantity counts for in each of them."""
 
 DRIFT = 0.5
 """Expected size of an instrument's slow drift, in scatters of one unit (assumed)."""
@@ -125,27 +119,12 @@ class Table:
 
     def _estimated(self, base: Array, named: Array) -> tuple[Array, float]:
         """Return the variance (m,) by repeated conditions, or by what everything leaves."""
-        observations = self.observations
-        measured = observations.measured
-        values = np.where(measured, observations.values, 0.0)
         structure = np.concatenate([named, everything(self)], axis=2)
-        columns = np.where(measured[:, :, None], np.concatenate([base, structure], axis=2), 0.0)
-        repeated, freedom = replicate_variance(values, columns, observations)
-        if freedom >= FEWEST_REPEATS:
-            known = float(np.sqrt(2.0 / (freedom * measured.any(axis=0).sum())))
-            return _shrunk(repeated, freedom, observations), max(known, STATED)
-        size = np.sqrt(np.sum(values**2, axis=0) / np.maximum(measured.sum(axis=0), 1))
-        size = np.where(size > 0.0, size, 1.0)
-        flat = (columns / size[:, None]).reshape(measured.size, -1)
-        p = base.shape[2]
-        basis = rich_basis(flat[:, :p], flat[:, p:], int(measured.sum()))
-        target = (values / size).ravel()
-        left = (target - basis @ (basis.T @ target)).reshape(measured.shape) * size
-        share = 1.0 - basis.shape[1] / measured.sum()
-        freedom = np.maximum(measured.sum(axis=0), 1) * max(share, 1.0 / measured.sum())
-        variance = np.sum(left**2 * measured, axis=0) / freedom
-        least = np.where(variance > 0.0, variance, (1e-9 * size) ** 2)
-        return _shrunk(least, float(freedom.mean()), observations), ESTIMATED
+        variance, repeats = scatter_of(self.observations, base, structure)
+        if not repeats:
+            return variance, ESTIMATED
+        seen = self.observations.measured.any(axis=0).sum()
+        return variance, max(float(np.sqrt(2.0 / (repeats * seen))), STATED)
 
 
 def everything(table: Table) -> Array:
@@ -158,15 +137,6 @@ def everything(table: Table) -> Array:
     features = np.concatenate([np.zeros((observations.n_units, 0)), *columns], axis=1)
     spread = features[:, None, :, None] * np.eye(m)[:, None, :]
     return np.asarray(spread.reshape(*observations.values.shape, -1))
-
-
-def _shrunk(variance: Array, freedom: float, observations: Observations) -> Array:
-    shrunk = variance.copy()
-    for quantity in observations.reported:
-        at = [c for c in quantity.components if observations.measured[:, c].any()]
-        mean = float(np.mean(variance[at]))
-        shrunk[at] = (freedom * variance[at] + POOLED * mean) / (freedom + POOLED)
-    return shrunk
 
 
 def _stated(observations: Observations) -> Array:

@@ -130,8 +130,11 @@ def quantities_of(gauges: Sequence[Gauge]) -> tuple[Quantity, ...]:
     """Return what is reported as one length: dial gauges together, and inclinometers."""
     tilts = tuple(n for n, each in enumerate(gauges) if each.point is None)
     lengths = tuple(n for n in range(len(gauges)) if n not in tilts)
-    pairs = ((GAUGES, lengths), (TILTS, tilts))
-    return tuple(Quantity(q.name, q.unit, own, q.per_si) for q, own in pairs if own)
+    return tuple(
+        replace(quantity, components=own, called=tuple(gauges[n].name for n in own))
+        for quantity, own in ((GAUGES, lengths), (TILTS, tilts))
+        if own
+    )
 
 
 @dataclass(frozen=True, eq=False)
