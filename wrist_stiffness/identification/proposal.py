@@ -96,7 +96,8 @@ class Proposal:
     @property
     def sentence(self) -> str:
         """What it says of the wrist."""
-        size = f"{self.value:.3g} +- {self.sigma:.1g} {self.key.rpartition('_')[2]}"
+        digits = max(0, 1 - int(np.floor(np.log10(max(self.sigma, 1e-9)))))
+        size = f"{self.value:.{digits}f} +- {self.sigma:.{digits}f} {self.key.rpartition('_')[2]}"
         return f"{size} {self.way} at {self.places} {self.form.tell(self.shape)}"
 
     def effect(self, name: str = "proposed") -> Effect:

@@ -98,7 +98,9 @@ def unit_of(quantity: Quantity) -> str:
 
 def spelled(text: str) -> str:
     """Return text for the page, with one spelling of units; names such as `size_um` stay."""
-    return re.sub(r"\bum\b", "µm", text).replace("+-", "±")
+    for plain, shown in (("um", "µm"), ("phi", "φ")):
+        text = re.sub(rf"\b{plain}\b", shown, text)
+    return text.replace("+-", "±")
 
 
 def length(values: Array, quantity: Quantity) -> Array:

@@ -72,8 +72,10 @@ class MissingPanel:
         """Offer the laws that are proposed where nothing on the list fits."""
         for law in self._tab.offers:
             text = f"{law.role} ({percent(law.probability)}): {spelled(law.sentence)}"
-            offer = ui.button(text, on_click=partial(self._formula.propose, law))
-            offer.props("outline dense align=left").classes("w-full text-left")
+            offer = ui.button(on_click=partial(self._formula.propose, law))
+            offer.props("outline dense align=left").classes("w-full")
+            with offer:
+                ui.label(text).classes("text-left px-1")
 
     def _ranking(self) -> None:
         result = self._tab.diagnosis

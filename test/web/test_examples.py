@@ -1,0 +1,62 @@
+"""Each built-in example shows what its card says."""
+
+import pytest
+
+from wrist_stiffness.commands.extend import FormulaEffect, direction_of
+from wrist_stiffness.web.bench import Bench
+from wrist_stiffness.web.examples import EXAMPLES
+
+pytestmark = pytest.mark.slow
+
+NAMING = 0.9
+
+
+def opened(name, folder):
+    """Return a bench with an example, and what the page shows once it was asked."""
+    bench = Bench(folder, lambda text: None, lambda done, total: None)
+    bench.open_example(name)
+    (_, calibrated) = bench.calibrate()["rows"]
+    return bench, calibrated.held_out, bench.rank()
+
+
+def added(bench, candidate):
+    bench.look_at(candidate)
+    return bench.add()["rows"][-1]
+
+
+def test_there_is_one_of_each_kind():
+    assert [each.name for each in EXAMPLES] == ["known_fault", "unknown_fault", "cannot_tell"]
+
+
+def test_a_known_fault_is_named_and_adding_it_leads_to_the_noise(tmp_path):
+    bench, before, found = opened("known_fault", tmp_path)
+    (finding,) = found["diagnosis"].findings
+    assert finding.names == ("backlash@motor_2",)
+    after = added(bench, finding.name)
+    floor = found["diagnosis"].noise
+    assert after.held_out["phi_mdeg"] < 1.2 * floor["phi_mdeg"] < 0.2 * before["phi_mdeg"]
+
+
+def test_a_fault_on_no_list_is_told_as_such_and_the_error_falls_by_the_proposed_law(tmp_path):
+    bench, before, found = opened("unknown_fault", tmp_path)
+    assert found["diagnosis"].verdict == "unknown"
+    assert found["diagnosis"].findings == ()
+    law = found["offers"][0]
+    assert "theta_1" in law.formula
+    assert "theta_2" in law.formula
+    place = "proposed", law.component, direction_of(law.way.split())
+    after = added(bench, FormulaEffect(*place, law.formula, {}))
+    assert after.warnings == ()
+    assert after.held_out["s_um"] < 0.6 * before["s_um"]
+
+
+def test_data_that_cannot_tell_name_nothing_and_show_two_causes_as_alike(tmp_path):
+    _, _, found = opened("cannot_tell", tmp_path)
+    diagnosis = found["diagnosis"]
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.findings == ()
+    (suspect,) = diagnosis.suspects
+    assert len(suspect.names) == 2
+    assert "mount_compliance@motor_2" in suspect.names
+    assert all(each.probability < NAMING for each in diagnosis.standings)
+    assert all(law.probability < NAMING for law in found["offers"])
