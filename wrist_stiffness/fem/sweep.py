@@ -42,8 +42,8 @@ OPERATIVE_SHARE = 0.25
 them with the closed form, and by all of it in the domain."""
 
 FINER, FINEST = 0.8, 0.5
-"""Step of the element sizes as a tolerance refines them, and the least ones over those asked for,
-with which links of the shipped wrist need 3 GB."""
+"""Step of the element sizes as a tolerance refines them, and the least ones over those asked for:
+`table build --tolerance 0.01` of the shipped wrist gets there, 250,000 elements and 3.1 GB."""
 
 
 @dataclass(frozen=True)
