@@ -15,6 +15,7 @@ from wrist_stiffness.identification.questions import finer_questions
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.blocks import time_blocks
 from wrist_stiffness.inference.dependence import Dependences, dependences
+from wrist_stiffness.inference.discrepancy import PASSING_DRIFT
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.point import Group, Point
 from wrist_stiffness.mechanism.components import Array
@@ -24,7 +25,6 @@ from wrist_stiffness.sessions.unit_session import UnitSession
 BLOCKS = 10
 """Stretches of the recordings that are predicted by all others."""
 
-TIME = "the time"
 
 LEAST = 0.01
 """Share of the square of the error below which a condition is named and no more."""
@@ -144,7 +144,7 @@ class Explained:
                 for at, group in zip(drifts, groups, strict=True)
             ]
             shown = self._shown(tuple(self.answer.chosen[at] for at in drifts))
-            found.append(Told({TIME: 1.0}, float(ndtr(max(away))), *shown))
+            found.append(Told({PASSING_DRIFT: 1.0}, float(ndtr(max(away))), *shown))
         noise = {key: max(size, 1e-12) for key, size in self.noise.items()}
         return tuple(
             sorted(found, key=lambda t: -sum((s / noise[k]) ** 2 for k, s in t.sizes.items()))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from wrist_stiffness.comparing.explained import LEAST, TIME, Explained, Told
+from wrist_stiffness.comparing.explained import LEAST, Explained, Told
+from wrist_stiffness.inference.discrepancy import PASSING_DRIFT
 
 
 def percent(share: float) -> str:
@@ -45,7 +46,7 @@ def sentence(told: Told, found: Explained) -> str:
         for key, size in told.sizes.items()
     )
     sure = f"({percent(told.probability)} sure)"
-    if told.name == TIME:
+    if told.name == PASSING_DRIFT:
         key = told.curve.quantity.key
         usual = f"{found.usual_drift[key]:.2g} {quantities[key].unit}"
         return (

@@ -8,7 +8,15 @@ import numpy as np
 
 from wrist_stiffness.identification.base_fit import BaseFit
 from wrist_stiffness.identification.questions import Conditions, alike, passing, questions
-from wrist_stiffness.inference.discrepancy import SLOW_DRIFT, Question, background, low_rank
+from wrist_stiffness.inference.discrepancy import (
+    PASSING,
+    SLOW_DRIFT,
+    Question,
+    background,
+    drift_features,
+    low_rank,
+    unresolved,
+)
 from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.noise import scatter_of
 from wrist_stiffness.inference.observations import Labels, Observations
@@ -99,35 +107,41 @@ class WristTable:
     ) -> None:
         self.table: Observations = table
         stated = table.covariance
-        variance, width = scatter or (4.0 * usual_wander(table.quantities) ** 2, UNKNOWN)
+        usual, width = scatter or (4.0 * usual_wander(table.quantities) ** 2, UNKNOWN)
         self._noise_width = width if stated is None else KNOWN
-        own = own_covariance(table, np.diag(variance) if stated is None else stated)
+        own = own_covariance(table, np.diag(usual) if stated is None else stated)
         # A drift that is stated has columns of its own.
         slow = np.concatenate(
             [np.broadcast_to(s.wander, (len(s), len(s.wander)))[s.measured] for s in sessions]
         )
         if stated is not None:
             own = own - slow[:, :, None] ** 2 * np.eye(table.n_components)
-        self._apart = Apart(table, component_factors(own, table.measured))
-        self._rows = np.flatnonzero(table.measured.ravel())
-        self.variance: Array = np.diagonal(own, axis1=1, axis2=2)
-        self._scatter = self.variance
+        variance: Array = np.diagonal(own, axis1=1, axis2=2)
+        self._scatter = variance
         if table.shared is not None and table.stand is not None:
             shared = np.sum(table.shared**2, axis=2) * (table.stand >= 0)[:, None]
-            self._scatter = self.variance + shared
-        usual = np.sqrt(np.median(self.variance, axis=0))
+            self._scatter = variance + shared
         each = [np.broadcast_to(s.white, (len(s), len(s.white)))[s.measured] for s in sessions]
         single = np.nan_to_num(np.median(np.concatenate(each), axis=0))
-        single = np.where(single > 0.0, single, usual)
+        single = np.where(single > 0.0, single, np.sqrt(np.median(variance, axis=0)))
         self.drift = np.maximum(DRIFT * single, slow.max(axis=0))
+        wander = drift_features(table)
+        short = passing(table.sessions, table.covariates)
+        # What the columns of a drift cannot follow is scatter of each unit by itself.
+        beyond = unresolved(wander) + PASSING**2 * unresolved(short)
+        own = own + (beyond[:, None] * self.drift**2)[:, :, None] * np.eye(table.n_components)
+        self.variance: Array = np.diagonal(own, axis1=1, axis2=2)
+        self._apart = Apart(table, component_factors(own, table.measured))
+        self._rows = np.flatnonzero(table.measured.ravel())
         self.background: Background = background(
             table,
             self.whiten,
             ask(table.covariates),
-            usual,
+            np.sqrt(np.median(self.variance, axis=0)),
             self.drift,
             self._noise_width,
-            drifts=(passing(table.sessions),),
+            wander,
+            short,
         )
         self._alike = low_rank(alike(table.covariates), LAW_RANK)
 

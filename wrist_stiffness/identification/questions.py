@@ -6,7 +6,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wrist_stiffness.inference.discrepancy import Question, bell, centred, scaled, straight
+from wrist_stiffness.inference.discrepancy import (
+    Question,
+    bell,
+    centred,
+    leading,
+    scaled,
+    straight,
+)
 from wrist_stiffness.inference.observations import Labels
 from wrist_stiffness.mechanism.components import Array
 
@@ -143,16 +150,11 @@ def finer_questions(conditions: Conditions) -> tuple[Question, ...]:
     )
 
 
-def passing(sessions: Labels) -> Question:
-    """Return whether the error changes within seconds; sessions (u,) do so apart."""
-
-    def kernel(own: Conditions) -> Array:
-        apart = np.abs(own["time_s"][:, None] - own["time_s"]) / PASSING_S
-        apart[sessions[:, None] != sessions] = np.inf
-        return np.exp(-apart)
-
-    rank = PASSING_RANK * len(np.unique(sessions))
-    return Question("the time", kernel, rank, ("time_s",))
+def passing(sessions: Labels, conditions: Conditions) -> Array:
+    """Return columns (u, k) of what changes within seconds; sessions (u,) do so apart."""
+    apart = np.abs(conditions["time_s"][:, None] - conditions["time_s"]) / PASSING_S
+    apart[sessions[:, None] != sessions] = np.inf
+    return leading(np.exp(-apart), PASSING_RANK * len(np.unique(sessions)))
 
 
 def alike(conditions: Conditions) -> Array:

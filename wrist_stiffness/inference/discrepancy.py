@@ -29,7 +29,7 @@ PASSING = 0.3
 WIDER = 4
 """So many times the columns of a kernel are found before the largest of them are kept."""
 
-SLOW_DRIFT = "slow drift of the instrument"
+SLOW_DRIFT, PASSING_DRIFT = "slow drift of the instrument", "the time"
 
 LEAST = 1e-3
 """Share of a kernel's trace that its columns may leave out."""
@@ -61,10 +61,7 @@ class Question:
         kernel = self.kernel(conditions)
         if kernel is None or np.trace(kernel) <= 1e-9 * len(kernel):
             return None
-        columns = low_rank(kernel * len(kernel) / np.trace(kernel), WIDER * self.rank)
-        # Of these the directions that hold most of the kernel.
-        left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.asarray(left[:, : self.rank] * sizes[: self.rank])
+        return leading(kernel * len(kernel) / np.trace(kernel), self.rank)
 
 
 class Asked(Protocol):
@@ -76,6 +73,12 @@ class Asked(Protocol):
 
     def features(self, conditions: Mapping[str, Array]) -> Array | None:
         """Return columns (u, k) of mean square 1 together; None where there is nothing to ask."""
+
+
+def leading(kernel: Array, rank: int) -> Array:
+    """Return the columns (u, k), k <= rank, that hold most of a kernel (u, u)."""
+    left, sizes, _ = np.linalg.svd(low_rank(kernel, WIDER * rank), full_matrices=False)
+    return np.asarray(left[:, :rank] * sizes[:rank])
 
 
 def low_rank(kernel: Array, rank: int) -> Array:
@@ -114,6 +117,15 @@ def centred(kernel: Array) -> Array:
     return np.asarray(kernel - row[:, None] - row + row.mean())
 
 
+def unresolved(features: Array) -> Array:
+    """Return what columns (u, k) of a kernel of unit variance leave of each unit's, (u,).
+
+    It is scatter of the unit by itself (Snelson and Ghahramani 2005): the columns of a long session
+    cannot follow all of its drift.
+    """
+    return np.maximum(1.0 - np.sum(features**2, axis=1), 0.0)
+
+
 def drift_features(table: Observations) -> Array:
     """Columns (u, k) of an instrument's slow drift, afresh in every session.
 
@@ -138,7 +150,7 @@ def background(
     drift: Array | None,
     noise_width: float,
     wander: Array | None = None,
-    drifts: Sequence[Asked] = (),
+    passing: Array | None = None,
 ) -> Background:
     """Put together what has no name.
 
@@ -157,9 +169,9 @@ def background(
     noise_width : float
         See `Background`.
     wander : (u, k) float, optional
-        Columns of that drift; by default those of `drift_features`.
-    drifts : sequence of Question, optional
-        Other ways in which the instrument may drift, within seconds.
+        Columns of that drift.
+    passing : (u, k) float, optional
+        Columns of what the instrument drifts within seconds.
     """
     groups: list[Group] = []
 
@@ -177,20 +189,12 @@ def background(
                     Group(name, quantity.name, columns, expected, features=features, size=own)
                 )
 
-    if drift is not None and table.time_s is not None:
-        add(
-            SLOW_DRIFT,
-            drift_features(table) if wander is None else wander,
-            drift,
-            1.0,
-        )
+    if drift is not None and wander is not None:
+        add(SLOW_DRIFT, wander, drift, 1.0)
     for question in questions:
         features = question.features(table.covariates)
         if features is not None:
             add(question.name, features, scatter, 0.0)
-    if drift is not None:
-        for question in drifts:
-            features = question.features(table.covariates)
-            if features is not None:
-                add(question.name, features, PASSING * drift, 1.0)
+    if drift is not None and passing is not None:
+        add(PASSING_DRIFT, passing, PASSING * drift, 1.0)
     return Background(tuple(groups), noise_width)

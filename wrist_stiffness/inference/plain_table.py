@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from wrist_stiffness.inference.candidates import Candidate
-from wrist_stiffness.inference.discrepancy import background
+from wrist_stiffness.inference.discrepancy import background, unresolved
 from wrist_stiffness.inference.noise import scatter_of
 from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.outliers import lost_units
@@ -67,9 +67,13 @@ class Table:
         n, m = observations.values.shape
         stated = stated_covariance(observations) if told else np.diag(self.variance)
         own = own_covariance(observations, np.broadcast_to(stated, (n, m, m)))
+        self.scatter: Array = np.sqrt(np.median(np.diagonal(own, axis1=1, axis2=2), axis=0))
+        if self._drift is not None:
+            # What the columns of the drift cannot follow is scatter of each row by itself.
+            beyond = unresolved(self._drift)[:, None] * (DRIFT * self.scatter) ** 2
+            own = own + beyond[:, :, None] * np.eye(m)
         self._apart = Apart(observations, component_factors(own, observations.measured))
         self._rows = np.flatnonzero(observations.measured.ravel())
-        self.scatter: Array = np.sqrt(np.median(np.diagonal(own, axis1=1, axis2=2), axis=0))
 
     def background(self, named: Array) -> Background:
         """Return what has no name.
