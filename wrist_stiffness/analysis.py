@@ -289,7 +289,8 @@ class Analysis:
         begun = problem.begin()
         grown = problem.extended(begun, effect)
         table = self._shown.table
-        before, after = (self._left(each.base) for each in (begun, grown))
+        # What a version leaves is told by its own fit, which may have ended in another valley.
+        before, after = (self._left(each.base) for each in (self._fit(), grown))
         errors = [table.rms(np.nan_to_num(each) ** 2) for each in (before, after)]
         return Preview(
             grown.base.beyond()[effect.name],
