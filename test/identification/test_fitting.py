@@ -8,8 +8,10 @@ import pytest
 from wrist_stiffness.identification.base_fit import best_valley, fit_cleaned
 from wrist_stiffness.identification.calibration import fitted, told_model
 from wrist_stiffness.identification.free_effects import FreeEffect, commissioning, free_all
+from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.result import told_parameters
+from wrist_stiffness.inference.discrepancy import PASSING, PASSING_DRIFT, SLOW_DRIFT
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
@@ -347,6 +349,24 @@ def test_rough_data_lead_into_the_best_valley_of_the_flanges(model, seed):
     problem = problem_of(model, [session], free)
     led, best = (fit_cleaned(problem, start)[0] for start in (best_valley(problem), true))
     assert led.cost < best.cost + 2.0
+
+
+def test_every_unit_has_the_whole_drift_however_long_the_session(model):
+    """What columns cannot follow of it must not look like an error of the model."""
+    rng = np.random.default_rng(2)
+    block = poses(rng, 200)
+    frame = FreeEffect(effect(FRAME), {"shift_x_um": 1000.0}, True)
+    base, _ = fit_cleaned(problem_of(model, [measured(model, block, rng)], (frame,)))
+    table = likelihood_of(base)
+    expected = {SLOW_DRIFT: 1.0, PASSING_DRIFT: PASSING}
+    followed = np.zeros_like(table.variance)
+    for group in table.background.groups:
+        if group.name in expected:
+            followed += np.sum(group.features**2, axis=1)[:, None] * group.size**2
+    drift = (1.0 + PASSING**2) * table.drift**2
+    assert np.all(followed.mean(axis=0) < 0.8 * drift)
+    noise = (table.variance + followed - drift)[:, :3]  # hidden counts turn the platform
+    assert noise == pytest.approx(np.broadcast_to(SIGMA[:3] ** 2, noise.shape), rel=1e-9, abs=0.0)
 
 
 def test_what_the_fit_cannot_follow_widens_its_uncertainty(model):
