@@ -54,7 +54,6 @@ RESULT = Diagnosis(
     ),
     ("registration: 700 um of s",),
     "another session",
-    ("the time was over",),
 )
 
 
@@ -123,7 +122,6 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "the nodes can correct it where they get its signal",
         "another session",
         "registration: 700 µm of s",
-        "the time was over",
         "others explain far more, to first order",
         "monday: 5 spikes",
         "creep@joint_2, creep@joint_5",
