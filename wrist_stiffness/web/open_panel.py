@@ -120,7 +120,7 @@ def _told(each: Contents) -> dict[str, str]:
     return {
         "recording": each.name,
         "duration": f"{each.duration_s / 60.0:.1f} min",
-        "pose samples": f"{each.measured:,} at {each.rate_hz:,.4g} Hz",
+        "pose samples": f"{each.measured:,} at {float(f'{each.rate_hz:.3g}'):,g} Hz",
         "poses held": f"{each.dwells:,}",
         "motor 1": f"{low_1:.0f} to {high_1:.0f}°",
         "motor 2": f"{low_2:.0f} to {high_2:.0f}°",
