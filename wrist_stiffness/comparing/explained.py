@@ -25,7 +25,6 @@ from wrist_stiffness.sessions.unit_session import UnitSession
 BLOCKS = 10
 """Stretches of the recordings that are predicted by all others."""
 
-
 LEAST = 0.01
 """Share of the square of the error below which a condition is named and no more."""
 

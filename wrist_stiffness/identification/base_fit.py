@@ -241,12 +241,10 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     int
         How many there were.
     """
-    z, total = (
-        _led(_few(problem), np.zeros(len(problem.unknowns)))[1] if start is None else start,
-        0,
-    )
-    usual = len(problem.free)
-    z, residual, columns, arrived = _descended(problem, problem, z, usual)
+    if start is None:
+        _, start = _led(_few(problem), np.zeros(len(problem.unknowns)))
+    usual, total = len(problem.free), 0
+    z, residual, columns, arrived = _descended(problem, problem, start, usual)
     for _ in range(MOST_CLEANINGS):
         table = problem.table.with_values(residual)
         # Exact data scatter by rounding: what is lost is far beyond the noise as well.
