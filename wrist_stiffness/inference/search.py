@@ -29,9 +29,9 @@ catalogue, the largest explains an nth of what is left; where the best candidate
 search does not go on beside it."""
 
 UNLIKE = 2.0
-"""Times by which a whole fit may reach further beyond its first order than those before it.  Where an
-effect strains the base until flanges close, first orders say little: rivals that explain as much as
-the best one fell short of it by 1.1 times its reach (fresh cases 34 and 57)."""
+"""Times by which a whole fit may reach further beyond its first order than those before it.  Where
+an effect strains the base until flanges close, first orders say little: rivals that explain as much
+as the best one fell short of it by 1.1 times its reach (fresh cases 34 and 57)."""
 
 MOST_FITS = 48
 """Whole fits of a search; most end after a dozen."""
