@@ -29,9 +29,9 @@ catalogue, the largest explains an nth of what is left; where the best candidate
 search does not go on beside it."""
 
 UNLIKE = 2.0
-"""Times by which a whole fit may reach further beyond its first order than those before it.  Where
-an effect strains the base until flanges close, first orders say little: rivals that explain as much
-as the best one fell short of it by 1.1 times its reach (fresh cases 34 and 57)."""
+"""Times by which a whole fit may reach further beyond its first order than another one of its law.
+Where an effect strains the base until flanges close, first orders say little: rivals that explain
+as much as the best one fell short of it by 1.1 times its reach (fresh cases 34 and 57)."""
 
 MOST_FITS = 48
 """Whole fits of a search; most end after a dozen."""
@@ -260,14 +260,18 @@ class Search:
         found: list[State] = []
         logs: dict[str, float] = {}
         self._asked[state.names] = state.evidence.log, logs
-        best, reach = state.evidence.log + self.price, 0.0
+        best = state.evidence.log + self.price
+        reach: dict[str, float] = {}
         for asked in (leaders, others):
             if not all(each.rough for each in found):
                 break
             for log, each in self._nearest(state, asked):
                 name = each.trial.name
                 logs[name] = log
-                if log + UNLIKE * reach < best - NEGLIGIBLE:
+                law = name.partition("@")[0]
+                # Whole fits may reach further than their first order, those of a law most alike.
+                further = max([UNLIKE * reach.get(law, 0.0), *reach.values()])
+                if log + further < best - NEGLIGIBLE:
                     continue
                 if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
                     self.in_time = False
@@ -284,7 +288,8 @@ class Search:
                 found.append(self._known(fit, state))
                 logs[name] = found[-1].evidence.log
                 best = max(best, logs[name])
-                reach = max(reach, logs[name] - log) if log < np.inf else reach
+                if log < np.inf:
+                    reach[law] = max(reach.get(law, 0.0), logs[name] - log)
         return found
 
     def _promise(self, base: State, trials: Sequence[Trial], ranking: Sequence[Ranked]) -> None:
