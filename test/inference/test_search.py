@@ -165,3 +165,32 @@ def test_a_whole_fit_is_for_what_comes_near_the_best_to_first_order(rng, only_wh
         assert len(problem.fitted_whole) >= LEADERS
     else:
         assert problem.fitted_whole == ["law_3@place"]
+
+
+@pytest.mark.parametrize("law", ["law", "other"])
+def test_whole_fits_of_one_law_reach_alike_beyond_their_first_order(rng, law):
+    """The true place falls short to first order by more than the best one's fit reached beyond."""
+    cause, true, first = rng.normal(size=ROWS), f"{law}@true", "law@first"
+
+    class Bent(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            self.left = 6.0 * cause + rng.normal(size=ROWS)
+            shares = {first: (0.75, 0.97), true: (0.45, 1.0)}
+            for name, of in shares.items():
+                noise = rng.normal(size=ROWS)
+                slope, whole = (s * cause + np.sqrt(1.0 - s**2) * noise for s in of)
+                self.slopes[name], self.whole[name] = slope[:, None], whole[:, None]
+            self.slopes = {name: self.slopes[name] for name in shares}
+
+        def tangent(self, fit, ranked):
+            name, point = ranked.trial.name, fit.point
+            columns, varied = -self.slopes[name], self.slopes[name] * ranked.z
+            left = point.left + columns @ ranked.z
+            return point.with_effect(name, left, columns, ranked.z, varied, 0.0)
+
+    search = Search(Bent(rng), most_effects=1)
+    search.run()
+    known = {name for names in search.states for name in names}
+    assert known == ({first, true} if law == "law" else {first})
+    assert search.best.names == {true if law == "law" else first}
