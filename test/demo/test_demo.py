@@ -1,7 +1,10 @@
 """The demo's folder belongs to its user."""
 
+import re
+from pathlib import Path
+
 import pytest
-from run_demo import run_demo
+from run_demo import DAYS, LIVE, REPLAYED, run_demo
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
@@ -34,3 +37,10 @@ def test_a_demo_that_cannot_be_leaves_the_last_one(tmp_path, seconds):
     with pytest.raises(InputError, match="is not 2 to 172800"):
         run_demo(tmp_path, MODEL, seconds, lambda label: lambda done, of: None, print)
     assert [path.name for path in tmp_path.iterdir()] == ["map_s.png"]
+
+
+def test_readme_writes_nothing_where_the_demo_before_it_has_written():
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    written = re.findall(r"^wrist-stiffness .*(?:-o|--record) demo/(\S+)$", readme, re.MULTILINE)
+    assert len(written) == 4
+    assert not {LIVE, REPLAYED, *DAYS}.intersection(written)
