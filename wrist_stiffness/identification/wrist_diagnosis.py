@@ -29,7 +29,7 @@ from wrist_stiffness.inference.answer import (
     read,
     standings,
 )
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
+from wrist_stiffness.inference.held_out import HeldOut, against, bought
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.search import Search, State
 from wrist_stiffness.mechanism.components import Array
@@ -238,11 +238,12 @@ class _Judged:
         return judge.left(fit_base(self._model, judge.parts.seen, effects, near))
 
     def kept(self, search: Search, reading: Reading) -> Reading:
-        """Return a reading without what makes the held-out part worse: it is not handed over."""
-        if not reading.named or not refuted(self.stages[0], self.stages[-1]):
+        """Return a reading without what the held-out part speaks against: it is not handed over."""
+        why = against(self.stages[0], self.stages[-1]) if reading.named else ""
+        if not why:
             return reading
         self.stages = self.stages[:1]
-        return reading.refute(search.base)
+        return reading.refute(search.base, why)
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
         """Return what is left without one of the effects."""

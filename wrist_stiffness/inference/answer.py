@@ -120,7 +120,9 @@ class Reading:
     unexplained : float
         Share of what the nominal model left above the noise that is left, in [0, 1].
     refuted : tuple of Class
-        What would be named, but makes the held-out error grow.
+        What would be named, if held-out units did not speak against it.
+    against : str
+        Why they do.
     """
 
     state: State
@@ -131,12 +133,12 @@ class Reading:
     depends_on: Mapping[str, float]
     unexplained: float
     refuted: tuple[Class, ...] = ()
+    against: str = ""
 
-    def refute(self, nominal: State) -> Reading:
-        """Return the same without what is named: it makes the held-out error grow."""
-        return replace(
-            self, state=nominal, named=(), verdict="unknown", unexplained=1.0, refuted=self.named
-        )
+    def refute(self, nominal: State, why: str) -> Reading:
+        """Return the same without what is named, and why held-out units speak against it."""
+        unknown = replace(self, state=nominal, named=(), verdict="unknown", unexplained=1.0)
+        return replace(unknown, refuted=self.named, against=why)
 
 
 def probabilities(search: Search) -> dict[Names, float]:
@@ -276,7 +278,7 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         probability = chance.get(name, 0.0) * itself.get(name, 1.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
         if name in refuted:
-            why = "makes the held-out error grow"
+            why = reading.against
         if name not in fitted and gain >= CHANCE and not search.in_time:
             why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))

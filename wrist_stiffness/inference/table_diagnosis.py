@@ -22,7 +22,7 @@ from wrist_stiffness.inference.answer import (
 )
 from wrist_stiffness.inference.candidates import Candidate
 from wrist_stiffness.inference.evidence import evidence
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
+from wrist_stiffness.inference.held_out import HeldOut, against, bought
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem, linear_problem
 from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Mask, Observations
@@ -130,12 +130,12 @@ def diagnose(
     search.run()
     reading = read(search, naming)
     tell("judging by what was held out")
-    judge = _Judge(problem, whole, aside, nuisances)
+    judge = _Judge(problem, whole, aside, nuisances, _noise(reading.state, problem.table))
     before, after = judge.left(search.base), judge.left(reading.state)
-    refused = bool(reading.named) and refuted(before, after)
+    refused = against(before, after) if reading.named else ""
     if refused:
         after = before
-        reading = reading.refute(search.base)
+        reading = reading.refute(search.base, refused)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
     answer = Diagnosis(
@@ -159,7 +159,7 @@ def diagnose(
     )
     return TableDiagnosis(
         **{each.name: getattr(answer, each.name) for each in fields(answer)},
-        predictor=Predictor(_sets(search, refused), candidates, nuisances),
+        predictor=Predictor(_sets(search, bool(refused)), candidates, nuisances),
         search=search,
         lost=tuple(np.flatnonzero(away).tolist()),
     )
@@ -193,7 +193,7 @@ def _spread(whole: Observations) -> Mask:
 
 
 class _Judge:
-    """Fits to what was seen, judged by what was not."""
+    """Fits to what was seen, judged by what was not, in units of one noise."""
 
     def __init__(
         self,
@@ -201,8 +201,10 @@ class _Judge:
         whole: Observations,
         aside: Mask,
         nuisances: Sequence[Nuisance],
+        variance: Array,
     ) -> None:
         self._problem, self._nuisances = problem, nuisances
+        self._size = np.sqrt(variance)
         self._alone = not aside.any()
         if self._alone:
             aside = _spread(whole)
@@ -221,14 +223,13 @@ class _Judge:
         found = evidence(fit.point, problem.background)
         own = State(fit, found, found.log)
         values = predicted_set(own, 1.0)
-        unseen, table = self._unseen, problem.table
+        unseen = self._unseen
         change = Predictor((values,), problem.candidates, self._nuisances).predict(unseen)
         residual = unseen.values - change
-        size = np.sqrt(_noise(own, table))
-        columns = self._set_up / size[:, None]
+        columns = self._set_up / self._size[:, None]
         rows = unseen.measured.ravel()
         flat = columns.reshape(len(rows), -1)[rows]
-        target = (residual / size).ravel()[rows]
+        target = (residual / self._size).ravel()[rows]
         gram = flat.T @ flat + np.diag(1.0 / self._prior**2)
         values_of = np.linalg.lstsq(gram, flat.T @ target, rcond=1e-12)[0]
         residual = residual - self._set_up @ values_of
