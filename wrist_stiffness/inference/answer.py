@@ -138,7 +138,15 @@ class Reading:
     def refute(self, nominal: State, why: str) -> Reading:
         """Return the same without what is named, and why held-out units speak against it."""
         unknown = replace(self, state=nominal, named=(), verdict="unknown", unexplained=1.0)
-        return replace(unknown, refuted=self.named, against=why)
+        doubt = 1.0 - stands_in(1.0)
+        doubted = {
+            each.name: replace(
+                each, probability=doubt * each.probability, itself=doubt * each.itself
+            )
+            for each in self.named
+        }
+        classes = tuple(doubted.get(each.name, each) for each in self.classes)
+        return replace(unknown, classes=classes, refuted=tuple(doubted.values()), against=why)
 
 
 def probabilities(search: Search) -> dict[Names, float]:
