@@ -12,8 +12,9 @@ from wrist_stiffness.sessions.in_pieces import in_pieces
 from wrist_stiffness.sessions.reading.registration import place_left, turn_left
 from wrist_stiffness.sessions.reading.spikes import WINDOW, spikes
 
-DENSE_S = 0.2
-"""Median time between poses below which single ones are compared with their neighbours [s]."""
+DENSE_S = 0.21
+"""Median time between poses up to which single ones are compared with their neighbours [s]: five a
+second, with room for what clocks and rounding add."""
 
 LEAST_SPIKE_M = 30e-6
 
