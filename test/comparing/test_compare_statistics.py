@@ -205,6 +205,16 @@ def test_what_was_not_varied_is_said(dwells):
     assert sentences(table(dwells))[-1].startswith("Not varied here")
 
 
+def test_a_signal_that_stood_still_is_said_once(dwells):
+    def stood_still(c):
+        c["humidity"] = np.full_like(c["humidity"], 44.5)
+        return 0.0
+
+    idle = table(dwells, stood_still).not_varied
+    assert "humidity" in idle
+    assert "humidity and the pose together" not in idle
+
+
 def test_laws_are_judged_by_stretches_that_they_have_not_seen(dwells):
     found = table(dwells, lambda c: shift(2, 4e-6 * c["fz"] + 3e-6 * np.sin(2 * c["theta_2"])))
     # The noise of three components of 1 um.

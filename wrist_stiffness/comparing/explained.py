@@ -174,10 +174,12 @@ class Explained:
 
     @property
     def not_varied(self) -> tuple[str, ...]:
-        """Questions of which these recordings say nothing."""
+        """Questions of which these recordings say nothing; of each signal once."""
         asked = {each.name for each in self.table.background.groups}
         every = finer_questions(self.observations.covariates)
-        return tuple(each.name for each in every if each.name not in asked)
+        still = [each.name for each in every if each.name not in asked]
+        twice = {f"{name} and the pose together" for name in still}
+        return tuple(name for name in still if name not in twice)
 
     @cached_property
     def reachable(self) -> dict[str, float]:
