@@ -15,7 +15,10 @@ class MountCompliance(Spring):
     id = "mount_compliance"
     places = MOTORS
     sentence = "the bracket of {place} gives"
-    check = "tighten the bracket's screws; put a dial gauge on the motor housing and load the wrist"
+    check = (
+        "tighten the bracket's screws; put a dial gauge on the motor housing and load the wrist; "
+        "where it stands still, look for a crack at the root of the link"
+    )
     excited_by = "loads of several directions at poses all over the workspace"
 
     def centre(self, geometry: Geometry, place: str) -> Array:
