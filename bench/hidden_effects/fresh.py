@@ -40,7 +40,7 @@ from score import Judge
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS
+from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, is_plausible
 
 LIST = Path(__file__).with_name("fresh_cases.json")
 
@@ -183,7 +183,8 @@ def by_names(line: dict[str, Any], riddle: Riddle) -> dict[str, Any]:
     if any(each.effect in {one[0] for one in searched(STRANGERS)} for each in riddle.hidden):
         kind = "stranger"
     found = float(np.mean(hits)) if hits else 0.0
-    return {"kind": kind, "plausible": True, "inside": any(hits), "found": found}
+    plausible = all(is_plausible(each) for each in riddle.hidden)
+    return {"kind": kind, "plausible": plausible, "inside": any(hits), "found": found}
 
 
 def run(output: Path, part: tuple[int, int], only: str, names: bool) -> None:

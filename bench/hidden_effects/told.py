@@ -82,14 +82,16 @@ def calibration_error(probability: Array, true: NDArray[np.bool_]) -> float:
     return sum(count * abs(mean - hits / count) for mean, count, hits in bins) / len(true)
 
 
-def rows(lines: Sequence[Line]) -> list[tuple[str, Sequence[Line], Callable[[Line], bool]]]:
+def rows(
+    likely: Sequence[Line], large: Sequence[Line]
+) -> list[tuple[str, Sequence[Line], Callable[[Line], bool]]]:
     """Return what is counted, of which riddles, and when it counts."""
 
     def group(name: str) -> list[Line]:
-        return [line for line in lines if line["group"] == name]
+        return [line for line in likely if line["group"] == name]
 
-    single = [x for x in group("single") if x["kind"] == "single" and x["plausible"]]
-    double = [x for x in group("double") if x["kind"] == "double" and x["plausible"]]
+    single = [x for x in group("single") if x["kind"] == "single"]
+    double = [x for x in group("double") if x["kind"] == "double"]
     outside = [x for x in group("outside") if x["kind"] == "stranger"]
     days = [x for x in group("two_days") if x["kind"] == "single"]
     return [
@@ -110,7 +112,12 @@ def rows(lines: Sequence[Line]) -> list[tuple[str, Sequence[Line], Callable[[Lin
         ("two effects: both found", double, lambda x: x["found"] == 1.0),
         ("outside the catalogue: nothing is named", outside, lambda x: not x["named"]),
         ("two days, one effect: right in the class", days, lambda x: bool(x["inside"])),
-        ("all: a false class", lines, lambda x: spurious(x) > 0),
+        ("all: a false class", likely, lambda x: spurious(x) > 0),
+        (
+            "larger than on a wrist that still works: a false class",
+            large,
+            lambda x: spurious(x) > 0,
+        ),
     ]
 
 
@@ -140,14 +147,19 @@ def main() -> None:
     given = parser.parse_args()
     found = [json.loads(line) for line in given.results.read_text().splitlines()]
     lines = [line | {"kind": line.get("kind", "none")} for line in found if "verdict" in line]
-    print(f"{len(found)} riddles, {len(lines)} answered\n")
+    likely = [line for line in lines if line.get("plausible", True)]
+    large = [line for line in lines if line not in likely]
+    print(
+        f"{len(found)} riddles, {len(lines)} answered, {len(large)} of them larger than on a wrist"
+    )
+    print("that still works: these count in the last row alone\n")
     print("| | cases | rate | 95 % interval |\n|---|---|---|---|")
-    for name, own, counts in rows(lines):
+    for name, own, counts in rows(likely, large):
         hits = sum(counts(line) for line in own)
         low, high = wilson(hits, len(own))
         rate = f"{100 * hits / len(own):.0f} %" if own else "-"
         print(f"| {name} | {hits} of {len(own)} | {rate} | {100 * low:.0f} to {100 * high:.0f} |")
-    for name, told in {"effects": claims(lines), "verdicts": verdicts(lines)}.items():
+    for name, told in {"effects": claims(likely), "verdicts": verdicts(likely)}.items():
         print(f"\ncalibration error of {name}: {calibration_error(*told):.3f} of {len(told[1])}")
         for mean, count, hits in binned(*told):
             print(f"  told {100 * mean:3.0f} %: {hits} of {count}")
@@ -155,7 +167,7 @@ def main() -> None:
     print(f"\nCPU: median {np.median(spent):.0f} s, 90 % {np.quantile(spent, 0.9):.0f} s")
     print(f"longest {spent.max():.0f} s")
     if given.picture:
-        draw(lines, given.picture)
+        draw(likely, given.picture)
 
 
 if __name__ == "__main__":

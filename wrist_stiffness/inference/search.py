@@ -70,6 +70,11 @@ class Trial:
     smooth: bool
     blocks: tuple[tuple[tuple[float, ...], Array], ...]
 
+    @property
+    def law(self) -> str:
+        """Its effect, wherever it is."""
+        return self.name.partition("@")[0]
+
 
 @dataclass(frozen=True, eq=False)
 class Ranked:
@@ -262,13 +267,12 @@ class Search:
         self._asked[state.names] = state.evidence.log, logs
         best = state.evidence.log + self.price
         reach: dict[str, float] = {}
-        for asked in (leaders, others):
-            if not all(each.rough for each in found):
-                break
-            for log, each in self._nearest(state, asked):
-                name = each.trial.name
+
+        def ask(candidates: Sequence[Ranked]) -> None:
+            nonlocal best
+            for log, each in self._nearest(state, candidates):
+                name, law = each.trial.name, each.trial.law
                 logs[name] = log
-                law = name.partition("@")[0]
                 # Whole fits may reach further than their first order, those of a law most alike.
                 further = max([UNLIKE * reach.get(law, 0.0), *reach.values()])
                 if log + further < best - NEGLIGIBLE:
@@ -290,6 +294,16 @@ class Search:
                 best = max(best, logs[name])
                 if log < np.inf:
                     reach[law] = max(reach.get(law, 0.0), logs[name] - log)
+
+        ask(leaders)
+        if all(each.rough for each in found):
+            ask(others)
+        if found:
+            best_one = max(found, key=lambda each: each.evidence.log)
+            (name,) = best_one.names - state.names
+            law = name.partition("@")[0]
+            if reach.get(law, 0.0) > NEGLIGIBLE:
+                ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
         return found
 
     def _promise(self, base: State, trials: Sequence[Trial], ranking: Sequence[Ranked]) -> None:
@@ -358,7 +372,7 @@ def _one_of_each_law(ranking: Sequence[Ranked], but: Sequence[Ranked]) -> list[R
     laws: dict[str, Ranked] = {}
     for each in ranking:
         if not each.trial.smooth:
-            laws.setdefault(each.trial.name.partition("@")[0], each)
+            laws.setdefault(each.trial.law, each)
     known = {each.trial.name for each in but}
     return [each for each in laws.values() if each.trial.name not in known]
 
