@@ -94,6 +94,11 @@ def rows(
     double = [x for x in group("double") if x["kind"] == "double"]
     outside = [x for x in group("outside") if x["kind"] == "stranger"]
     days = [x for x in group("two_days") if x["kind"] == "single"]
+    named = [x for x in large if x["kind"] in ("single", "double")]
+
+    def in_class(line: Line) -> bool:
+        return bool(line["inside"])
+
     return [
         ("nothing hides: something is named", group("nothing"), lambda x: bool(x["named"])),
         ("nothing hides: *unknown*", group("nothing"), lambda x: x["verdict"] == "unknown"),
@@ -102,7 +107,7 @@ def rows(
             group("nothing_dense"),
             lambda x: x["verdict"] != "none",
         ),
-        ("one effect: right in the class", single, lambda x: bool(x["inside"])),
+        ("one effect: right in the class", single, in_class),
         ("one effect: a false class", single, lambda x: spurious(x) > 0),
         (
             "one effect: error after within 1.1",
@@ -111,8 +116,9 @@ def rows(
         ),
         ("two effects: both found", double, lambda x: x["found"] == 1.0),
         ("outside the catalogue: nothing is named", outside, lambda x: not x["named"]),
-        ("two days, one effect: right in the class", days, lambda x: bool(x["inside"])),
+        ("two days, one effect: right in the class", days, in_class),
         ("all: a false class", likely, lambda x: spurious(x) > 0),
+        ("larger than on a wrist that still works: right in the class", named, in_class),
         (
             "larger than on a wrist that still works: a false class",
             large,
@@ -152,7 +158,7 @@ def main() -> None:
     print(
         f"{len(found)} riddles, {len(lines)} answered, {len(large)} of them larger than on a wrist"
     )
-    print("that still works: these count in the last row alone\n")
+    print("that still works: these count in the last two rows alone\n")
     print("| | cases | rate | 95 % interval |\n|---|---|---|---|")
     for name, own, counts in rows(likely, large):
         hits = sum(counts(line) for line in own)
