@@ -299,8 +299,9 @@ class Search:
         if all(each.rough for each in found):
             ask(others)
         if found:
-            best_one = max(found, key=lambda each: each.evidence.log)
-            (name,) = best_one.names - state.names
+            leading = max(found, key=lambda each: each.evidence.log)
+            (name,) = leading.names - state.names
+            # Where first orders tell, the leaders hold what comes near.
             law = name.partition("@")[0]
             if reach.get(law, 0.0) > NEGLIGIBLE:
                 ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
