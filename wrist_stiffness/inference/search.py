@@ -301,8 +301,8 @@ class Search:
         if found:
             leading = max(found, key=lambda each: each.evidence.log)
             (name,) = leading.names - state.names
-            # Where first orders tell, the leaders hold what comes near.
             law = name.partition("@")[0]
+            # Where first orders tell, the leaders hold what comes near.
             if reach.get(law, 0.0) > NEGLIGIBLE:
                 ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
         return found
