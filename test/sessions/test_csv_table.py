@@ -221,7 +221,7 @@ def changed(row, column, value):
         (changed(1, "qz", "q_z"), "column qz of the quaternion is missing"),
         (changed(1, "spindle_1", "spindle"), "column 'spindle' is not known and no NAME_UNIT"),
         (changed(1, "spindle_1", "x_mm"), "column x_mm is there twice"),
-        (changed(1, "x_mm", "p1x_mm"), "column p1y_mm, p1z_mm of the markers is missing"),
+        (changed(1, "x_mm", "p1x_mm"), "columns p1y_mm, p1z_mm of the markers are missing"),
         (table_of(), "nothing measured"),
         (table_of(FULL, full_cells).splitlines()[0], "no rows below the column names"),
         ("", "no column names in the first line"),

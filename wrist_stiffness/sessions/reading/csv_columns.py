@@ -129,26 +129,17 @@ def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
     for name, times in Counter(header).items():
         if times > 1:
             raise InputError(f"column {name or '(without a name)'} is there twice")
-    if missing := [name for name in (TIME, *MOTORS) if name not in header]:
-        raise InputError(f"column {', '.join(missing)} is missing (found: {', '.join(header)})")
-    loads = [name for name in LOAD if name in header]
-    if 0 < len(loads) < len(LOAD):
-        missing = [name for name in LOAD if name not in header]
-        raise InputError(
-            f"column {', '.join(missing)} of the load is missing (found: {', '.join(header)})"
-        )
-    turned = [name for name in QUATERNION if name in header]
-    if 0 < len(turned) < len(QUATERNION):
-        missing = [name for name in QUATERNION if name not in header]
-        raise InputError(f"column {', '.join(missing)} of the quaternion is missing")
+    _require((TIME, *MOTORS), header)
+    loads = any(name in header for name in LOAD)
+    if loads:
+        _require(LOAD, header, " of the load")
+    if any(name in header for name in QUATERNION):
+        _require(QUATERNION, header, " of the quaternion")
     pose = tuple(name for name in (*POSITION, *QUATERNION) if name in header)
     markers = _markers(header)
     if pose and markers:
         raise InputError(f"columns {pose[0]} and p1x_mm: a pose and markers exclude each other")
-    if missing := [name for name in gauges if name not in header]:
-        raise InputError(
-            f"column {', '.join(missing)} of the gauges is missing (found: {', '.join(header)})"
-        )
+    _require(gauges, header, " of the gauges")
     if gauges and (pose or markers):
         raise InputError(
             f"columns {gauges[0]} and {(*pose, 'p1x_mm')[0]}: gauges and a pose exclude each other "
@@ -175,7 +166,7 @@ def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
             covariates[covariate_of(name)] = name
         else:
             raise InputError(f"column {name!r} is not known and no NAME_UNIT of a covariate")
-    return Columns(bool(loads), pose, markers, temperatures, covariates, tuple(gauges))
+    return Columns(loads, pose, markers, temperatures, covariates, tuple(gauges))
 
 
 def covariate_of(column: str) -> str:
@@ -193,10 +184,17 @@ def _markers(header: Sequence[str]) -> int:
     found = [name for name in header if MARKER.fullmatch(name)]
     # Three columns each, numbered from 1: a number too large has columns missing before it.
     count = -(-len(found) // 3)
-    expected = marker_columns(count)
-    if missing := sorted({*expected} - {*found}) or sorted({*found} - {*expected}):
-        raise InputError(f"column {', '.join(missing[:6])} of the markers is missing")
+    _require(marker_columns(count), header, " of the markers")
     return count
+
+
+def _require(names: Sequence[str], header: Sequence[str], whose: str = "") -> None:
+    """Refuse a table without one of these columns."""
+    if missing := [name for name in names if name not in header]:
+        columns, are = ("column", "is") if len(missing) == 1 else ("columns", "are")
+        raise InputError(
+            f"{columns} {', '.join(missing)}{whose} {are} missing (found: {', '.join(header)})"
+        )
 
 
 def reader_of(column: str, factors: Mapping[str, Decimal] = FACTORS) -> Callable[[str], float]:
