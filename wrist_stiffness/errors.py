@@ -5,6 +5,8 @@ A message is one line that names the value, the place and the limit.  The comman
 """
 
 import re
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
@@ -14,6 +16,12 @@ def with_a_point(text: str) -> str:
     if not DECIMAL_COMMA.fullmatch(text.strip()):
         return ""
     return f": write {text.strip().replace(',', '.')}, with a decimal point"
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """Return what to say, behind a name that is not known, of the one most like it; else empty."""
+    near = get_close_matches(name, list(known), 1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 class WristError(Exception):

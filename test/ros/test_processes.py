@@ -156,7 +156,7 @@ def test_a_node_ends_wherever_it_hangs(graph, model, tmp_path, where):
         ({"load_age_limit_s": "long"}, "load_age_limit_s"),
         ({"frames": "'{ft: {parent: moon}}'"}, "'moon' is not one of"),
         ({"covariates": '"humidity b!c"'}, "covariates: 'b!c' cannot be the name of a topic"),
-        ({"model_fle": "x"}, "unknown parameter 'model_fle'; is model_file meant?"),
+        ({"model_fle": "x"}, "unknown parameter 'model_fle'; did you mean model_file?"),
         ({"frames.ft.parent": "x"}, "'frames.ft.parent': frames is one text"),
     ],
 )

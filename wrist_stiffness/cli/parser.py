@@ -3,10 +3,9 @@
 import argparse
 import re
 from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
 from typing import Any, NoReturn, TypeAlias
 
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, meant
 
 PROG = "wrist-stiffness"
 
@@ -76,9 +75,7 @@ class OneLineParser(argparse.ArgumentParser):
         """Refuse what the command itself does not know: argparse would leave it to the program."""
         found, left = super().parse_known_args(args, namespace)
         if left:
-            alike = [get_close_matches(each, self._option_string_actions, 1) for each in left]
-            meant = " or ".join(name for names in alike for name in names)
-            advice = f"; did you mean {meant}?" if meant else ""
+            advice = "".join(meant(each, self._option_string_actions) for each in left)
             self.error(f"unrecognized arguments: {' '.join(left)}{advice}")
         return found, left
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, meant
 
 RATES_HZ = (1.0, 2000.0)
 """Slowest and fastest samples of the virtual cell."""
@@ -98,9 +97,8 @@ def unknown_arguments(given: Iterable[str]) -> list[str]:
     warnings = []
     for name in given:
         if name not in LAUNCH_ARGUMENTS:
-            near = get_close_matches(name, LAUNCH_ARGUMENTS, 1)
-            meant = f"; is {near[0]} meant?" if near else ""
-            warnings.append(f"WARNING: wrist.launch.py has no argument {name}{meant}")
+            guess = meant(name, LAUNCH_ARGUMENTS)
+            warnings.append(f"WARNING: wrist.launch.py has no argument {name}{guess}")
     return warnings
 
 

@@ -13,6 +13,7 @@ from wrist_stiffness import topics
 from wrist_stiffness.commands.cell_messages import CellMessages
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.model.registry import unknown_effect
 from wrist_stiffness.progress import Progress
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import String
@@ -179,15 +180,16 @@ def hide(
     """
     effect, _, place = name.partition("@")
     component, _, form = place.partition(":")
-    if effect not in ALL or not component:
-        raise InputError(
-            f"effect {name!r} is not NAME@COMPONENT with a NAME of: {', '.join(sorted(ALL))}"
-        )
+    if effect not in ALL:
+        raise unknown_effect(effect, ALL, "docs/hidden-effects.md")
     if not (np.isfinite(size) and size > 0.0):
         raise InputError(f"effect {name!r}: size {size:g} is not a positive number")
     entry = ALL[effect]
     if component not in entry.components:
-        raise InputError(f"effect {name!r}: {effect} is at {', '.join(entry.components)} only")
+        raise InputError(
+            f"effect {name!r}: {effect} is at {', '.join(entry.components)} only; write "
+            f"{effect}@{entry.components[0]}"
+        )
     if form and form not in entry.forms:
         raise InputError(f"effect {name!r}: {effect} has the forms {', '.join(entry.forms)} only")
     start = HiddenEffect(

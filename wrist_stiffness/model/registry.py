@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import inspect
 import os
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module, metadata, util
 from pathlib import Path
 from pkgutil import iter_modules
 
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, meant
 from wrist_stiffness.model import effects
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import STAGES, Law, require_id
@@ -53,8 +54,15 @@ def find_law(name: str) -> Law:
     """
     laws = catalogue()
     if name not in laws:
-        raise InputError(f"unknown effect {name!r}; known are {', '.join(sorted(laws))}")
+        raise unknown_effect(name, laws, "docs/effects.md")
     return laws[name]
+
+
+def unknown_effect(name: str, known: Iterable[str], page: str) -> InputError:
+    """Return the error of an effect that is none of those known, all of which a page lists."""
+    guess = meant(name, known)
+    others = f"{guess} (all: {page})" if guess else f"; known are {', '.join(sorted(known))}"
+    return InputError(f"unknown effect {name!r}{others}")
 
 
 def effect_named(name: str) -> Effect:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from wrist_stiffness.compensation.parameters import (
     PREDICTION,
     ParameterEntry,
 )
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, meant
 from wrist_stiffness.shipped import shipped_file
 
 EVERY_ENTRY = (*COMMON, *PREDICTION, *CORRECTION, *MONITOR)
@@ -77,8 +76,7 @@ def _guess(name: str, known: Collection[str]) -> str:
     first = name.split(".")[0]
     if "." in name and first in known:
         return f": {first} is one text (YAML in quotes), not a mapping"
-    near = get_close_matches(name, known, 1)
-    return f"; is {near[0]} meant?" if near else ""
+    return meant(name, known)
 
 
 def values_of(node: Node, entries: Sequence[ParameterEntry]) -> Mapping[str, Any]:
