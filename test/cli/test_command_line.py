@@ -151,6 +151,20 @@ def test_an_unknown_option_is_told_by_its_own_command(argv, told, capsys):
     assert capsys.readouterr().err == f"wrist-stiffness: error: {expected}\n"
 
 
+@pytest.mark.parametrize(
+    ("argv", "told"),
+    [
+        (["predict", "--angles", "-20,5", "1"], "argument --angles: '-20,5' is no number: "),
+        (["simulate", "-o", "a", "--rate", "20,5"], "argument --rate: '20,5' is no number: "),
+        (["explain", "--angles", "0", "0", "--temperature", "link_1=20,5"], "link_1=20,5: "),
+    ],
+)
+def test_a_decimal_comma_is_told(argv, told, refused):
+    said = refused(*argv)
+    assert told in said
+    assert "20.5, with a decimal point" in said
+
+
 @pytest.mark.parametrize("number", ["-3", "-.5", "-1e-6", "-2.5E+3"])
 def test_a_negative_number_is_no_option(number):
     seen = []

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn, TypeAlias
 
-from wrist_stiffness.errors import InputError, meant
+from wrist_stiffness.errors import InputError, meant, with_a_point
 
 PROG = "wrist-stiffness"
 
@@ -34,17 +34,25 @@ class _StoreOnce(argparse._StoreAction):
         super().__call__(parser, namespace, values, option_string)
 
 
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number{with_a_point(text)}") from error
+
+
 class OneLineParser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, without the usage text before it.
 
     An option whose second value would replace its first is refused.  Negative numbers may have an
-    exponent: Python 3.11 and 3.12 take -1e-6 for an option.
+    exponent, or a comma to be told of: Python 3.11 and 3.12 take -1e-6 for an option.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.register("action", None, _StoreOnce)
-        self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
+        self.register("type", float, _number)
+        self._negative_number_matcher = re.compile(r"-(\d+[.,]?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
 
     def flag(self, name: str, what: str) -> None:
         """Add an option without a value."""
@@ -138,7 +146,8 @@ def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
         try:
             value = float(number)
         except ValueError as error:
-            raise InputError(f"{option} {text}: write NAME=NUMBER") from error
+            advice = with_a_point(number) or ": write NAME=NUMBER"
+            raise InputError(f"{option} {text}{advice}") from error
         if not name:
             raise InputError(f"{option} {text}: write NAME=NUMBER")
         if name in values:
