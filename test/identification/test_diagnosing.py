@@ -7,7 +7,7 @@ import pytest
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
-from wrist_stiffness.simulation.catalogue import HiddenEffect
+from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.cell import CellSettings
 
 SECONDS = 120.0
@@ -60,6 +60,23 @@ def test_backlash_behind_a_wrong_base_is_named_with_its_width(worn):
     assert error < 5.0
     assert found.effects[0].estimates["width_mdeg"].value == value
     assert found.diagnosis.after["phi_mdeg"] < 0.5 * found.diagnosis.before["phi_mdeg"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["one_sided", "linear"])
+def test_a_drive_that_is_softer_one_way_is_named_and_its_law_gives(model, in_the_cell, form):
+    hidden = HiddenEffect("drive_compliance", "motor_1", form, 0.05, 5)
+    session = measured(in_the_cell, model, (hidden,))
+    (finding,) = diagnose_sessions(model, [session]).diagnosis.findings
+    assert finding.names == ("drive_compliance@motor_1",)
+    if form == "linear":
+        assert finding.gives == {}
+        return
+    soft, stiff = build(hidden, model.table).softness
+    value, error = finding.gives["asymmetry"]
+    assert abs(abs(value) - abs(soft - stiff) / (soft + stiff)) < 3.0 * error < 0.1
+    assert "growth" not in finding.gives
+    assert "One way it is 2." in finding.evidence
 
 
 @pytest.mark.slow

@@ -41,6 +41,9 @@ class Disappointing:
     def tangent(self, fit, ranked):
         return None
 
+    def giving(self, fit):
+        return ()
+
     def fitted(self, names):
         empty = np.zeros((ROWS, 0))
         columns = np.concatenate([empty, *(self.whole[name] for name in names)], axis=1)

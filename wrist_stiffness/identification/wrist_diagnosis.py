@@ -29,6 +29,7 @@ from wrist_stiffness.inference.answer import (
     read,
     standings,
 )
+from wrist_stiffness.inference.giving import told
 from wrist_stiffness.inference.held_out import HeldOut, against, bought
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.search import Search, State
@@ -265,6 +266,12 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
     theta = np.concatenate([s.still.theta[s.measured] for s in fit.base.problem.sessions])
     points = turns_normal(fit.twist(found.name)[:, :, None], normal.normal(normal.forward(theta)))
     explained = 1.0 - found.left
+    gives = {g.way: size for g, size in state.evidence.given.items() if g.name == found.name}
+    sentences = [
+        f"{find_law(law).sentence.format(place=place)}.",
+        f"Explains {100.0 * explained:.3g} % of the error above the noise.",
+        *(told(way, *size) for way, size in gives.items()),
+    ]
     return Finding(
         tuple((*_law_and_place(name), share) for name, share in found.members.items()),
         found.probability,
@@ -273,9 +280,9 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
         explained,
         buys,
         compensable(find_law(law), place, points),
-        f"{find_law(law).sentence.format(place=place)}. "
-        f"Explains {100.0 * explained:.3g} % of the error above the noise.",
+        " ".join(sentences),
         find_law(law).check,
+        gives,
     )
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import lsq_linear
 from wrist_stiffness.identification.base_fit import BaseFit
 from wrist_stiffness.identification.likelihood import WristTable
 from wrist_stiffness.inference.evidence import Evidence, evidence, known_noise
+from wrist_stiffness.inference.giving import WAYS, Give, given
 from wrist_stiffness.inference.point import Point
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.parameters import Parameter
@@ -42,10 +43,13 @@ class WristFit:
         Set-up, tolerances and effects.
     table : WristTable
         Of the same units.
+    gives : tuple of Give
+        In which ways laws of the set give.
     """
 
     base: BaseFit
     table: WristTable
+    gives: tuple[Give, ...] = ()
 
     @property
     def names(self) -> Collection[str]:
@@ -56,6 +60,16 @@ class WristFit:
         """Return what an effect of the set does to the predictions, (u, 6) to first order."""
         at = self.places[name]
         return np.asarray(-self.base.columns[:, :, at] @ self.base.z[at])
+
+    @cached_property
+    def ways(self) -> dict[Give, Array]:
+        """What is left less, (N,), for each way in which a law may give that is not exact."""
+        scale = np.sqrt(np.median(self.table.variance, axis=0))
+        found = {}
+        for name in (n for n, effect in self.base.beyond().items() if effect.law.inexactness):
+            columns = -self.table.whiten(given(self.change(name), scale))
+            found.update({Give(name, way): columns[:, n] for n, way in enumerate(WAYS)})
+        return found
 
     def twist(self, name: str) -> Array:
         """Return the twists (u, 6) at O by which an effect of the set changes the predictions."""
@@ -105,6 +119,7 @@ class WristFit:
         base, table = self.base, self.table
         z = base.z.copy()
         inexact = [np.zeros((len(table.whiten(base.residual)), 0))]
+        inexact += [self.ways[each][:, None] for each in self.gives]
         varied = {}
         for name, places in self.places.items():
             effect = base.problem.free[base.problem.unknowns[places[0]].free].effect
@@ -125,6 +140,7 @@ class WristFit:
             {name: places for name, places in effects.items() if len(places)},
             np.concatenate(inexact, axis=1),
             varied,
+            self.gives,
         )
 
     @cached_property
@@ -153,8 +169,8 @@ class WristFit:
             elif here:
                 break
             else:
-                fit, here = WristFit(fit.base.with_columns_here(), self.table), True
-        return WristFit(replace(fit.base, arrived=gain < LARGE_GAIN), self.table)
+                fit, here = replace(fit, base=fit.base.with_columns_here()), True
+        return replace(fit, base=replace(fit.base, arrived=gain < LARGE_GAIN))
 
     def _step(self, found: Evidence) -> tuple[Array, float]:
         """Return the step to the maximum within the bounds (p,), and its gain to second order."""
@@ -181,7 +197,7 @@ class WristFit:
         for halvings in range(MOST_HALVINGS):
             z = self.base.z + 0.5**halvings * step
             base = replace(self.base, z=z, residual=self.base.problem.residual(z))
-            tried = WristFit(base, self.table)
+            tried = replace(self, base=base)
             if found.cost(tried.point) < before:
                 return tried
         return None

@@ -31,6 +31,7 @@ from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.evidence import evidence
 from wrist_stiffness.inference.point import Background, Point
 from wrist_stiffness.inference.search import Ranked, Trial, ranked
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.columns import SMALL
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -92,6 +93,14 @@ class WristProblem:
             for shape in candidate.shapes
         ]
         return Trial(candidate.name, candidate.law.smooth, tuple(blocks))
+
+    def giving(self, fit: WristFit) -> Sequence[tuple[Array, WristFit]]:
+        """Return the fits in which one more law gives, with the column (N,) which that adds."""
+        return [
+            (column, replace(fit, gives=(*fit.gives, give)))
+            for give, column in fit.ways.items()
+            if give not in fit.gives
+        ]
 
     def tangent(self, fit: WristFit, ranked: Ranked) -> Point | None:
         """Return a fit with one effect more: the effect by its own law, all else to first order.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -321,6 +321,8 @@ class Finding:
         Fall of the held-out error and its standard uncertainty, by quantity and unit.
     compensable, evidence, check : str
         For the technician.
+    gives : dict
+        In which ways its law gives, `asymmetry` or `growth`, with one standard uncertainty.
     """
 
     members: tuple[tuple[str, str, float], ...]
@@ -332,6 +334,7 @@ class Finding:
     compensable: str
     evidence: str
     check: str
+    gives: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -468,6 +471,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         ],
         "probability": finding.probability,
         "parameters": {name: list(value) for name, value in finding.parameters.items()},
+        "gives": {way: list(value) for way, value in finding.gives.items()},
         "log_gain": finding.log_gain,
         "explains": finding.explains,
         "buys": {key: list(gain) for key, gain in finding.buys.items()},

@@ -23,6 +23,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.linalg.lapack import dpotri, dtrtri
 from scipy.special import gammaln
 
+from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
 
 Array = NDArray[np.float64]
@@ -194,6 +195,16 @@ class Evidence:
         return self._solved[2][: self.point.columns.shape[1]]
 
     @property
+    def given(self) -> dict[Give, tuple[float, float]]:
+        """By how much laws give, with one standard uncertainty."""
+        first = len(self.point.z)
+        sigma = np.sqrt(np.diag(self.covariance))
+        return {
+            give: (SPREAD * float(self._solved[2][place]), SPREAD * float(sigma[place]))
+            for place, give in enumerate(self.point.gives, first)
+        }
+
+    @property
     def unnamed(self) -> Array:
         """Most probable values of the columns of the background, (q,)."""
         return self._solved[2][len(self._priors[0]) :]
@@ -306,7 +317,9 @@ class Evidence:
         """
         point, places = self.point, self.point.effects[name]
         own = point.columns[:, places] @ point.z[places]
+        count = len(point.z) + len(point.gives)
         named = point.left + point.columns @ self.step
+        named += point.inexact[:, : len(point.gives)] @ self._solved[2][len(point.z) : count]
         basis, sizes, _ = np.linalg.svd(point.varied[name], full_matrices=False)
         basis = basis[:, sizes > 1e-6 * sizes[0]] if len(sizes) else basis
         noise = self.excess * basis.shape[1]
@@ -422,8 +435,9 @@ def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array
 
 
 def known_noise(point: Point, background: Background) -> Evidence:
-    """Return a fitted set beside noise and drift as they are known, and nothing else."""
-    exact = replace(point, inexact=OFF * point.inexact, _beside={})
+    """Return a fitted set beside noise and drift as they are known; laws give, nothing else."""
+    own = np.arange(point.inexact.shape[1]) < len(point.gives)
+    exact = replace(point, inexact=np.where(own, 1.0, OFF) * point.inexact, _beside={})
     return _usual(exact, background)
 
 

@@ -108,7 +108,7 @@ class LinearFit:
             self.places,
             np.concatenate([np.zeros((len(columns), 0)), *inexact], axis=1),
             varied,
-            not free.shape[1] and not held.any(),
+            linear=not free.shape[1] and not held.any(),
         )
 
 
@@ -196,6 +196,10 @@ class LinearProblem:
 
     def tangent(self, fit: LinearFit, ranked: Ranked) -> None:
         """Return nothing: a whole fit costs no more."""
+
+    def giving(self, fit: LinearFit) -> tuple[()]:
+        """Return nothing: the laws of a plain table are as they are stated."""
+        return ()
 
     def added(self, fit: LinearFit, ranked: Ranked) -> LinearFit | None:
         """Return the best fit with one effect more; None where its bounds leave nothing of it."""

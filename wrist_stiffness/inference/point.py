@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.inference.giving import Give
+
 Array = NDArray[np.float64]
 
 OUTSIDE = 0.2
@@ -167,9 +169,11 @@ class Point:
     effects : dict of str to (k,) int
         Places of the unknowns of each effect, which have the prior of effects.
     inexact : (N, l) float
-        What the laws of the effects may leave because no law is exact.
+        What the laws of the effects may leave because no law is exact; first those that give.
     varied : dict of str to (N, l) float
         What each effect would add if its size changed with the conditions by its own size.
+    gives : tuple of Give
+        In which ways laws give, a column of `inexact` each.
     linear : bool
         Whether the slopes hold everywhere: then the unknowns follow the amplitudes.
     numbers : int
@@ -183,6 +187,7 @@ class Point:
     effects: Mapping[str, NDArray[np.intp]]
     inexact: Array
     varied: Mapping[str, Array] = field(default_factory=dict)
+    gives: tuple[Give, ...] = ()
     linear: bool = False
     numbers: int = 0
     _beside: dict[str, Any] = field(default_factory=dict, repr=False)

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from wrist_stiffness.inference.evidence import ENOUGH, Array, Evidence, evidence
+from wrist_stiffness.inference.giving import GIVES, WAYS
 from wrist_stiffness.inference.point import Background, Point
 
 LEADERS = 6
@@ -32,6 +33,9 @@ UNLIKE = 2.0
 """Times by which a whole fit may reach further beyond its first order than another one of its law.
 Where an effect strains the base until flanges close, first orders say little: rivals that explain
 as much as the best one fell short of it by 1.1 times its reach (fresh cases 34 and 57)."""
+
+PRICE_OF_GIVING = float(np.log(len(WAYS) / GIVES))
+"""Log prior odds against a law that gives in one way."""
 
 MOST_FITS = 48
 """Whole fits of a search; most end after a dozen."""
@@ -113,6 +117,9 @@ class Problem(Protocol):
 
     def tangent(self, fit: Any, ranked: Ranked) -> Point | None:
         """Return the fit with one effect more to first order; None where only a fit can tell."""
+
+    def giving(self, fit: Any) -> Sequence[tuple[Array, Any]]:
+        """Return the fits in which one more law gives, with the column (N,) which that adds."""
 
     def added(self, fit: Any, ranked: Ranked) -> Any:
         """Return the best fit with one effect more."""
@@ -355,13 +362,32 @@ class Search:
 
     def _known(self, fit: Any, near: State | None) -> State:
         found = evidence(fit.point, self._problem.background, near.evidence if near else None)
-        new = State(fit, found, found.log - self.price * len(fit.names))
+        fit, found = self._giving(fit, found)
+        log = found.log - self.price * len(fit.names) - PRICE_OF_GIVING * len(found.point.gives)
+        new = State(fit, found, log)
         known = self.states.get(new.names)
         if known is None or known.log < new.log:
             self.states[new.names] = new
             if not new.names:
                 self.base = new
         return self.states[new.names]
+
+    def _giving(self, fit: Any, found: Evidence) -> tuple[Any, Evidence]:
+        """Let laws give, one way after the other, for as long as that pays."""
+        while found.unexplained > 0.0 and (asked := self._problem.giving(fit)):
+            gains = found.without_discrepancy().gains([column[:, None] for column, _ in asked])
+            trials = [
+                own
+                for (_, own), (gain, _) in zip(asked, gains, strict=True)
+                if gain > PRICE_OF_GIVING
+            ]
+            known = [evidence(each.point, self._problem.background, found) for each in trials]
+            logs = [each.log - PRICE_OF_GIVING for each in known]
+            if max(logs, default=-np.inf) < found.log:
+                break
+            best = int(np.argmax(logs))
+            fit, found = trials[best], known[best]
+        return fit, found
 
 
 def _beside(names: Collection[str]) -> str:

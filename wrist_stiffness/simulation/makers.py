@@ -19,6 +19,7 @@ from wrist_stiffness.mechanism.vectors import block_diagonal, skew, unit
 from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
 from wrist_stiffness.simulation.laws.added_spring import (
     MountSpring,
+    OneSidedDrive,
     OuterSpring,
     StiffeningDrive,
     drive_flexibility,
@@ -84,12 +85,16 @@ def bushing_stiffness(d: Draw) -> Law:
 
 
 # A belt that gives 3 deg at 1 N m is off its wheel.
-@effect(MOTORS, "rad/(N m)", 2e-3, 0.05, 5.0, ("linear", "stiffening"))
+@effect(MOTORS, "rad/(N m)", 2e-3, 0.05, 5.0, ("linear", "stiffening", "one_sided"))
 def drive_compliance(d: Draw) -> Law:
-    """Return a linear or a stiffening drive."""
+    """Return a linear drive, a stiffening one, or one of which a flank is worn."""
     axis = d.table.geometry.axes[DRIVEN[d.component]]
     if d.form == "stiffening":
         return StiffeningDrive(DRIVEN[d.component], axis, d.magnitude, 0.01)
+    if d.form == "one_sided":
+        lean = d.rng.choice((-1.0, 1.0)) * d.rng.uniform(0.2, 0.5)
+        softness = d.magnitude * (1.0 + lean), d.magnitude * (1.0 - lean)
+        return OneSidedDrive(DRIVEN[d.component], axis, softness)
     axes = d.table.mechanism.a1, d.table.mechanism.a2
     return MountSpring(d.component, drive_flexibility(d.component, axes, d.magnitude))
 

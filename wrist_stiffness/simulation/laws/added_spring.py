@@ -71,6 +71,38 @@ class StiffeningDrive(Bending):
 
 
 @dataclass(frozen=True)
+class OneSidedDrive(Bending):
+    """Gears of which one flank is worn: softer one way than the other.
+
+    Parameters
+    ----------
+    joint : str
+        Driven joint.
+    axis : (3,) float
+        Motor axis in F.
+    softness : (float, float)
+        Turn per torque, of torques above 0 and below [rad/(N m)].
+    """
+
+    joint: str
+    axis: Array
+    softness: tuple[float, float]
+
+    @property
+    def bends(self) -> str:
+        """The joint."""
+        return self.joint
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Turn by the softness of the flank that is loaded."""
+        column = np.concatenate([np.zeros(3), self.axis])
+        torque = wrench @ column
+        softness = np.where(torque > 0.0, *self.softness)
+        turn = (softness * torque)[:, None] * column
+        return turn, softness[:, None, None] * np.outer(column, column)
+
+
+@dataclass(frozen=True)
 class OuterSpring(Law):
     """A spring under both limbs (frame), or between platform and tool (platform).
 
