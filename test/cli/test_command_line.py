@@ -281,7 +281,7 @@ def test_an_existing_recording_is_named_before_the_work(secret, refused, tmp_pat
     path = tmp_path / "riddle.mcap"
     path.write_bytes(b"")
     monkeypatch.setattr(Scale, "__init__", lambda *given: pytest.fail("worked before it asked"))
-    assert "choose another name or remove it" in refused("simulate", "-o", str(path), *secret)
+    assert "choose another name, or --overwrite" in refused("simulate", "-o", str(path), *secret)
 
 
 @pytest.mark.parametrize("secret", [["--reveal", "7"], ["--effect", "backlash@motor_1"]])

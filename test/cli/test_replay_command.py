@@ -61,8 +61,12 @@ def test_output_may_be_one_file(recording):
 
 
 def test_existing_output_is_kept_unless_asked(recording, refused, capsys):
-    assert main(["replay", recording, "-o", "out.mcap"]) == 0
-    assert "out.mcap exists already" in refused("replay", recording, "-o", "out.mcap")
+    for output in ("out", "out.mcap"):
+        assert main(["replay", recording, "-o", output]) == 0
+        said = refused("replay", recording, "-o", output)
+        assert (
+            f"{output} exists already and is not overwritten; choose another name, or --ov" in said
+        )
     assert main(["replay", "out.mcap", "-o", "out.mcap", "--overwrite"]) == 0
     assert "outputs of an earlier run in the input left out" in capsys.readouterr().out
 

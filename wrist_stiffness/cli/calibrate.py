@@ -9,7 +9,6 @@ from wrist_stiffness.cli.options import (
     add_model,
     model_named,
     recordings_named,
-    require_new_model,
 )
 from wrist_stiffness.cli.output import say, this_run
 from wrist_stiffness.cli.parser import Commands, add_command
@@ -46,7 +45,6 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands.calibrate import calibrate_model
     from wrist_stiffness.report.fit_lines import calibration_lines
 
-    require_new_model(arguments)
     found = calibrate_model(
         model_named(arguments),
         recordings_named(arguments.fit, arguments),

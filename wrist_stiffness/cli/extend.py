@@ -10,7 +10,6 @@ from wrist_stiffness.cli.options import (
     add_model,
     model_named,
     recordings_named,
-    require_new_model,
 )
 from wrist_stiffness.cli.output import say, this_run
 from wrist_stiffness.cli.parser import Commands, add_command, named_numbers
@@ -70,7 +69,6 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands.extend import extend_model
     from wrist_stiffness.report.fit_lines import extension_lines
 
-    require_new_model(arguments)
     found = extend_model(
         model_named(arguments),
         _addition(arguments),

@@ -163,6 +163,7 @@ def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | 
         for option, begins in RESULTS.items():
             _require_place(getattr(arguments, option, None), option, begins)
         _require_places_apart(arguments)
+        _require_new(arguments)
         with cleaned_up_on_sigterm(), python_laws(arguments.allow_python_laws), bars_ended():
             code: int = arguments.run(arguments)
         for option in RESULTS:
@@ -235,6 +236,19 @@ def _require_places_apart(arguments: argparse.Namespace) -> None:
             raise InputError(
                 f"{path}: --{other} and --{option} name the same file; give each its own"
             )
+
+
+def _require_new(arguments: argparse.Namespace) -> None:
+    """Refuse to replace an output that nobody asked to replace, where `--overwrite` would do so."""
+    if getattr(arguments, "overwrite", True) or arguments.output is None:
+        return
+    from wrist_stiffness.recording.bag_folder import METADATA_FILE
+
+    output = Path(arguments.output)
+    if output.is_file() or (output / METADATA_FILE).is_file():
+        raise InputError(
+            f"{output} exists already and is not overwritten; choose another name, or --overwrite"
+        )
 
 
 def _refuse(reason: str) -> int:

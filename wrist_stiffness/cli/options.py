@@ -166,18 +166,3 @@ def add_fit(parser: OneLineParser) -> None:
     parser.add_argument("-o", "--output", required=True, metavar="MODEL2", help="file to write")
     parser.flag("--overwrite", "replace an existing MODEL2")
     add_sensor_names(parser)
-
-
-def require_new_model(arguments: argparse.Namespace) -> None:
-    """Refuse to replace a model that nobody asked to replace.
-
-    Raises
-    ------
-    InputError
-        If the output is there and `--overwrite` is not.
-    """
-    if Path(arguments.output).is_file() and not arguments.overwrite:
-        raise InputError(
-            f"{arguments.output} exists already and is not overwritten; choose another "
-            "name, or --overwrite"
-        )
