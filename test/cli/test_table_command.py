@@ -21,6 +21,7 @@ from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
 
 DEADLINE_S = 120.0
+PICTURES = "wrist_stiffness.report.table_pictures"
 
 CHECKS = {
     "file",
@@ -174,6 +175,21 @@ def test_pictures_show_something(small_table, tmp_path, capsys):
     for name in ("map_s.png", "map_phi.png"):
         assert coloured(seen[name]) > 0.3
     assert not np.array_equal(seen["map_s.png"], seen["map_phi.png"])
+
+
+def test_the_map_is_of_the_poses_that_are_summarised(small_table, tmp_path, monkeypatch):
+    drawn = []
+    for name in ("budget", "bent_wrist", "uncertainty"):
+        monkeypatch.setattr(f"{PICTURES}.draw_{name}", lambda *given: None)
+    monkeypatch.setattr(f"{PICTURES}.draw_map", lambda *given: drawn.append(given[1:3]))
+    table, path = small_table
+    summary = tmp_path / "maps.json"
+    assert main(["table", "show", str(path), "-o", str(tmp_path), "--json", str(summary)]) == 0
+    told = json.loads(summary.read_text())["operative"]
+    for name, (poses, values) in zip(("s_um", "phi_mdeg"), drawn, strict=True):
+        inside = values[table.workspace.operative(poses)]
+        assert told[name]["min"] == pytest.approx(inside.min(), rel=1e-9)
+        assert told[name]["mean"] == pytest.approx(inside.mean(), rel=1e-9)
 
 
 @pytest.mark.slow

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
 """The corners alone carry no plane to be judged inside; the splines' matrices grow with n^4."""
 
+FINE = 161
+"""Points along each motor angle where the rated load's map is summarised and drawn."""
+
 MICRO = 1e6
 MDEG = 1e3 * 180.0 / np.pi
 
@@ -174,7 +177,7 @@ def summarise(table: Table) -> MapSummary:
         In micrometres and millidegrees.
     """
     workspace = table.workspace
-    poses = workspace.grid(101)
+    poses = workspace.grid(FINE)
     values = table.map_spline(poses) * np.array([MICRO] * 4 + [MDEG])
     inside = values[workspace.operative(poses)]
     names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_mdeg"]

@@ -8,6 +8,7 @@ import numpy as np
 
 from wrist_stiffness.commands.budget import PER_AXIS, Push, budget
 from wrist_stiffness.commands.modes import ModeMap, modes_at
+from wrist_stiffness.commands.table import FINE, MDEG, MICRO
 from wrist_stiffness.commands.uncertainty import contributions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
@@ -17,12 +18,7 @@ from wrist_stiffness.report.pictures.budget import draw_budget
 from wrist_stiffness.report.pictures.joint_map import draw_map
 from wrist_stiffness.report.pictures.uncertainty import draw_uncertainty
 
-FINE = 161
-
 PICTURED_POSE = np.radians([25.0, -20.0])
-
-MICRO = 1e6
-MDEG = 1e3 * 180.0 / np.pi
 
 
 def picture_folder(folder: str | Path) -> Path:
