@@ -141,9 +141,10 @@ def process(fit: WristFit, ground: Background, rows: Array) -> Array:
         inexact=fit.point.inexact[seen],
         _beside={},
     )
-    found = evidence(point, replace(ground, groups=groups))
-    law = ground.optional[ground.group]
-    return np.asarray(ground.columns[:, law] @ found.unnamed[law])
+    found = evidence(point, Background(groups, ground.noise_width))
+    there = ground.part(found.background.numbers or range(len(groups)))
+    law = there.optional[there.group]
+    return np.asarray(there.columns[:, law] @ found.unnamed[law])
 
 
 def table(lines: Sequence[dict[str, Any]]) -> str:

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.identification import wrist_problem
 from wrist_stiffness.identification.extension import extend
+from wrist_stiffness.identification.proposal import twins
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.identification.wrist_problem import WristProblem
@@ -90,6 +91,32 @@ def test_a_wave_of_the_difference_of_the_angles_in_a_link_is_found_there(model, 
     assert law.shape[0] == pytest.approx(18.0, rel=0.05)
     assert law.value == pytest.approx(40.0, abs=4.0 * law.sigma)
     assert found.places["link_3"] > 0.9
+
+
+def test_a_dent_in_a_passive_joint_is_found_at_its_angle(model, day):
+    text = "lift_um * exp(-((turn_3 - 0.1) ** 2) / 0.005)"
+    session = planted(model, day, "joint_3", [0, 0.8, 0.6, 0, 0, 0], text, lift_um=20.0)
+    found = proposed(model, session)
+    law = found.terms[0]
+    assert law.form.name == "a spot of turn_3"
+    assert "joint_3" in (law.component, *twins(law.component))
+    assert law.shape == pytest.approx((0.1, 0.05), abs=0.02)
+    assert "deg of joint_3" in law.sentence
+
+
+def test_what_pulls_at_the_platform_is_a_wrench_that_the_sensor_does_not_say(model, day):
+    # A small one: under newtons flanges close, and slopes tell little.
+    text = "pull_N * sin(14 * theta_1)"
+    session = planted(model, day, "load_sensor", [0, 0.6, 0.8, 0, 0, 0], text, pull_N=0.4)
+    found = proposed(model, session)
+    law = found.terms[0]
+    assert law.component == "load_sensor"
+    assert law.key == "size_N"
+    assert law.value * law.direction[:3] == pytest.approx([0.0, 0.24, 0.32], abs=0.1)
+    assert law.form.name == "a wave of theta_1"
+    assert "at load_sensor or whatever pulls at the platform" in law.sentence
+    added = extend(model, law.effect("pull"), [session])
+    assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
 
 
 def test_beside_an_effect_that_is_named_a_law_is_proposed_for_the_rest(model, day, monkeypatch):

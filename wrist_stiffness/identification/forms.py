@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula import Formula, Past
-from wrist_stiffness.model.formula_law import TEMPERATURE
+from wrist_stiffness.model.formula_law import TEMPERATURE, TURNS
 
 Shape = tuple[float, ...]
 
@@ -24,6 +24,9 @@ MOMENTS = 24
 
 CENTRES, WIDTHS = 5, (0.15, 0.3)
 """Centres of zones along each angle, and widths of zones in the range of the angles."""
+
+SPOTS, WIDTHS_OF_SPOTS = 12, (0.04, 0.1)
+"""Places and widths of a bump along one angle, the widths in its range."""
 
 SLACKS = (0.05, 0.2, 0.5)
 """Slacks of play that are tried, in half ranges of the signal."""
@@ -117,7 +120,7 @@ def unit_of(name: str) -> str:
     """Return the unit of a signal, `1` where its name does not say."""
     if name in ("theta_dot_1", "theta_dot_2"):
         return "rad/s"
-    if name.startswith("theta") or "theta" in name:
+    if "theta" in name or name in TURNS:
         return "rad"
     if name.startswith("W_"):
         return "N" if name[2] == "f" else "N m"
@@ -138,16 +141,17 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
     length = max(float(np.ptp(own["time"])) for own in signals)
     late = Span(tuple(np.geomspace(1.0, max(0.5 * length, 4.0), LATE)), positive=True)
     moving = [name for name, own in pooled.items() if name != "time" and _moves(own)]
-    others = [name for name in moving if not name.startswith("theta_") or "dot" in name]
-    angles = [name for name in moving if name not in others]
+    motors = [name for name in moving if name in ("theta_1", "theta_2")]
+    angles = [name for name in moving if name in (*motors, *TURNS)]
+    others = [name for name in moving if name not in angles]
     found = [each for name in others for each in _of_signal(name, pooled[name], late)]
     found += [each for name in angles for each in _of_angle(name, pooled[name], late)]
-    if len(angles) == 2:
-        one, two = (pooled[name] for name in angles)
+    if len(motors) == 2:
+        one, two = (pooled[name] for name in motors)
         found += [_wave("(theta_1 - theta_2)", one - two), _wave("(theta_1 + theta_2)", one + two)]
         found.append(_zone(one, two))
     found += _of_time(pooled["time"], length)
-    slow = [name for name in moving if "dot" not in name]
+    slow = [name for name in moving if "dot" not in name and name not in TURNS]
     found += [_together(*pair, pooled) for pair in combinations(slow, 2)]
     return found
 
@@ -213,10 +217,11 @@ def _zeroed(name: str, values: Array) -> str:
 
 
 def _of_angle(name: str, values: Array, late: Span) -> list[Form]:
-    half, motor = _half_range(values), f"motor {name[-1]}"
+    half, motor = _half_range(values), TURNS.get(name, f"motor {name[-1]}")
     slack = Span(tuple(half * each for each in (0.01, 0.05, 0.2)), positive=True)
     return [
         _wave(name, values),
+        _spot(name, values),
         Form("hysteresis", (name,), (slack,), lambda s: f"({name} - play({name}, {number(s[0])}))",
              lambda s: f"for every rad since {motor} turned back, {number(s[0])} rad at most",
              f"every pose from both sides of {motor}"),
@@ -232,7 +237,7 @@ def _wave(x: str, values: Array) -> Form:
     rates = Span(tuple(2.0 * np.pi * waves / whole for waves in WAVES))
     names = {"(theta_1 - theta_2)": "the difference of the motor angles"}
     names["(theta_1 + theta_2)"] = "the sum of the motor angles"
-    told = names.get(x, f"the angle of motor {x[-1]}")
+    told = names.get(x, f"the angle of {TURNS.get(x, f'motor {x[-1]}')}")
     return Form(
         "a wave",
         (x.strip("()"),),
@@ -240,6 +245,21 @@ def _wave(x: str, values: Array) -> Form:
         lambda s: f"sin({number(s[0])} * {x} + {number(s[1])})",
         lambda s: f"as a wave of {number(360.0 / s[0])} deg in {told}",
         f"{told} in steps far below the wave",
+    )
+
+
+def _spot(name: str, values: Array) -> Form:
+    """Return a bump at one place of an angle: of a tooth, a ball, a dent in a bore."""
+    low, high = np.percentile(values, (5.0, 95.0))
+    widths = tuple(2.0 * _half_range(values) * each for each in WIDTHS_OF_SPOTS)
+    of = TURNS.get(name, f"motor {name[-1]}")
+    return Form(
+        "a spot",
+        (name,),
+        (Span(tuple(np.linspace(low, high, SPOTS))), Span(widths, positive=True)),
+        lambda s: f"exp(-{_beyond(name, s[0])} ** 2 / {number(2.0 * s[1] ** 2)})",
+        lambda s: f"about {np.rad2deg(s[0]):.1f} deg of {of}, {np.rad2deg(s[1]):.2g} deg wide",
+        f"the angle of {of} in steps far below the width",
     )
 
 

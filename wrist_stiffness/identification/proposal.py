@@ -13,21 +13,23 @@ from wrist_stiffness.identification.forms import EVERYWHERE, Form, Shape
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import names_in
-from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
-from wrist_stiffness.model.parameters import Estimate, si_factor
+from wrist_stiffness.model.formula_law import LOAD_SENSOR, SIGNALS, FormulaLaw
+from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.places import BODY, LIMB
 
 SAME: dict[str, tuple[str, ...]] = {
     "frame": ("the stand of the instrument",),
     "platform": ("the target on it",),
+    LOAD_SENSOR: ("whatever pulls at the platform",),
 }
-"""What moves the reading exactly as a screw at a component does, and is none of the wrist."""
+"""What does exactly the same and is none of the wrist."""
 
 
 def twins(component: str) -> tuple[str, ...]:
     """Return where else the very same screw may sit: no recording can tell."""
-    seat = LIMB[component], BODY[component]
-    others = (name for name in LIMB if (LIMB[name], BODY[name]) == seat and name != component)
+    seats = {name: (LIMB[name], BODY[name]) for name in LIMB}
+    seat = seats.pop(component, None)
+    others = (name for name, own in seats.items() if own == seat)
     return (*others, *SAME.get(component, ()))
 
 
@@ -48,7 +50,7 @@ class Proposal:
     value, sigma : float
         Size and its standard uncertainty, in the unit of `key`.
     key : str
-        `size_um` or `size_mdeg`.
+        `size_um` or `size_mdeg`; of a wrench `size_N` or `size_Nmm`.
     probability : float
         That it is the one, among all that were asked and none of them.
     log_gain : float
@@ -211,8 +213,3 @@ class Proposals:
             "tells_apart": self.tells_apart,
             "asked": self.asked,
         }
-
-
-def in_units(key: str, value: float) -> float:
-    """Return a value [m, rad] in the unit of a parameter's name."""
-    return value / si_factor(key)

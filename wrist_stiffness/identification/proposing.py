@@ -17,7 +17,7 @@ from scipy.special import gammaln, logsumexp
 
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.identification.forms import Form, Shape, Span, evaluated, forms
-from wrist_stiffness.identification.proposal import Proposal, Proposals, in_units
+from wrist_stiffness.identification.proposal import Proposal, Proposals, twins
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import MEMBER, NAMING
@@ -25,23 +25,33 @@ from wrist_stiffness.inference.evidence import TAIL, Evidence, evidence
 from wrist_stiffness.inference.point import OUTSIDE
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.formula_law import MOTION, TEMPERATURE, WRENCH, FormulaLaw
-from wrist_stiffness.model.parameters import si_factor
+from wrist_stiffness.model.formula_law import (
+    LOAD_SENSOR,
+    MOTION,
+    TEMPERATURE,
+    TURNS,
+    WRENCH,
+    FormulaLaw,
+)
 from wrist_stiffness.model.places import BODY, LIMB
 from wrist_stiffness.sessions.unit_session import UnitSession
 
-PLACES = tuple({(LIMB[name], BODY[name]): name for name in reversed(LIMB)}.values())[::-1]
-"""One component of each set in which a screw does the very same."""
+PLACES = (
+    *tuple({(LIMB[name], BODY[name]): name for name in reversed(LIMB)}.values())[::-1],
+    LOAD_SENSOR,
+)
+"""One component of each set in which a screw does the very same, and the load sensor."""
 
-USUAL_UM, USUAL_MDEG = 5.0, 20.0
-"""Usual size of a law over a recording, standard deviation (assumed): that of a gap in a fit, and
-of a gear's play."""
+USUAL = {"size_um": 5.0, "size_mdeg": 20.0, "size_N": 0.1, "size_Nmm": 2.0}
+"""Usual size of a law over a recording, standard deviation (assumed): that of a gap in a fit, of a
+gear's play, and of what a load sensor reads without load."""
 
 DIRECTIONS = ((0,), (1,), (2,), (3,), (4,), (5,), (0, 1, 2), (3, 4, 5))
 """Coordinates of the screw that are free: one axis, or any direction of a shift or of a turn."""
 
-LEADERS, OF_ONE_FORM = 12, 3
-"""Laws that are judged by their evidence, and how many of them may share a form."""
+LEADERS, OF_ONE_FORM, AT_ONE_PLACE = 12, 4, 2
+"""Forms at a place that are judged by their evidence, at how many places one form, and in how many
+directions there.  While all that is left counts as noise, slopes rank places only roughly."""
 
 MOST_TERMS = 2
 
@@ -160,11 +170,11 @@ def _proposal(found: _Judged, chance: float, before: Evidence) -> Proposal:
     spread = float(np.sqrt(own @ state.covariance[np.ix_(at, at)] @ own))
     direction = np.zeros(6)
     direction[list(law.free)] = own
-    key = _key(law.free)
+    key = _key(PLACES[law.place], law.free)
     had, left = (each.without_discrepancy().square for each in (before, state))
     # With everything that follows no law taken for noise.
     explains = (had - left) / max(had - state.point.count * state.excess, had - left)
-    size = in_units(key, _usual(law.free) / found.size)
+    size = USUAL[key] / found.size
     return Proposal(
         law.form,
         law.shape,
@@ -180,14 +190,16 @@ def _proposal(found: _Judged, chance: float, before: Evidence) -> Proposal:
     )
 
 
-def _key(free: Sequence[int]) -> str:
+def _key(place: str, free: Sequence[int]) -> str:
+    if place == LOAD_SENSOR:
+        return "size_N" if free[0] < 3 else "size_Nmm"
     return "size_um" if free[0] < 3 else "size_mdeg"
 
 
-def _usual(free: Sequence[int]) -> float:
-    """Return the typical magnitude of a screw [m] or [rad]."""
-    usual = USUAL_UM if free[0] < 3 else USUAL_MDEG
-    return usual * si_factor(_key(free))
+def _may_be_at(form: Form) -> list[bool]:
+    """Return at which places a form is asked: what hangs on a passive joint's turn is in it."""
+    joints = [TURNS[name] for name in form.of if name in TURNS]
+    return [not joints or joints[0] in (name, *twins(name)) for name in PLACES]
 
 
 class _Library:
@@ -217,9 +229,14 @@ class _Library:
                     among.append(len(shapes))
         self._rows = np.array(rows).reshape(len(rows), -1)
         self._among = np.log(among)
-        kinds = len({form for form, _ in self._points})
-        self._price = float(np.log(OUTSIDE / max(kinds * len(PLACES), 1)))
-        self.count = len(rows) * len(PLACES) * len(DIRECTIONS)
+        self._asked = np.array([_may_be_at(form) for form, _ in self._points]).reshape(
+            -1, len(PLACES)
+        )
+        kinds = {
+            form: int(at.sum()) for (form, _), at in zip(self._points, self._asked, strict=True)
+        }
+        self._price = float(np.log(OUTSIDE / max(sum(kinds.values()), 1)))
+        self.count = int(self._asked.sum()) * len(DIRECTIONS)
 
     def _row(self, form: Form, shape: Shape) -> Array | None:
         """Return a form on the units of the table, (u,); None where it never changes."""
@@ -237,8 +254,9 @@ class _Library:
         trials = []
         for name in PLACES:
             for axis in range(6):
-                law = FormulaLaw("unit", name, np.eye(6)[axis], "size", (), ("size",))
-                trials.append((law, name, {"size": _usual((axis,))}))
+                key = _key(name, (axis,))
+                law = FormulaLaw("unit", name, np.eye(6)[axis], key, (), (key,))
+                trials.append((law, name, {key: USUAL[key]}))
         changes = problem.about(self._fit).changes(trials)
         return changes.reshape(len(PLACES), 6, *changes.shape[1:])
 
@@ -258,17 +276,22 @@ class _Library:
                 gains, z = beyond.gains(self._rows, place, free)
                 gains = gains - np.log(2.0 * (6.0 if len(free) == 1 else 2.0))
                 gains = gains - self._among
-                for n, (form, shape) in enumerate(self._points):
-                    gain = float(gains[n])
+                for n in np.flatnonzero(self._asked[:, place]).tolist():
+                    (form, shape), gain = self._points[n], float(gains[n])
                     key = id(form), place, number
                     if key not in best or best[key].gain < gain:
                         best[key] = _Asked(form, place, free, shape, gain, z[n])
         chosen: list[_Asked] = []
+        seats: set[tuple[int, int]] = set()
         for each in sorted(best.values(), key=lambda own: -own.gain):
-            if sum(own.form is each.form for own in chosen) < OF_ONE_FORM:
-                chosen.append(each)
-            if len(chosen) == LEADERS:
+            here, seat = id(each.form), (id(each.form), each.place)
+            if seat not in seats and sum(form == here for form, _ in seats) == OF_ONE_FORM:
+                continue
+            if seat not in seats and len(seats) == LEADERS:
                 break
+            seats.add(seat)
+            if sum((id(own.form), own.place) == seat for own in chosen) < AT_ONE_PLACE:
+                chosen.append(each)
         return chosen
 
     def _refined(self, law: _Asked, beyond: _Beyond) -> tuple[_Asked, float]:
@@ -396,12 +419,14 @@ def signals_of(model: ErrorModel, session: UnitSession) -> dict[str, Array]:
     """Return what a formula may use, at the kept moments of a session, (k,) each."""
     block = session.block
     load = block.load
+    pose, axes = model.table.mechanism.forward(block.theta), model.table.geometry.axes
     if block.load_on_platform:
-        turned = model.table.mechanism.platform_rotation(block.theta)
-        load = (load.reshape(-1, 2, 3) @ np.swapaxes(turned, -1, -2)).reshape(-1, 6)
+        turned = np.swapaxes(pose.platform, -1, -2)
+        load = (load.reshape(-1, 2, 3) @ turned).reshape(-1, 6)
     speed = np.zeros_like(block.theta) if block.theta_dot is None else block.theta_dot
     found: dict[str, Array] = {"time": block.time}
     found |= dict(zip(MOTION, np.concatenate([block.theta, speed], axis=1).T, strict=True))
+    found |= {name: pose.turn(joint, axes[joint]) for name, joint in TURNS.items()}
     found |= {f"W_{name}": each for name, each in zip(WRENCH, load.T, strict=True)}
     found |= {f"{TEMPERATURE}{name}": each for name, each in block.temperatures.items()}
     return found | dict(block.covariates)

@@ -13,6 +13,11 @@ BODIES = ("frame", "link_1", "link_2", "platform", "link_3")
 """Rigid bodies, in the order of `Configuration.bodies`."""
 
 
+TURNING = {"joint_2": ("link_1", "platform"), "joint_3": ("link_3", "platform")}
+TURNING["joint_4"] = ("link_2", "link_3")
+"""Body on the motor side and on the platform side of each passive joint."""
+
+
 @dataclass(frozen=True)
 class Configuration:
     """The wrist at given motor angles, rigid, origin at O, everything in F.
@@ -81,6 +86,28 @@ class Configuration:
     def platform(self) -> Array:
         """Rotation U -> F of the rigid platform, (..., 3, 3)."""
         return self.bodies[..., 3, :, :]
+
+    def turn(self, joint: str, axis: Array) -> Array:
+        """Turn of a passive joint from home, platform side against motor side, (...) [rad].
+
+        Parameters
+        ----------
+        joint : str
+            One of `TURNING`.
+        axis : (3,) float
+            Of the joint at home.
+        """
+        before, after = (self.rotations[body] for body in TURNING[joint])
+        relative = np.swapaxes(before, -1, -2) @ after
+        vee = np.stack(
+            [
+                relative[..., 2, 1] - relative[..., 1, 2],
+                relative[..., 0, 2] - relative[..., 2, 0],
+                relative[..., 1, 0] - relative[..., 0, 1],
+            ],
+            axis=-1,
+        )
+        return np.asarray(np.arctan2(vee @ axis, np.trace(relative, axis1=-2, axis2=-1) - 1.0))
 
 
 _SHAPES: dict[str, tuple[int, ...]] = {

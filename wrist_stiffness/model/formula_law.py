@@ -16,12 +16,14 @@ from wrist_stiffness.model.places import LIMB
 from wrist_stiffness.model.situation import Situation
 
 MOTION = ("theta_1", "theta_2", "theta_dot_1", "theta_dot_2")
+TURNS = {"turn_2": "joint_2", "turn_3": "joint_3", "turn_4": "joint_4"}
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 TEMPERATURE = "T_"
 
 SIGNALS = frozenset(
     {
         *MOTION,
+        *TURNS,
         *WRENCH,
         *(f"W_{axis}" for axis in WRENCH),
         "time",
@@ -30,9 +32,17 @@ SIGNALS = frozenset(
 )
 """What every formula may use."""
 
+LOAD_SENSOR = "load_sensor"
+"""Component at which a formula is no screw but a wrench that the load sensor does not say."""
+
+FORMULA_PLACES = (*LIMB, LOAD_SENSOR)
+"""Components of a formula."""
+
 
 class FormulaLaw(Law):
     """A screw along a fixed direction of the component's body, as large as a formula says.
+
+    At the load sensor it is a wrench in F on the platform, beyond what the sensor says [N, N m].
 
     Parameters
     ----------
@@ -43,7 +53,8 @@ class FormulaLaw(Law):
     direction : (6,) float
         (translation; rotation) at O in the component's home frame for a value of 1 [m, rad].
     expression : str
-        In `theta_1`, `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `fx` ... `mz` (wrench
+        In `theta_1`, `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `turn_2` ... `turn_4`
+        (turns of the passive joints from home [rad]), `fx` ... `mz` (wrench
         through the component at O in its home frame [N, N m]), `W_fx` ... `W_mz` (wrench on the
         platform at O in F), `T_<component>` [degC], `time` [s], the covariates and the parameters.
     covariates : sequence of str
@@ -58,7 +69,6 @@ class FormulaLaw(Law):
         numbers or zero, a name is no name or used twice, or the expression is not allowed.
     """
 
-    stage = "reaction"
     check = "what the formula's author has in mind"
     excited_by = "a wide range of what the formula depends on"
 
@@ -72,13 +82,15 @@ class FormulaLaw(Law):
         keys: Sequence[str],
     ) -> None:
         require_id(name)
-        if place not in LIMB:
-            raise InputError(f"{name}: component {place!r} is not one of {', '.join(LIMB)}")
+        if place not in FORMULA_PLACES:
+            known = ", ".join(FORMULA_PLACES)
+            raise InputError(f"{name}: component {place!r} is not one of {known}")
         if direction.shape != (6,) or not np.isfinite(direction).all() or not direction.any():
             raise InputError(
                 f"{name}: direction {direction.tolist()} is not six finite numbers, one not zero"
             )
         self.id = name
+        self.stage = "load" if place == LOAD_SENSOR else "reaction"
         self.places = (place,)
         self.sentence = f"{{place}}: {expression}"
         self.direction = direction
@@ -120,7 +132,9 @@ class FormulaLaw(Law):
             per_si = {key: 1.0 / si_factor(key) for key in self._keys}
             told = f"{self.id}: {self.formula.undefined(there, per_si)}"
             raise UndefinedFormulaError(told, float(at.block.time[row]))
-        return at.screw(place, np.outer(size, self.direction)), past.states or None
+        screws = np.outer(size, self.direction)
+        load = self.stage == "load"
+        return Contribution(wrench=screws) if load else at.screw(place, screws), past.states or None
 
     def _signal(
         self, at: Situation, place: str, name: str, values: Mapping[str, float]
@@ -134,8 +148,11 @@ class FormulaLaw(Law):
         if name.startswith(TEMPERATURE):
             reference = at.table.geometry.reference_temperature
             return at.temperature(name.removeprefix(TEMPERATURE)) + reference
+        if name in TURNS:
+            joint = TURNS[name]
+            return at.configuration.turn(joint, at.table.geometry.axes[joint])
         if name in MOTION:
             return np.concatenate([at.block.theta, at.speed], axis=1)[:, MOTION.index(name)]
-        if name.startswith("W_"):
+        if name.startswith("W_") or self.stage == "load":
             return at.wrench[:, WRENCH.index(name.removeprefix("W_"))]
         return at.at_home(place, at.through_place(place))[:, WRENCH.index(name)]

@@ -23,10 +23,6 @@ from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError, together
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
-_TURNING = {"joint_2": ("link_1", "platform"), "joint_3": ("link_3", "platform")}
-_TURNING["joint_4"] = ("link_2", "link_3")
-"""Body on the motor side and on the platform side of each passive joint."""
-
 
 @dataclass(frozen=True)
 class Situation:
@@ -260,20 +256,7 @@ class Situation:
 
     def turn(self, joint: str) -> Array:
         """Turn of a passive joint from home, platform side against motor side, (n,) [rad]."""
-        before, after = (
-            self.configuration.bodies[..., BODIES.index(body), :, :] for body in _TURNING[joint]
-        )
-        relative = np.swapaxes(before, -1, -2) @ after
-        axis = self.table.geometry.axes[joint]
-        vee = np.stack(
-            [
-                relative[..., 2, 1] - relative[..., 1, 2],
-                relative[..., 0, 2] - relative[..., 2, 0],
-                relative[..., 1, 0] - relative[..., 0, 1],
-            ],
-            axis=-1,
-        )
-        return np.arctan2(vee @ axis, np.trace(relative, axis1=-2, axis2=-1) - 1.0)
+        return self.configuration.turn(joint, self.table.geometry.axes[joint])
 
     def carried(self, added: Contribution) -> tuple[Array, Array]:
         """Carry a contribution to the platform and to the flange gaps, with slides free.

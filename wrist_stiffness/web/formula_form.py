@@ -6,8 +6,7 @@ from nicegui import ui
 
 from wrist_stiffness.commands.extend import FormulaEffect, direction_of
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.formula_law import SIGNALS
-from wrist_stiffness.model.places import LIMB
+from wrist_stiffness.model.formula_law import FORMULA_PLACES, SIGNALS
 from wrist_stiffness.web.bench import Offer
 from wrist_stiffness.web.tab import Tab
 
@@ -27,7 +26,8 @@ class FormulaForm:
         with ui.expansion("An effect of your own, by formula").classes("w-full") as self._form:
             self._name = ui.input("name", value="own_effect").props(props)
             self._formula = ui.input("formula", placeholder="lift_um * clamp_bar").props(props)
-            self._place = ui.select(list(LIMB), value="frame", label="at which part").props(props)
+            places = list(FORMULA_PLACES)
+            self._place = ui.select(places, value="frame", label="at which part").props(props)
             self._way = ui.input("direction", value="along +z").props(props)
             self._said = ui.label("").classes("text-xs")
             self._look = ui.button("See what it would explain", on_click=self._looked)
