@@ -107,3 +107,17 @@ def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size)
     assert gain == pytest.approx(exact, abs=0.1)
     first_order = Evidence(without, mute, one, 1.0).gains([-column])[0][0]
     assert first_order == pytest.approx(exact, abs=0.1)
+
+
+def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
+    point, ground = linear(rng, {"a": np.arange(1)}, columns=1, z=[9.0])
+    varied = 9.0 * point.columns * rng.normal(size=(ROWS, 2))
+    rests = [
+        Evidence(replace(point, varied={"a": (share, varied)}), ground, np.full(2, 0.5), 0.1).rest(
+            "a"
+        )
+        for share in (0.0, 0.05, 10.0)
+    ]
+    assert rests[0] > 0.05**2
+    assert rests[1] == pytest.approx(rests[0] - 0.05**2)
+    assert rests[2] == 0.0

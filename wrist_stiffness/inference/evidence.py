@@ -308,7 +308,7 @@ class Evidence:
         """Return how much of an effect is left in its own shape, 0 where its law is right.
 
         Sum of squares above the noise that the same effect, its size changing with the conditions,
-        would still explain, over that of the effect itself.
+        would still explain, over that of the effect itself; less what its law may be wrong by.
 
         Parameters
         ----------
@@ -320,11 +320,12 @@ class Evidence:
         count = len(point.z) + len(point.gives)
         named = point.left + point.columns @ self.step
         named += point.inexact[:, : len(point.gives)] @ self._solved[2][len(point.z) : count]
-        basis, sizes, _ = np.linalg.svd(point.varied[name], full_matrices=False)
+        share, varied = point.varied[name]
+        basis, sizes, _ = np.linalg.svd(varied, full_matrices=False)
         basis = basis[:, sizes > 1e-6 * sizes[0]] if len(sizes) else basis
         noise = self.excess * basis.shape[1]
         left = max(float(np.sum((basis.T @ named) ** 2)) - noise, 0.0)
-        return left / max(float(own @ own), 1e-300)
+        return max(left / max(float(own @ own), 1e-300) - share**2, 0.0)
 
     def without_discrepancy(self) -> Evidence:
         """Return the set as if all that it leaves were noise."""

@@ -94,7 +94,10 @@ class LinearFit:
             table.inexact(self.change(name), term.candidate.inexactness)
             for name, term in self.terms.items()
         ]
-        varied = {name: table.inexact(self.change(name), 1.0) for name in self.terms}
+        varied = {
+            name: (term.candidate.inexactness, table.inexact(self.change(name), 1.0))
+            for name, term in self.terms.items()
+        }
         bent = [problem.tangents(self, name) for name in self.terms]
         free = np.concatenate([np.zeros((len(columns), 0)), *bent], axis=1)
         p = columns.shape[1]
