@@ -112,6 +112,7 @@ def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size)
 def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
     point, ground = linear(rng, {"a": np.arange(1)}, columns=1, z=[9.0])
     varied = 9.0 * point.columns * rng.normal(size=(ROWS, 2))
+    point = replace(point, left=point.left + 3.0 * varied[:, 0])
     rests = [
         Evidence(replace(point, varied={"a": (share, varied)}), ground, np.full(2, 0.5), 0.1).rest(
             "a"
