@@ -52,8 +52,8 @@ FIRST_SEED = 7001
 
 STRETCHES = 12
 
-SENSOR = ("frame", "platform")
-"""Where a law of the instrument shows, as its stand or its target."""
+RIGHT = {"pose_sensor": ("frame", "platform"), "cable_stop": ("load_sensor",)}
+"""Where a law of the instrument shows, as its stand or its target; and a pull at the platform."""
 
 
 def cases(sizes: Sequence[float], sound: int) -> list[Case]:
@@ -90,8 +90,8 @@ def answer(case: Case) -> dict[str, Any]:
     line["forms"] = [each.form.name for each in found.terms]
     line["components"] = [each.component for each in found.terms]
     if case.effects:
-        place = case.effects[0][1]
-        right = SENSOR if place == "pose_sensor" else (place, *twins(place))
+        effect, place, _ = case.effects[0]
+        right = RIGHT.get(effect) or RIGHT.get(place) or (place, *twins(place))
         line["right_component"] = any(each.component in right for each in found.terms)
         line["among_components"] = any(name in right for name in found.places)
         both = WristProblem(model, (whole,))
