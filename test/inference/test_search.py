@@ -201,3 +201,23 @@ def test_whole_fits_of_one_law_reach_alike_beyond_their_first_order(rng, law, cr
     known = {name for names in search.states for name in names if "else" not in name}
     assert known == ({first, true} if law == "law" else {first})
     assert search.best.names == {true if law == "law" else first}
+
+
+def test_of_walls_slopes_tell_nothing_so_the_law_that_leads_is_asked_everywhere(rng):
+    cause = rng.normal(size=ROWS)
+
+    class Walled(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            self.left = 6.0 * cause + rng.normal(size=ROWS)
+            shares = {"play@first": (0.7, 0.8), "play@true": (0.0, 1.0)}
+            shares |= {f"else_{number}@place": (0.5, 0.5) for number in range(2 * LEADERS)}
+            for name, of in shares.items():
+                noise = rng.normal(size=ROWS)
+                slope, whole = (s * cause + np.sqrt(1.0 - s**2) * noise for s in of)
+                self.slopes[name], self.whole[name] = slope[:, None], whole[:, None]
+            self.slopes = {name: self.slopes[name] for name in shares}
+
+    search = Search(Walled(rng), most_effects=1)
+    search.run()
+    assert search.best.names == {"play@true"}

@@ -281,7 +281,8 @@ class Search:
                 name, law = each.trial.name, each.trial.law
                 logs[name] = log
                 # Whole fits may reach further than their first order, those of a law most alike.
-                further = max([UNLIKE * reach.get(law, 0.0), *reach.values()])
+                known = [each for each in reach.values() if each < np.inf]
+                further = max([UNLIKE * reach.get(law, 0.0), *known])
                 if log + further < best - NEGLIGIBLE:
                     continue
                 if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
@@ -299,8 +300,8 @@ class Search:
                 found.append(self._known(fit, state))
                 logs[name] = found[-1].evidence.log
                 best = max(best, logs[name])
-                if log < np.inf:
-                    reach[law] = max(reach.get(law, 0.0), logs[name] - log)
+                further = logs[name] - log if log < np.inf else np.inf
+                reach[law] = max(reach.get(law, 0.0), further)
 
         ask(leaders)
         if all(each.rough for each in found):
@@ -309,7 +310,7 @@ class Search:
             leading = max(found, key=lambda each: each.evidence.log)
             (name,) = leading.names - state.names
             law = name.partition("@")[0]
-            # Where first orders tell, the leaders hold what comes near.
+            # Where first orders tell, the leaders hold what comes near; of walls they tell nothing.
             if reach.get(law, 0.0) > NEGLIGIBLE:
                 ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
         return found
