@@ -80,6 +80,16 @@ def test_a_drive_that_is_softer_one_way_is_named_and_its_law_gives(model, in_the
 
 
 @pytest.mark.slow
+def test_play_and_lost_motion_together_are_both_named(model, in_the_cell):
+    """The first one found takes most of the error or most of the evidence; the search goes on."""
+    play = HiddenEffect("joint_clearance", "joint_3", "algebraic", 8e-7, 5)
+    lost = replace(BACKLASH, magnitude=1.2e-3)
+    found = diagnose_sessions(model, [measured(in_the_cell, model, (play, lost))]).diagnosis
+    names = {each.name for each in found.findings}
+    assert names == {"joint_clearance@joint_3", "backlash@motor_1"}
+
+
+@pytest.mark.slow
 def test_every_candidate_stands_somewhere_and_says_why(worn):
     _, found = worn
     standings = {each.name: each for each in found.diagnosis.standings}

@@ -122,3 +122,16 @@ def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
     assert rests[0] > 0.05**2
     assert rests[1] == pytest.approx(rests[0] - 0.05**2)
     assert rests[2] == 0.0
+
+
+def test_what_is_attainable_is_the_evidence_of_noise_alone(rng):
+    point, ground = linear(rng, columns=2)
+    drift = ground.part(ground.always)
+    everything = np.hstack([point.columns, point.inexact, drift.columns])
+    noise = rng.normal(size=ROWS)
+    noise -= everything @ np.linalg.lstsq(everything, noise, rcond=None)[0]
+    alone = replace(point, left=noise * np.sqrt(ROWS) / np.linalg.norm(noise), _beside={})
+    best = Evidence(alone, drift, np.array([0.5]), 1.0)
+    assert best.attainable == pytest.approx(best.log, abs=1e-9)
+    at = Evidence(replace(point, left=20.0 * point.left, _beside={}), ground, np.full(2, 3.0), 2.0)
+    assert at.attainable == pytest.approx(best.log, abs=1e-9)

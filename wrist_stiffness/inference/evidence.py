@@ -147,6 +147,15 @@ class Evidence:
         log += ground.log_odds * np.count_nonzero(ground.optional & (self.amplitude > OFF))
         return float(log)
 
+    @cached_property
+    def attainable(self) -> float:
+        """Log evidence if the set left noise alone, beside drift as it is known."""
+        usual = _usual(self.point, self.background.whole or self.background)
+        precision, offset, _ = usual._priors
+        _, _, step, slope = usual._solved
+        cost = usual._known[2] + float(precision @ offset**2 + slope @ step)
+        return usual.log + 0.5 * (cost - self.point.count)
+
     def cost(self, point: Point) -> float:
         """Return minus twice the log posterior of a point, up to what all points share.
 

@@ -26,8 +26,8 @@ NEGLIGIBLE = 3.0
 
 MOST_EFFECTS = 3
 """Effects of a set: more are hardly told apart in one recording.  If all of n more are in the
-catalogue, the largest explains an nth of what is left; where the best candidate explains less, the
-search does not go on beside it."""
+catalogue, the largest takes an nth of the error or brings an nth of the log evidence that is to be had; where
+the best candidate does neither, the search does not go on beside it."""
 
 UNLIKE = 2.0
 """Times by which a whole fit may reach further beyond its first order than another one of its law.
@@ -251,10 +251,14 @@ class Search:
             # Those that cannot be told apart share what one of them would gain.
             if np.logaddexp.reduce([each.log for each in found]) <= state.log:
                 break
-            more = self._most - len(state.names)
-            fell = best.evidence.unexplained < (1.0 - 1.0 / more) * state.evidence.unexplained
+            gain, more = best.evidence.log - state.evidence.log, self._most - len(state.names)
+            fell = state.evidence.unexplained - best.evidence.unexplained
+            enough = (
+                more * gain > state.evidence.attainable - state.evidence.log
+                or more * fell > state.evidence.unexplained
+            )
             state = best
-            if self._costly and not (fell and best.rough):
+            if self._costly and not (enough and best.rough):
                 break
         return self.best
 
