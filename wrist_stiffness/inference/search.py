@@ -26,8 +26,8 @@ NEGLIGIBLE = 3.0
 
 MOST_EFFECTS = 3
 """Effects of a set: more are hardly told apart in one recording.  If all of n more are in the
-catalogue, the largest takes an nth of the error or brings an nth of the log evidence that is to be had; where
-the best candidate does neither, the search does not go on beside it."""
+catalogue, the largest takes an nth of the error, or brings an nth of the log evidence that is to be
+had; where the best candidate does neither, the search does not go on beside it."""
 
 UNLIKE = 2.0
 """Times by which a whole fit may reach further beyond its first order than another one of its law.
