@@ -120,6 +120,19 @@ def test_positions_in_metres_are_told_of_a_wrist_that_was_never_calibrated(model
     assert "with positions times 1000" in told(model, metres)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_positions_in_metres_are_told_of_a_tracker_on_a_wrist_within_its_tolerances(
+    model, in_the_cell, seed
+):
+    """Other tolerances may make half or twice the load fit a little better."""
+    settings = CellSettings(
+        rate_hz=20.0, program_seconds=60.0, instrument="tracker", base="wrong", base_seed=seed
+    )
+    measured = in_the_cell(model.table, settings, 3)
+    metres = replace(measured, shift=1e-3 * measured.shift, covariance=None)
+    assert "with positions times 1000" in told(model, metres)
+
+
 def test_a_wrist_stiffer_than_its_model_is_no_mistake(model):
     """Positions times 1000 would hide what the model says too much."""
     soft = model.with_effects(

@@ -61,6 +61,16 @@ def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
     assert words in told if words else told == ""
 
 
+def test_a_load_in_kN_is_told_of_a_tracker_on_a_wrist_within_its_tolerances(model, in_the_cell):
+    settings = CellSettings(rate_hz=20.0, program_seconds=60.0, instrument="tracker", base="wrong")
+    sound = in_the_cell(model.table, settings, 3)
+    block = replace(sound.block, load=1e-3 * sound.block.load)
+    measured = (replace(sound, block=block, covariance=None),)
+    found = calibrate(model, measured)
+    told = wrong_load(model, found.model, measured, found)
+    assert "with the load times 1000 a fit leaves" in told
+
+
 @pytest.mark.slow
 def test_a_whole_fit_tells_what_it_would_else_take_up(model, in_the_cell):
     """The load is in the other frame."""

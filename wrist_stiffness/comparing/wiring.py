@@ -59,8 +59,8 @@ class Mistake:
         The same for the measured positions.
     gauge : str
         Name of a gauge whose readings turn their sign without it.
-    unit : bool
-        It is a wrong unit.
+    stiff : bool
+        A wrist stiffer or softer than its model may look like it: none is a thousandfold.
     """
 
     without: str
@@ -68,7 +68,7 @@ class Mistake:
     block: Callable[[Block], Block] = lambda block: block
     shift_factor: float = 1.0
     gauge: str = ""
-    unit: bool = False
+    stiff: bool = False
 
     def put_right(self, session: UnitSession) -> UnitSession:
         """Return the session without the mistake."""
@@ -109,9 +109,9 @@ LOAD_MISTAKES = (
         "does the sensor show what acts on the platform, or the reaction (acts_on: environment)?",
         _load(-1.0),
     ),
-    Mistake("the load times 1000", "is it in kN and kN m?", _load(1e3), unit=True),
-    Mistake("the load times 9.81", "is it in kilograms?", _load(9.80665), unit=True),
-    Mistake("the load times 4.45", "is it in pounds (lbf)?", _load(4.4482216), unit=True),
+    Mistake("the load times 1000", "is it in kN and kN m?", _load(1e3)),
+    Mistake("the load times 9.81", "is it in kilograms?", _load(9.80665), stiff=True),
+    Mistake("the load times 4.45", "is it in pounds (lbf)?", _load(4.4482216), stiff=True),
     Mistake(
         "the load in the other frame",
         "does the load sensor turn with the platform (wrist_platform) or not (wrist_base)?",
@@ -130,19 +130,17 @@ MISTAKES = (
         "positions divided by 1000",
         "are they in mm? A recording has m",
         shift_factor=1e-3,
-        unit=True,
     ),
     Mistake(
         "positions times 1000",
         "are they in m where mm belong, as in the _mm columns of a table?",
         shift_factor=1e3,
-        unit=True,
     ),
     Mistake(
         "positions times 25.4",
         "are they in inches where mm belong, as in the _mm columns of a table?",
         shift_factor=25.4,
-        unit=True,
+        stiff=True,
     ),
 )
 
@@ -230,7 +228,7 @@ def suspected(
     if not len(logs) or weights.max() < NAMING * total:
         return None
     mistake = list(found)[int(np.argmax(logs))]
-    if mistake.unit and any(
+    if mistake.stiff and any(
         sum(gains(mistake.with_load(times)).values()) > logs.max() for times in BESIDE
     ):
         return None
