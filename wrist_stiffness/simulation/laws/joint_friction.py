@@ -112,13 +112,7 @@ class JointFriction(Rubbing):
 
     def turn_of(self, block: Block) -> Array:
         """Turn of the joint from home, (n,) [rad]."""
-        inner, outer = BODIES_JOINED[self._joint]
-        bodies = block.configuration.rotations
-        relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
-        axis = self.seat.axis
-        across = np.linalg.svd(axis[None])[2][1]
-        turned = relative @ across
-        return np.arctan2(turned @ np.cross(axis, across), turned @ across)
+        return joint_turn(block, self._joint, self.seat.axis)
 
     def budget(self, reaction: Array) -> Array:
         """Friction in motion for a reaction (...) [N]."""
@@ -130,6 +124,16 @@ class JointFriction(Rubbing):
         local = np.einsum("nji,nj->ni", to_origin, through)
         push = np.einsum("rij,nj->nri", self.seat.rings, local)
         return np.asarray(np.sqrt(dot(push, push)).sum(axis=-1))
+
+
+def joint_turn(block: Block, joint: str, axis: Array) -> Array:
+    """Return the turn of a passive joint from home about its axis there (3,), (n,) [rad]."""
+    inner, outer = BODIES_JOINED[joint]
+    bodies = block.configuration.rotations
+    relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
+    across = np.linalg.svd(axis[None])[2][1]
+    turned = relative @ across
+    return np.arctan2(turned @ np.cross(axis, across), turned @ across)
 
 
 def _implicit(stiffness: float, give: list[list[float]], pull: Pair) -> Pair:

@@ -7,13 +7,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
+from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS
 from wrist_stiffness.mechanism.vectors import unit
 from wrist_stiffness.simulation.effect_entry import Draw, effect
-from wrist_stiffness.simulation.laws.law import Law
-from wrist_stiffness.simulation.strangers.motion import OilFilm, Resonance
-from wrist_stiffness.simulation.strangers.places import CableStop, Dent
-from wrist_stiffness.simulation.strangers.slow import FloorTilt, Swelling, ThermalBow
+from wrist_stiffness.simulation.laws.law import DRIVEN, Law
+from wrist_stiffness.simulation.makers import spring
+from wrist_stiffness.simulation.strangers.motion import OilFilm, Resonance, SpinningTool
+from wrist_stiffness.simulation.strangers.places import CableStop, Dent, WornSector
+from wrist_stiffness.simulation.strangers.sensors import OverloadRing, PrismIncidence
+from wrist_stiffness.simulation.strangers.slow import (
+    FloorTilt,
+    LooseningScrew,
+    SqueezeFilm,
+    Swelling,
+    ThermalBow,
+)
 from wrist_stiffness.simulation.strangers.steps import HeadChange, LooseSeat, PlasticSet
 
 
@@ -96,3 +104,53 @@ def swelling(d: Draw) -> Law:
     """Return three waves of humidity."""
     periods = d.rng.uniform([40.0, 100.0, 250.0], [80.0, 200.0, 500.0])
     return Swelling(d.component, d.twist(), periods, d.rng.uniform(0.0, 6.0, 3))
+
+
+# 0.3 deg at the torque of the largest load are felt by hand.
+@effect(MOTORS, "rad/(N m)", 0.01, 0.1, 5.0)
+def worn_sector(d: Draw) -> Law:
+    """Return a gear that is worn where the cell works most."""
+    axis = d.table.geometry.axes[DRIVEN[d.component]]
+    at, width = d.rng.uniform(-0.3, 0.3), d.rng.uniform(0.1, 0.2)
+    return WornSector(d.component, axis, d.magnitude, at, width)
+
+
+# A rotor of half a kilogram, at 20 000 turns a minute.
+@effect(("platform",), "kg m^2/s", 5e-3, 0.1, 5.0)
+def spinning_tool(d: Draw) -> Law:
+    """Return a spindle that leans a little from the platform's normal."""
+    axis = unit(d.table.mechanism.n0 + 0.3 * d.direction())
+    return SpinningTool(d.rng.choice((-1.0, 1.0)) * d.magnitude * axis)
+
+
+# A clamp that gives 0.1 mm at 1 N has lost its screw.
+@effect(LINKS, "m/N", 5e-6, 1e-4, 1e-3)
+def loosening_screw(d: Draw) -> Law:
+    """Return a clamp at one end of the link."""
+    end = d.table.geometry.link_ends(d.component)[d.rng.integers(2)]
+    place = d.table.geometry.links[d.component].arc_radius * end
+    return LooseningScrew(d.component, d.magnitude * spring(d, place), d.rng.uniform(10.0, 40.0))
+
+
+# 50 um: no lubricant holds in such a gap.
+@effect(PASSIVE_JOINTS, "m", 3e-6, 5e-5, 1e-3)
+def squeeze_film(d: Draw) -> Law:
+    """Return a grease that yields within seconds."""
+    time_s, turn = d.rng.uniform(1.0, 4.0), d.rng.uniform(0.05, 0.15)
+    return SqueezeFilm(d.component, d.seat, d.magnitude, time_s, turn)
+
+
+# Of nine tenths hardly anything is left to measure, and more than all cannot go past.
+@effect(("load_sensor",), "-", 0.3, 0.9, 1.0)
+def overload_ring(d: Draw) -> Law:
+    """Return a ring about the plate that touches far below the rated force."""
+    plate = d.table.geometry.platform.centre
+    return OverloadRing(d.magnitude, d.table.mechanism.n0, plate, d.rng.uniform(0.05, 0.15))
+
+
+# The glass of the common half-inch prism is 9 mm deep.
+@effect(("pose_sensor",), "m", 2e-4, 1e-2, 5e-2)
+def prism_incidence(d: Draw) -> Law:
+    """Return a prism that faces the sensor within some 30 deg with the wrist at home."""
+    beam = d.direction()
+    return PrismIncidence(d.magnitude, beam, unit(beam + 0.5 * d.direction()))

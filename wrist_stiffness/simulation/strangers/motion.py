@@ -1,4 +1,4 @@
-"""Strangers that come with motion: a platform that rings, a pin that floats up on its oil."""
+"""Strangers that come with motion: a tool that rings or spins, a pin that floats on its oil."""
 
 from __future__ import annotations
 
@@ -101,3 +101,29 @@ class OilFilm(Law):
         return at_component(
             block, self._joint, np.tanh(np.abs(rate) / self._speed)[:, None] * screw
         )
+
+
+class SpinningTool(Law):
+    """The platform feels a gyroscopic moment: by the speed of its tilting, and across it.
+
+    A spindle in the tool runs steadily; turning its angular momentum takes a moment.
+
+    Parameters
+    ----------
+    momentum : (3,) float
+        Angular momentum of the rotor, in U [kg m^2/s].
+    """
+
+    def __init__(self, momentum: Array) -> None:
+        self._momentum = momentum
+        self._past: tuple[float, Array] | None = None
+
+    def wrench(self, block: Block) -> Array:
+        """Return what the rotor does to the platform while its axis turns."""
+        now = block.configuration.platform @ self._momentum
+        before, past = (block.time_s[0], now[0]) if self._past is None else self._past
+        steps = np.diff(block.time_s, prepend=before)[:, None]
+        change = np.diff(now, axis=0, prepend=past[None])
+        self._past = float(block.time_s[-1]), now[-1]
+        rate = np.divide(change, steps, out=np.zeros_like(change), where=steps > 0.0)
+        return np.concatenate([np.zeros_like(rate), -rate], axis=-1)

@@ -1,4 +1,4 @@
-"""Strangers that are somewhere: a cable that meets a stop, a dent in a bearing."""
+"""Strangers that are somewhere: a cable meets a stop, a bearing has a dent, a gear is worn."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.laws.joint_friction import BODIES_JOINED
-from wrist_stiffness.simulation.laws.law import Law, at_component
+from wrist_stiffness.simulation.laws.joint_friction import joint_turn
+from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Bending, Law, at_component
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -67,13 +67,46 @@ class Dent(Law):
 
     def screws(self, block: Block) -> Array:
         """Lift where the dent passes."""
-        inner, outer = BODIES_JOINED[self.joint]
-        bodies = block.configuration.rotations
-        relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
-        across = np.linalg.svd(self.seat.axis[None])[2][1]
-        turned = relative @ across
-        turn = np.arctan2(turned @ np.cross(self.seat.axis, across), turned @ across)
+        turn = joint_turn(block, self.joint, self.seat.axis)
         shape = np.exp(-0.5 * ((turn - self.at) / self.width) ** 2)
         home = self.lift @ self.seat.rings[0]
         screw = shape[:, None] * (self.seat.to_origin(block.rotation(self.joint)) @ home)
         return at_component(block, self.joint, screw)
+
+
+@dataclass(frozen=True)
+class WornSector(Bending):
+    """Motor's gear: soft under torque only at the motor angles where its teeth are worn.
+
+    Thinner teeth bend more; the link turns on with the torque through its driven joint.
+
+    Parameters
+    ----------
+    motor : str
+        Which one.
+    axis : (3,) float
+        Motor axis in F.
+    softness : float
+        Turn per torque in the middle of the worn sector [rad/(N m)].
+    at, width : float
+        Place and width of the sector on the motor's angle [rad].
+    """
+
+    motor: str
+    axis: Array
+    softness: float
+    at: float
+    width: float
+
+    @property
+    def bends(self) -> str:
+        """The driven joint."""
+        return DRIVEN[self.motor]
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Turn about the motor axis."""
+        column = np.concatenate([np.zeros(3), self.axis])
+        theta = block.configuration.theta[:, MOTOR[self.motor]]
+        soft = self.softness * np.exp(-0.5 * ((theta - self.at) / self.width) ** 2)
+        turn = (soft * (wrench @ column))[:, None] * column
+        return turn, soft[:, None, None] * np.outer(column, column)

@@ -1,4 +1,4 @@
-"""Strangers that take their time: a bowing frame, a swaying carrier, swelling bushings."""
+"""Strangers that take their time: what bows, sways, swells, works loose or sinks in its oil."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.law import Law, at_component
+from wrist_stiffness.simulation.laws.joint_friction import joint_turn
+from wrist_stiffness.simulation.laws.law import Bending, Flowing, Law, at_component, no_screws
+from wrist_stiffness.simulation.seat import Seat
 
 
 @dataclass(frozen=True)
@@ -86,3 +88,95 @@ class Swelling(Law):
         wet = np.sin(angle).mean(axis=-1)
         turned = block_diagonal(block.rotation(self.joint)) @ self.screw
         return at_component(block, self.joint, wet[:, None] * turned)
+
+
+class LooseningScrew(Bending):
+    """A link's clamp screw works loose: its end gets softer with all that the motors have moved.
+
+    The gears shake it, and it never tightens again.
+
+    Parameters
+    ----------
+    link : str
+        Which one.
+    flexibility : (6, 6) float
+        Of the open clamp, at O with the wrist at home [m/N, rad/N, rad/(N m)].
+    path : float
+        Sum of both motors' motion after which 63 % of it are there [rad].
+    """
+
+    def __init__(self, link: str, flexibility: Array, path: float) -> None:
+        self._link, self._flexibility, self._path = link, flexibility, path
+        self._past: tuple[float, Array] | None = None
+        self._loose = np.zeros(0), np.zeros(0)
+
+    @property
+    def bends(self) -> str:
+        """The link."""
+        return self._link
+
+    def screws(self, block: Block) -> Array:
+        """Count what the motors move."""
+        theta = block.configuration.theta
+        so_far, past = self._past or (0.0, theta[0])
+        moved = so_far + np.cumsum(np.abs(np.diff(theta, axis=0, prepend=past[None])).sum(axis=1))
+        self._past = float(moved[-1]), theta[-1]
+        self._loose = block.time_s, -np.expm1(-moved / self._path)
+        return no_screws(block)
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Give way to the wrench, as loose as the screw is by now."""
+        turn = block_diagonal(block.rotation(self._link))
+        loose = np.interp(block.time_s, *self._loose)[:, None, None]
+        soft = loose * (turn @ self._flexibility @ np.swapaxes(turn, -1, -2))
+        return (soft @ wrench[..., None])[..., 0], soft
+
+
+class SqueezeFilm(Flowing):
+    """A passive joint's pin sinks along its radial force while at rest; turning centres it again.
+
+    The force squeezes the lubricant out of the gap, the faster the larger it is.
+
+    Parameters
+    ----------
+    joint : str
+        Passive joint.
+    seat : Seat
+        Of its bushing.
+    gap : float
+        Radial gap, the farthest that the pin sinks [m].
+    time_s : float
+        Time constant of sinking under 1 N [s].
+    turn : float
+        Turn of the joint that draws 63 % of the lubricant in again [rad].
+    """
+
+    def __init__(self, joint: str, seat: Seat, gap: float, time_s: float, turn: float) -> None:
+        self._joint, self._seat, self._gap = joint, seat, gap
+        self._time_s, self._turn = time_s, turn
+        self._past: tuple[float, float, Array] | None = None
+
+    @property
+    def flows(self) -> str:
+        """The joint."""
+        return self._joint
+
+    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+        """Sink by time and force, rise by turn."""
+        to_origin = self._seat.to_origin(block.rotation(self._joint))
+        across = np.eye(3) - np.outer(self._seat.axis, self._seat.axis)
+        force = np.einsum("nji,nj->ni", to_origin, wrench)[:, :3] @ across
+        size = np.sqrt(np.sum(force * force, axis=-1))
+        wall = self._gap * force / np.maximum(size, 1e-12)[:, None]
+        turn = joint_turn(block, self._joint, self._seat.axis)
+        # It was turned before the start.
+        before, angle, sunk = self._past or (block.time_s[0], turn[0], np.zeros(3))
+        out = np.zeros_like(wrench)
+        for i, now in enumerate(block.time_s):
+            sunk = sunk * np.exp(-abs(turn[i] - angle) / self._turn)
+            sunk = wall[i] + (sunk - wall[i]) * np.exp(-size[i] * (now - before) / self._time_s)
+            before, angle = now, turn[i]
+            out[i, :3] = sunk
+        if remember:
+            self._past = float(before), float(angle), sunk
+        return np.einsum("nij,nj->ni", to_origin, out)
