@@ -117,8 +117,8 @@ def require_near(shift: Array) -> None:
         raise InputError(
             f"the measured positions are not those of the platform's point O in {BASE_FRAME}: half "
             f"of them are more than {1e3 * off[worst]:.4g} mm (limit {1e3 * FAR_M:g} mm) from the "
-            f"base's O along {'xyz'[worst]}; map the instrument's frame, or check the unit (m in a "
-            "recording, mm in a table)"
+            f"base's O along {'xyz'[worst]}; map the instrument's frame (a table: import "
+            "--register), or check the unit (m in a recording, mm in a table)"
         )
 
 
