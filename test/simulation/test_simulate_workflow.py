@@ -64,7 +64,7 @@ def test_command_writes_a_recording_and_its_result(wrist, tmp_path, capsys):
     assert main([*arguments, "--rate", "20"], [command]) == 0
     assert "20 samples" in capsys.readouterr().out
     assert '"samples": 20' in (tmp_path / "run.json").read_text()
-    assert main([*arguments, "--rate", "-3"], [command]) == 2
+    assert main([*arguments, "--overwrite", "--rate", "-3"], [command]) == 2
     assert "rate of -3 Hz" in capsys.readouterr().err
 
 
