@@ -24,6 +24,7 @@ from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.identification.proposal import Proposal
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
+from wrist_stiffness.inference.giving import told
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
@@ -260,15 +261,18 @@ class Bench:
         effect = seen.effect
         self._looked = asked, option
         values = {key: each.value for key, each in effect.estimates.items()}
-        sentence = effect.law.sentence.format(place=effect.component)
-        told = (
+        findings = self._answer.diagnosis.findings if self._answer else ()
+        gives = [each.gives.items() for each in findings if each.name == effect.name]
+        sentences = [effect.law.sentence.format(place=effect.component)]
+        sentences += [told(way, *size).rstrip(".") for own in gives for way, size in own]
+        shown = (
             effect.name,
-            sentence,
+            ". ".join(sentences),
             effect.law.check.replace("{place}", effect.component),
             seen.change,
             values,
         )
-        return {"seen": Seen(*told), "version": len(self._opened.versions) - 1}
+        return {"seen": Seen(*shown), "version": len(self._opened.versions) - 1}
 
     def add(self) -> Changes:
         """Add what was looked at last."""
