@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.configuration import TURNING
 from wrist_stiffness.model.block import Load
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import (
@@ -194,3 +196,23 @@ def test_allowed_formulas_agree_with_python(text):
     except (ValueError, ZeroDivisionError, OverflowError):
         return
     assert made == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True)
+
+
+def test_a_formula_at_the_load_sensor_is_a_wrench_that_it_does_not_say(model, make):
+    """As a sensor's bias of the opposite sign, which has code of its own."""
+    block = make.block()
+    law = FormulaLaw("pull", "load_sensor", np.array([0, 0, 1.0, 0, 0, 0]), "p_N", (), ("p_N",))
+    pull = Effect(law, "load_sensor").with_values({"p_N": 0.3})
+    bias = make.effect("load_bias@load_sensor", fz_N=-0.3)
+    one, two = model.with_effects().batch_with(block, [(pull,), (bias,)])
+    assert np.abs(one.measured).max() > 0.0
+    assert np.allclose(one.measured, two.measured, rtol=1e-9, atol=1e-15)
+
+
+def test_turns_of_passive_joints_are_those_of_the_bodies_they_join(model):
+    theta = np.radians([[20.0, -15.0], [-10.0, 30.0]])
+    pose, axes = model.table.mechanism.forward(theta), model.table.geometry.axes
+    for joint, (inner, outer) in TURNING.items():
+        relative = np.swapaxes(pose.rotations[inner], -1, -2) @ pose.rotations[outer]
+        expected = Rotation.from_matrix(relative).as_rotvec()
+        assert np.allclose(pose.turn(joint, axes[joint])[:, None] * axes[joint], expected)

@@ -304,8 +304,8 @@ class Search:
                 found.append(self._known(fit, state))
                 logs[name] = found[-1].evidence.log
                 best = max(best, logs[name])
-                further = logs[name] - log if log < np.inf else np.inf
-                reach[law] = max(reach.get(law, 0.0), further)
+                beyond_slopes = logs[name] - log if log < np.inf else np.inf
+                reach[law] = max(reach.get(law, 0.0), beyond_slopes)
 
         ask(leaders)
         if all(each.rough for each in found):
