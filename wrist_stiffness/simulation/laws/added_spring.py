@@ -36,8 +36,8 @@ class MountSpring(Law):
 
 
 @dataclass(frozen=True)
-class StiffeningDrive(Bending):
-    """Gears whose teeth touch more fully under torque: soft at first, then stiff.
+class _Drive(Bending):
+    """Gears and coupling of a motor.
 
     Parameters
     ----------
@@ -45,25 +45,40 @@ class StiffeningDrive(Bending):
         Driven joint.
     axis : (3,) float
         Motor axis in F.
-    softness : float
-        Turn per torque at rest [rad/(N m)].
-    torque : float
-        Torque at which the softness has halved [N m].
     """
 
     joint: str
     axis: Array
-    softness: float
-    torque: float
 
     @property
     def bends(self) -> str:
         """The joint."""
         return self.joint
 
+    @property
+    def column(self) -> Array:
+        """Turn about the axis, (6,)."""
+        return np.concatenate([np.zeros(3), self.axis])
+
+
+@dataclass(frozen=True)
+class StiffeningDrive(_Drive):
+    """Gears whose teeth touch more fully under torque: soft at first, then stiff.
+
+    Parameters
+    ----------
+    softness : float
+        Turn per torque at rest [rad/(N m)].
+    torque : float
+        Torque at which the softness has halved [N m].
+    """
+
+    softness: float
+    torque: float
+
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Turn by a saturating logarithm of the torque."""
-        column = np.concatenate([np.zeros(3), self.axis])
+        column = self.column
         torque = wrench @ column
         turn = self.softness * self.torque * np.arcsinh(torque / self.torque)
         slope = self.softness / np.sqrt(1.0 + (torque / self.torque) ** 2)
@@ -71,31 +86,20 @@ class StiffeningDrive(Bending):
 
 
 @dataclass(frozen=True)
-class OneSidedDrive(Bending):
+class OneSidedDrive(_Drive):
     """Gears of which one flank is worn: softer one way than the other.
 
     Parameters
     ----------
-    joint : str
-        Driven joint.
-    axis : (3,) float
-        Motor axis in F.
     softness : (float, float)
         Turn per torque, of torques above 0 and below [rad/(N m)].
     """
 
-    joint: str
-    axis: Array
     softness: tuple[float, float]
-
-    @property
-    def bends(self) -> str:
-        """The joint."""
-        return self.joint
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Turn by the softness of the flank that is loaded."""
-        column = np.concatenate([np.zeros(3), self.axis])
+        column = self.column
         torque = wrench @ column
         softness = np.where(torque > 0.0, *self.softness)
         turn = (softness * torque)[:, None] * column
