@@ -46,7 +46,6 @@ LIBRARIES_USED = {
     "fem": ROBOT | {"netgen", "skfem", "pymetis"},
     "cli": ROBOT | {"tqdm"},  # the extra `progress`
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
-    "commands": ROBOT | {"distributed", "cloudpickle"},  # the extra `fleet`
     "web": ROBOT | {"nicegui"},  # the extra `web`; Plotly's JavaScript comes with it
 }
 DRAWING = "matplotlib"

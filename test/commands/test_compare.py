@@ -153,7 +153,6 @@ def test_a_fleet_names_each_recording_once(error):
 
 @pytest.mark.slow
 def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
-    pytest.importorskip("distributed", reason="the extra fleet")
     folder = tmp_path / "wrists"
     folder.mkdir()
     shutil.copy(DATA / "wrist_b.mcap", folder)
@@ -172,7 +171,6 @@ def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys)
     ("options", "named"),
     [
         (["--each", "--report", "x.html"], "--report draws one wrist"),
-        (["--scheduler", "tcp://localhost:1"], "add --each"),
         (["--model", "missing.yaml"], "missing.yaml"),
         (["--report", "no folder/x.html"], "no folder/x.html: folder no folder does not exist"),
         (["--json", "."], ".: cannot be written: it is a folder"),

@@ -54,7 +54,6 @@ def test_each_wrist_has_a_line_that_says_what_is_missing():
 
 @pytest.mark.slow
 def test_a_folder_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
-    pytest.importorskip("distributed", reason="the extra fleet")
     folder = tmp_path / "wrists"
     folder.mkdir()
     hidden = ["--effect", "backlash@motor_2", "--size", "10", "--seconds", "40", "--rate", "10"]

@@ -1,5 +1,6 @@
 """Many recordings at once: each answers or says why not."""
 
+import operator
 import os
 import signal
 import subprocess
@@ -8,113 +9,86 @@ import time
 from functools import partial
 from pathlib import Path
 
-import cloudpickle
 import pytest
-from distributed import LocalCluster
 
-from wrist_stiffness.commands.fleet import map_recordings, spread
-from wrist_stiffness.errors import InputError, RecordingError
+from wrist_stiffness.commands.fleet import attempt, map_recordings, spread
+from wrist_stiffness.errors import RecordingError
 
-PATHS = [Path(name) for name in ("good", "bad", "ugly", "best")]
+# Workers cannot import this file, as pytest can: what they call is Python's own.
+READS = operator.methodcaller("read_text")
 
 
-def judge(path, length):
-    """Stand in for a command; at module level, as workers need it."""
-    if path.name == "bad":
+def test_an_error_is_one_line():
+    def refuse(path):
         raise RecordingError(f"{path} is no\nrecording")
-    if path.name == "ugly":
-        raise ZeroDivisionError("of its own")
-    if path.name == "dead":
-        os._exit(1)
-    return len(path.name) + length, os.getpid()
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _importable():
-    """Send functions of this file whole: pytest imports it in a way that workers cannot."""
-    cloudpickle.register_pickle_by_value(sys.modules[__name__])
-    yield
-    cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0"
-    ) as cluster:
-        yield cluster
-
-
-def expected_of(rows):
-    return [(row.path.name, row.result and row.result[0], row.error) for row in rows]
-
-
-EXPECTED = [
-    ("good", 104, ""),
-    ("bad", None, "bad is no recording"),
-    ("ugly", None, "ZeroDivisionError: of its own"),
-    ("best", 104, ""),
-]
+    assert attempt(refuse, Path("bad")) == (None, "bad is no recording")
 
 
 @pytest.mark.slow
-def test_processes_of_this_machine_answer_in_the_order_of_the_paths():
+def test_processes_of_this_machine_answer_in_the_order_of_the_paths(tmp_path):
+    paths = [tmp_path / name for name in ("good", "bad", "best")]
+    for path in (paths[0], paths[2]):
+        path.write_text(f"read {path.name}")
     told = []
-    rows = map_recordings(
-        partial(judge, length=100), PATHS, workers=2, progress=lambda *counts: told.append(counts)
-    )
-    assert expected_of(rows) == EXPECTED
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    assert os.getpid() not in {row.result[1] for row in rows if row.result}
+    rows = map_recordings(READS, paths, workers=2, progress=lambda *counts: told.append(counts))
+    assert [row.path for row in rows] == paths
+    assert [row.result for row in rows] == ["read good", None, "read best"]
+    assert [row.error[:17] for row in rows] == ["", "FileNotFoundError", ""]
+    assert told == [(1, 3), (2, 3), (3, 3)]
 
 
-def test_a_cluster_is_used_where_a_scheduler_is_named(cluster):
-    rows = map_recordings(partial(judge, length=100), PATHS, cluster.scheduler_address)
-    assert expected_of(rows) == EXPECTED
+@pytest.mark.slow
+def test_workers_are_other_processes_of_one_thread_each():
+    asked = ["__import__('os').getpid()", "__import__('os').environ['OMP_NUM_THREADS']"]
+    process, threads = spread(eval, asked)
+    assert process.result not in (None, os.getpid())
+    assert threads.result == "1"
 
 
-def test_a_function_that_workers_cannot_load_is_the_rows_error(cluster):
-    cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
-    try:
-        (row,) = map_recordings(partial(judge, length=0), PATHS[:1], cluster.scheduler_address)
-    finally:
-        cloudpickle.register_pickle_by_value(sys.modules[__name__])
-    assert "ModuleNotFoundError" in row.error
+def unknown_to_workers(path):
+    return path
+
+
+@pytest.mark.slow
+def test_a_function_that_workers_cannot_load_is_the_rows_error():
+    for row in map_recordings(unknown_to_workers, [Path("a"), Path("b")]):
+        assert "ModuleNotFoundError" in row.error
 
 
 def test_one_recording_needs_no_other_process():
-    (row,) = map_recordings(partial(judge, length=0), PATHS[:1])
-    assert row.result == (4, os.getpid())
+    (row,) = map_recordings(lambda _: os.getpid(), [Path("good")])
+    assert row.result == os.getpid()
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_is_a_row_with_its_error():
-    paths = [Path("dead"), Path("good")]
-    dead, good = map_recordings(partial(judge, length=0), paths, workers=1)
-    assert "the worker died" in dead.error
-    assert good.result[0] == 4
+def test_a_worker_that_dies_is_an_answer_with_its_error():
+    dead, good = spread(eval, ["__import__('os')._exit(7)", "2 + 2"], workers=1)
+    assert dead == (None, "the worker died: exit code 7")
+    assert good == (4, "")
 
 
+DIES_ONCE = """
+import os, signal
 def dies_once(number, folder):
-    """Take the worker along, the first time that a number comes."""
     marker = folder / str(number)
     if number % 2 and not marker.exists():
         marker.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number**2
+"""
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_loses_nothing(tmp_path):
-    answers = spread(partial(dies_once, folder=tmp_path), range(6), workers=2)
+def test_a_worker_that_dies_loses_nothing(tmp_path, monkeypatch):
+    (tmp_path / "mortal.py").write_text(DIES_ONCE)
+    monkeypatch.syspath_prepend(tmp_path)
+    from mortal import dies_once
+
+    (folder := tmp_path / "died").mkdir()
+    answers = spread(partial(dies_once, folder=folder), range(6), workers=2)
     assert [answer.result for answer in answers] == [0, 1, 4, 9, 16, 25]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["1", "3", "5"]
-
-
-def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
-    monkeypatch.setattr("wrist_stiffness.commands.fleet.CONNECT_S", 0.5)
-    with pytest.raises(InputError, match="tcp://127.0.0.1:9"):
-        map_recordings(partial(judge, length=0), PATHS, "tcp://127.0.0.1:9")
+    assert sorted(path.name for path in folder.iterdir()) == ["1", "3", "5"]
 
 
 DEADLINE_S = 60.0

@@ -47,7 +47,7 @@ def _run(arguments: argparse.Namespace) -> int:
         from wrist_stiffness.report.fleet_lines import compared_lines
 
         one = partial(compare, models, run=this_run())
-        rows = each_recording(one, recordings, arguments.scheduler, Progress("recordings"))
+        rows = each_recording(one, recordings, Progress("recordings"))
         return say(arguments, compared_lines(rows), table_values(rows, "comparison"))
     from wrist_stiffness.report.comparison_lines import comparison_lines
 

@@ -63,7 +63,7 @@ def _run(arguments: argparse.Namespace) -> int:
         from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
         one = partial(diagnose_recordings, model, run=this_run(), naming=naming, seconds=seconds)
-        rows = each_recording(one, recordings, arguments.scheduler, Progress("recordings"))
+        rows = each_recording(one, recordings, Progress("recordings"))
         return say(arguments, diagnosed_lines(rows), table_values(rows, "diagnosis"))
     from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
 

@@ -60,8 +60,6 @@ EXTRA_OF = {
     "skfem": "fem",
     "pymetis": "fem",
     "matplotlib": "plot",
-    "distributed": "fleet",
-    "cloudpickle": "fleet",
     "nicegui": "web",
 }
 """The extra that installs a library which a robot does without."""

@@ -130,11 +130,6 @@ def add_compared_recordings(parser: OneLineParser) -> None:
     parser.add_argument("--report", metavar="OUT.html", help="write a report with pictures here")
     each = "every recording is of a wrist of its own: one line for each, in parallel"
     parser.flag("--each", each)
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="with --each: a running Dask scheduler, tcp://HOST:PORT (default: this machine)",
-    )
     add_sensor_names(parser)
 
 
@@ -148,8 +143,6 @@ def for_each(arguments: argparse.Namespace) -> bool:
     """
     if arguments.each and arguments.report:
         raise InputError("--report draws one wrist; leave out --each")
-    if arguments.scheduler and not arguments.each:
-        raise InputError("--scheduler spreads many recordings over machines: add --each")
     return bool(arguments.each)
 
 

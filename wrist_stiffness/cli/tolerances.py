@@ -37,11 +37,6 @@ def add_parser(commands: Commands) -> None:
         "standard deviation; 0 for none",
     )
     parser.option("--seed", 0, "of the draws")
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="a running Dask scheduler, tcp://HOST:PORT (default: this machine)",
-    )
     parser.add_argument("--picture", metavar="OUT.png", help="draw the table here")
 
 
@@ -55,7 +50,6 @@ def _run(arguments: argparse.Namespace) -> int:
         whole_load(arguments.load),
         named_numbers(arguments.limit, "--limit"),
         arguments.seed,
-        arguments.scheduler,
         progress=Progress("wrists"),
     )
     lines = study.lines()

@@ -1,4 +1,4 @@
-"""One function over many recordings or other items: processors of this machine, or Dask's.
+"""One function over many recordings or other items, on the processors of this machine.
 
 For a command that takes a folder of recordings, each of a wrist of its own::
 
@@ -9,36 +9,39 @@ For a command that takes a folder of recordings, each of a wrist of its own::
     rows = map_recordings(partial(summary, model="wrist.yaml"), recordings_in([folder]), ...)
 
 Workers are processes of their own: function and result are pickled, so the function is one of a
-module and everything else reaches it by `functools.partial`.  Paths are opened where the worker
-runs; a cluster needs them on a file system that all see.
+module and everything else reaches it by `functools.partial`.
 """
 
 from __future__ import annotations
 
-import logging
 import os
 import pickle
 import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
-from itertools import islice
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from wrist_stiffness.commands.read_sessions import Recordings
-from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.errors import WristError
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.reading.folder import recordings_in
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-CONNECT_S = 10.0
+ATTEMPTS = 3
+"""Workers that may die over one item."""
 
-NAME = "wrist_stiffness"
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables of libraries that would use every processor in every worker."""
+
+SPAWN = get_context("spawn")
 
 
 class Answer(NamedTuple, Generic[Result]):
@@ -93,7 +96,6 @@ class Told(Protocol):
 def each_recording(
     command: Callable[[Recordings], Told],
     recordings: Recordings,
-    scheduler_address: str | None,
     progress: Progress,
 ) -> list[FleetRow[dict[str, Any]]]:
     """Run a command on every recording by itself, as of a wrist of its own, in parallel.
@@ -104,8 +106,8 @@ def each_recording(
         Of recordings; can be pickled.
     recordings : Recordings
         Recordings, or folders of them.
-    scheduler_address, progress
-        As those of `map_recordings`.
+    progress : callable
+        As that of `map_recordings`.
 
     Returns
     -------
@@ -115,11 +117,11 @@ def each_recording(
     Raises
     ------
     InputError
-        If there is no recording, or no scheduler answers.
+        If there is no recording.
     """
     one = partial(_values, command=command, recordings=recordings)
     paths = recordings_in(recordings.paths)
-    return map_recordings(one, paths, scheduler_address, progress=progress)
+    return map_recordings(one, paths, progress=progress)
 
 
 def _values(
@@ -131,7 +133,6 @@ def _values(
 def map_recordings(
     function: Callable[[Path], Result],
     paths: Sequence[Path],
-    scheduler_address: str | None = None,
     workers: int | None = None,
     progress: Progress = silent,
 ) -> list[FleetRow[Result]]:
@@ -143,10 +144,8 @@ def map_recordings(
         Of a path; can be pickled.
     paths : sequence of Path
         Recordings (see `sessions.reading.folder.recordings_in`).
-    scheduler_address : str, optional
-        Of a running Dask scheduler, `tcp://HOST:PORT`; processes of this machine if None.
     workers : int, optional
-        Processes on this machine; one for each processor, at most one for each recording, if None.
+        Processes; one for each processor, at most one for each recording, if None.
     progress : callable
         Told recordings done and in all.
 
@@ -154,22 +153,14 @@ def map_recordings(
     -------
     list of FleetRow
         In the order of the paths.  A recording that fails is a row with its error, not a stop.
-
-    Raises
-    ------
-    InputError
-        If no scheduler answers at the address, or its workers have not this package's version.
-    ModuleNotFoundError
-        Without the extra `fleet`, where more than one recording is given or a scheduler.
     """
-    answers = spread(function, paths, scheduler_address, workers, progress)
+    answers = spread(function, paths, workers, progress)
     return [FleetRow(path, *answer) for path, answer in zip(paths, answers, strict=True)]
 
 
 def spread(
     function: Callable[[Item], Result],
     items: Sequence[Item],
-    scheduler_address: str | None = None,
     workers: int | None = None,
     progress: Progress = silent,
 ) -> list[Answer[Result]]:
@@ -182,34 +173,39 @@ def spread(
     list of Answer
         In the order of the items.
     """
-    if len(items) <= 1 and scheduler_address is None:
+    if len(items) <= 1:
         return [attempt(function, item) for item in items]
-    import cloudpickle
-    from distributed import as_completed
-
-    answers: list[Answer[Result]] = [Answer(None, "") for _ in items]
     # As bytes: a worker that cannot load the function says so instead of dying over it.
-    pickled = cloudpickle.dumps(function)
-    with _client(scheduler_address, workers or _processors(len(items))) as client:
-        waiting = iter(range(len(items)))
-        number: dict[Any, int] = {}
-
-        def submitted(count: int) -> list[Any]:
-            new = {
-                client.submit(_answer, pickled, items[i], pure=False): i
-                for i in islice(waiting, count)
-            }
-            number.update(new)
-            return list(new)
-
-        # One item for each thread at a time: a worker that dies over one takes no other along.
-        running = as_completed(submitted(sum(client.nthreads().values())))
-        for done, future in enumerate(running, 1):
-            i = number.pop(future)
-            answers[i] = _answered(future)
-            progress(done, len(items))
-            running.update(submitted(1))
-    return answers
+    pickled = pickle.dumps(function)
+    answers: dict[int, Answer[Result]] = {}
+    waiting = list(reversed(range(len(items))))
+    deaths = Counter[int]()
+    in_hand: dict[_Worker, int] = {}
+    most = workers or len(os.sched_getaffinity(0))
+    crew = [_Worker(pickled) for _ in range(min(most, len(items)))]
+    try:
+        while len(answers) < len(items):
+            for worker in crew:
+                if waiting and worker not in in_hand:
+                    in_hand[worker] = waiting.pop()
+                    worker.ask(items[in_hand[worker]])
+            for worker in _answered(in_hand):
+                i = in_hand.pop(worker)
+                try:
+                    answers[i] = worker.pipe.recv()
+                except (EOFError, ConnectionError):
+                    deaths[i] += 1
+                    crew[crew.index(worker)] = _Worker(pickled)
+                    died = f"the worker died: exit code {worker.end()}"
+                    if deaths[i] < ATTEMPTS:
+                        waiting.append(i)
+                        continue
+                    answers[i] = Answer(None, died)
+                progress(len(answers), len(items))
+    finally:
+        for worker in crew:
+            worker.end()
+    return [answers[i] for i in range(len(items))]
 
 
 def attempt(function: Callable[[Item], Result], item: Item) -> Answer[Result]:
@@ -223,72 +219,54 @@ def attempt(function: Callable[[Item], Result], item: Item) -> Answer[Result]:
         return Answer(None, f"{type(error).__name__}: {' '.join(str(error).split())}")
 
 
-def _processors(most: int) -> int:
-    return min(most, len(os.sched_getaffinity(0)))
+class _Worker:
+    """A process that answers one item after another."""
+
+    def __init__(self, pickled: bytes) -> None:
+        self.pipe, theirs = SPAWN.Pipe()
+        self._process = SPAWN.Process(target=_serve, args=(pickled, theirs), daemon=True)
+        with _worker_surroundings():
+            self._process.start()
+        theirs.close()
+
+    def ask(self, item: Any) -> None:
+        """Hand over an item; where the worker is dead, its pipe says so."""
+        with suppress(ConnectionError):
+            self.pipe.send(item)
+
+    def end(self) -> int | None:
+        """End the process, whatever it does, and return its exit code."""
+        self._process.kill()
+        self._process.join()
+        self.pipe.close()
+        return self._process.exitcode
+
+
+def _answered(workers: Collection[_Worker]) -> list[_Worker]:
+    """Return those that have answered or died; wait for one."""
+    ready = wait([worker.pipe for worker in workers])
+    return [worker for worker in workers if worker.pipe in ready]
+
+
+def _serve(pickled: bytes, pipe: Connection) -> None:
+    with suppress(EOFError):
+        while True:
+            pipe.send(attempt(lambda item: pickle.loads(pickled)(item), pipe.recv()))
 
 
 @contextmanager
-def _client(scheduler_address: str | None, workers: int) -> Iterator[Any]:
-    from distributed import Client, LocalCluster
+def _worker_surroundings() -> Iterator[None]:
+    """Let processes that start here compute in one thread each, and ignore Ctrl-C.
 
-    if scheduler_address is None:
-        with _deaf_to_interrupts():
-            local = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                dashboard_address="127.0.0.1:0",
-                # What befalls a recording is told in its row.
-                silence_logs=logging.CRITICAL,
-            )
-        with local, Client(local) as client:
-            yield client
-        return
-    try:
-        client = Client(scheduler_address, timeout=CONNECT_S)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"no Dask scheduler answers at {scheduler_address} within {CONNECT_S:g} s"
-        ) from error
-    with client:
-        _require_same_version(client, scheduler_address)
-        yield client
-
-
-@contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Let processes that start here ignore Ctrl-C, which a terminal sends to all of them.
-
-    This process ends them; on their own each would do so with a traceback.
+    A terminal sends it to all of them.  This process ends them; on their own each would do so with
+    a traceback.
     """
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    unset = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(unset, "1"))
     try:
         yield
     finally:
+        for name in unset:
+            del os.environ[name]
         signal.signal(signal.SIGINT, before)
-
-
-def _require_same_version(client: Any, scheduler_address: str) -> None:
-    """Refuse a cluster without workers, or with workers that compute something else."""
-    try:
-        found = set(client.run(version, NAME).values())
-    except PackageNotFoundError as error:
-        raise InputError(f"{scheduler_address}: {NAME} is not installed at its workers") from error
-    if not found:
-        raise InputError(f"{scheduler_address}: the Dask scheduler has no workers")
-    if found != {version(NAME)}:
-        raise InputError(
-            f"{scheduler_address}: its workers have {NAME} {', '.join(sorted(found))}, this "
-            f"machine has {version(NAME)}"
-        )
-
-
-def _answer(pickled: bytes, item: Any) -> Answer[Any]:
-    return attempt(lambda one: pickle.loads(pickled)(one), item)
-
-
-def _answered(future: Any) -> Answer[Any]:
-    """Return what a worker answered; one item that workers die over is its error."""
-    if future.status == "finished":
-        answer: Answer[Any] = future.result()
-        return answer
-    return Answer(None, f"the worker died: {' '.join(str(future.exception()).split())}")

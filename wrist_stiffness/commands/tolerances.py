@@ -233,7 +233,6 @@ def study_tolerances(
     load: Sequence[float],
     limits: Mapping[str, float],
     seed: int = 0,
-    scheduler: str | None = None,
     workers: int | None = None,
     progress: Progress = silent,
 ) -> ToleranceStudy:
@@ -253,7 +252,7 @@ def study_tolerances(
         See `tolerances_of`.
     seed : int
         Of the draws.
-    scheduler, workers, progress
+    workers, progress
         See `fleet.spread`.
 
     Raises
@@ -270,7 +269,7 @@ def study_tolerances(
     )
     total: Sums | None = None
     told = partial(_tell, progress, wrists)
-    for answer in spread(one, firsts, scheduler, workers, told):
+    for answer in spread(one, firsts, workers, told):
         if answer.result is None:
             raise InputError(f"tolerances: {answer.error}")
         total = answer.result if total is None else total + answer.result
