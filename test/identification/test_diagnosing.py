@@ -7,6 +7,11 @@ import pytest
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
+from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.inference.search import ranked
+from wrist_stiffness.model.effect import effect_at
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.cell import CellSettings
 
@@ -179,3 +184,36 @@ def test_a_session_without_a_measured_pose_is_named(model, in_the_cell):
     for sessions in ([session, blank], [blank, session]):
         with pytest.raises(InputError, match="tuesday: no measured pose"):
             diagnose_sessions(model, sessions)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_drive_that_is_stiffer_than_stiff_is_not_asked(model, in_the_cell, sign):
+    """What is measured moves as a soft drive would move it, or the other way."""
+    name = "drive_compliance@motor_1"
+    units = as_units(model, measured(in_the_cell, model))
+    about = WristProblem(model, (units,))
+    soft = (find_law("drive_compliance"), "motor_1", {"compliance_mdeg_per_Nm": 3000.0})
+    change = np.zeros((len(units), 6))
+    change[units.measured] = about.about(about.begin()).changes([soft])[0]
+    shift, turn = units.shift + sign * change[:, :3], units.turn + sign * change[:, 3:]
+    problem = WristProblem(model, (replace(units, shift=shift, turn=turn),))
+    fit = problem.begin()
+    (trial,) = (each for each in problem.trials(fit) if each.name == name)
+    (first,) = ranked(fit.evidence.without_discrepancy(), [trial])
+    found = problem.added(fit, first)
+    if sign > 0.0:
+        assert first.gain > 10.0
+        assert found.evidence.log > fit.evidence.log + 10.0
+        return
+    assert first.gain == first.z[0] == 0.0
+    assert found is None
+    # Who adds it all the same learns that there is none, to within what the data tell, and the
+    # evidence does not count what a drive below nothing would explain.
+    own = effect_at(*soft[:2], {"compliance_mdeg_per_Nm": 1000.0})
+    asked = problem.extended(fit, own)
+    (place,) = asked.places[name]
+    assert asked.base.z[place] == 0.0
+    assert asked.evidence.log == pytest.approx(fit.evidence.log, abs=1.0)
+    assert asked.whole.columns[:, place].any()
+    assert np.sqrt(asked.covariance[place, place]) * asked.base.problem.unknowns[place].step < 800.0

@@ -109,6 +109,22 @@ def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size)
     assert first_order == pytest.approx(exact, abs=0.1)
 
 
+def test_what_cannot_be_explains_nothing(rng):
+    """Of two unknowns one would have to be negative: the other gains what it gains alone."""
+    columns, empty = rng.normal(size=(ROWS, 2)), np.zeros((ROWS, 0))
+    left = columns @ np.array([5.0, -5.0]) + rng.normal(size=ROWS)
+    point = Point(left, empty, np.zeros(0), np.zeros(0), {}, empty)
+    at = Evidence(point, Background((), 0.2), np.zeros(0), 1.0)
+    either = -np.full(2, np.inf), np.full(2, np.inf)
+    (free, _), (held, z) = at.gains(
+        [-columns, -columns], [either, (np.array([-np.inf, 0.0]), either[1])]
+    )
+    ((alone, first),) = at.gains([-columns[:, :1]])
+    assert free > held + 10.0
+    assert held == pytest.approx(alone)
+    assert z.tolist() == pytest.approx([*first, 0.0])
+
+
 def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
     point, ground = linear(rng, {"a": np.arange(1)}, columns=1, z=[9.0])
     varied = 9.0 * point.columns * rng.normal(size=(ROWS, 2))

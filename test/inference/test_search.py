@@ -21,6 +21,9 @@ class Fit:
     point: Point
 
 
+ANYTHING = np.array([-np.inf]), np.array([np.inf])
+
+
 class Disappointing:
     """Every candidate's slopes look like what is left; what it does whole is something else."""
 
@@ -58,7 +61,7 @@ class Disappointing:
 
     def trials(self, fit):
         return [
-            Trial(name, True, (((), -each),))
+            Trial(name, True, (((), -each),), *ANYTHING)
             for name, each in self.slopes.items()
             if name not in fit.names
         ]

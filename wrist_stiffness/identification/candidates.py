@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.columns import Carried, Recipe, Shape, Values
+from wrist_stiffness.model.columns import Carried, Factor, Recipe, Shape, Values
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.registry import catalogue, find_law
@@ -84,8 +84,17 @@ class WristCandidate:
     @property
     def usual(self) -> Array:
         """Usual size of the factor of each column, (k,)."""
-        first = self.recipe.columns(self.shapes[0])
-        return np.array([column.factor.plausible for column in first])
+        return np.array([each.plausible for each in self._factors])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and most that is possible of these factors, in usual sizes, (k,) each."""
+        lower = np.array([each.lower for each in self._factors]) / self.usual
+        return lower, np.array([each.upper for each in self._factors]) / self.usual
+
+    @property
+    def _factors(self) -> list[Factor]:
+        return [column.factor for column in self.recipe.columns(self.shapes[0])]
 
 
 def compensable(law: Law, place: str, points: bool = True) -> str:

@@ -295,7 +295,8 @@ def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, f
     """Return the parameters of an effect and their standard uncertainties, in their units."""
     places = state.fit.places[name]
     known = {each.key: each for each in effect.parameters}
-    sigma = np.sqrt(np.diag(state.evidence.covariance_of_fit)[places])
+    evidence = replace(state.evidence, point=state.fit.whole)
+    sigma = np.sqrt(np.diag(evidence.covariance_of_fit)[places])
     keys = [state.fit.base.problem.unknowns[place].key for place in places]
     return {
         key: (effect.estimates[key].value, float(own * known[key].scale))

@@ -115,6 +115,19 @@ class WristFit:
 
     @cached_property
     def point(self) -> Point:
+        """Where the fit ended, as the evidence takes it: effects that stand at a bound stay there.
+
+        A clearance below nothing would explain a lot.
+        """
+        lower, upper = self.base.problem.bounds
+        held = np.isclose(self.base.z, lower) | np.isclose(self.base.z, upper)
+        held &= ~self.base.of_base
+        if not held.any():
+            return self.whole
+        return replace(self.whole, columns=self.whole.columns * ~held, _beside={})
+
+    @cached_property
+    def whole(self) -> Point:
         """Where the fit ended, whitened; effects in typical magnitudes from their law's mean."""
         base, table = self.base, self.table
         z = base.z.copy()
@@ -151,7 +164,8 @@ class WristFit:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the steps of all unknowns where a fit has settled, (p, p)."""
-        return self.evidence.covariance_of_fit * np.outer(self.ratio, self.ratio)
+        found = replace(self.evidence, point=self.whole)
+        return found.covariance_of_fit * np.outer(self.ratio, self.ratio)
 
     def settled(self) -> WristFit:
         """Return the most probable values beside noise and drift as they are known.
@@ -161,7 +175,7 @@ class WristFit:
         """
         fit, gain, here = self, np.inf, False
         for _ in range(MOST_ROUNDS):
-            noise = known_noise(fit.point, self.table.background)
+            noise = known_noise(fit.whole, self.table.background)
             step, gain = fit._step(noise)
             moved = fit._moved(noise, step) if gain >= SMALL_GAIN else None
             if moved is not None:

@@ -42,6 +42,9 @@ LEAVES_MUCH, HELPS = 1.5, 0.8
 which its fit is tried again: from the drawing, for tolerances that gave way to a large effect may
 not find back, and with walls little by little."""
 
+NOTHING = 1e-3
+"""Usual sizes from a bound within which a search by steps inside the bounds stands at it."""
+
 
 class WristProblem:
     """A wrist and its sessions as the search asks them.
@@ -92,7 +95,7 @@ class WristProblem:
             (shape, self.table.whiten(-candidate.at(shape) * candidate.usual))
             for shape in candidate.shapes
         ]
-        return Trial(candidate.name, candidate.law.smooth, tuple(blocks))
+        return Trial(candidate.name, candidate.law.smooth, tuple(blocks), *candidate.bounds)
 
     def giving(self, fit: WristFit) -> Sequence[tuple[Array, WristFit]]:
         """Return the fits in which one more law gives, with the column (N,) which that adds."""
@@ -110,19 +113,19 @@ class WristProblem:
         at, candidates = self._catalogue(fit)
         candidate = candidates[ranked.trial.name]
         try:
-            own = self._begun(fit, ranked, at, candidate)
+            start = self._begun(fit, ranked, at, candidate)
         except WristError:
             return None
-        if has_walls(own):
+        if has_walls(start):
             return None
         if candidate.law.smooth:
             z, columns = ranked.z, candidate.at(ranked.shape) * candidate.usual
-            change = columns @ z
+            change, bounds = columns @ z, candidate.bounds
         else:
-            values = {key: each.value for key, each in own.estimates.items()}
+            values = {key: each.value for key, each in start.estimates.items()}
             asked = [
                 p
-                for p in own.parameters
+                for p in start.parameters
                 if p.key not in candidate.recipe.idle and np.isfinite(p.scale)
             ]
             trials = [values]
@@ -142,11 +145,14 @@ class WristProblem:
             )
             columns = np.moveaxis((found[1:] - change) / steps[:, None, None], 0, -1)
             z = np.array([(values[p.key] - p.mean) / p.scale for p in asked])
-        point = fit.point
-        left = point.left - self.table.whiten(change)
+            lower = np.array([(p.lower - p.mean) / p.scale for p in asked])
+            bounds = lower, np.array([(p.upper - p.mean) / p.scale for p in asked])
+        held = (z < bounds[0] + NOTHING) | (z > bounds[1] - NOTHING)
+        left = fit.point.left - self.table.whiten(change)
+        own = -self.table.whiten(columns) * ~held
         varied = self.table.varied(change)
-        return point.with_effect(
-            candidate.name, left, -self.table.whiten(columns), z, varied, candidate.law.inexactness
+        return fit.point.with_effect(
+            candidate.name, left, own, z, varied, candidate.law.inexactness
         )
 
     def _begun(
@@ -165,9 +171,14 @@ class WristProblem:
         return self._starts[candidate]
 
     def added(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
-        """Return the best fit with one effect more; None where its law finds no equilibrium."""
+        """Return the best fit with one effect more.
+
+        None where its law finds no equilibrium, or its bounds leave nothing of it.
+        """
         point, candidates = self._catalogue(fit)
-        return self._added(fit, ranked, point, candidates[ranked.trial.name])
+        name = ranked.trial.name
+        found = self._added(fit, ranked, point, candidates[name])
+        return found if found is not None and found.change(name).any() else None
 
     def extended(self, fit: WristFit, effect: Effect) -> WristFit:
         """Return the best fit with an effect that somebody named; the last one is kept.

@@ -364,7 +364,9 @@ class Evidence:
         information = (columns.T @ columns - mixed.T @ mixed / self.excess) / self.excess
         return float(np.sqrt(max(np.linalg.eigvalsh(information)[-1], 0.0)))
 
-    def gains(self, blocks: Sequence[Array]) -> list[tuple[float, Array]]:
+    def gains(
+        self, blocks: Sequence[Array], bounds: Sequence[tuple[Array, Array]] | None = None
+    ) -> list[tuple[float, Array]]:
         """Return what effects would each add to the log evidence, to first order.
 
         Parameters
@@ -372,6 +374,8 @@ class Evidence:
         blocks : sequence of (N, k) arrays
             Change of what is left by the unknowns of each effect, whitened, in standard deviations
             of their priors.
+        bounds : sequence of ((k,), (k,)) arrays, optional
+            What is possible of these unknowns, least and most; anything by default.
 
         Returns
         -------
@@ -386,10 +390,10 @@ class Evidence:
         slope = -(columns.T @ self.point.left + products.T @ step) / self.excess
         ends = np.cumsum(counts)
         found = []
-        for first, end in zip(ends - counts, ends, strict=True):
+        for n, (first, end) in enumerate(zip(ends - counts, ends, strict=True)):
             own, beside = columns[:, first:end], mixed[:, first:end]
             information = (own.T @ own - beside.T @ beside / self.excess) / self.excess
-            found.append(_gain(information, slope[first:end]))
+            found.append(_gain(information, slope[first:end], bounds[n] if bounds else None))
         return found
 
     def scores(
@@ -425,12 +429,25 @@ class Evidence:
         ]
 
 
-def _gain(information: Array, slope: Array) -> tuple[float, Array]:
+def _gain(
+    information: Array, slope: Array, bounds: tuple[Array, Array] | None
+) -> tuple[float, Array]:
     """Return the gain of an effect and its unknowns: Laplace's method at the better of two modes.
 
-    The prior has a peak and tails: a large effect is found from the side of the tails.
+    The prior has a peak and tails: a large effect is found from the side of the tails.  Unknowns
+    that would go beyond what is possible stay at the bound, and their room to move is none.
     """
-    return max((_mode(information, slope, near) for near in (1.0, 1e-8)), key=lambda each: each[0])
+    z, free = np.zeros(len(slope)), np.ones(len(slope), dtype=bool)
+    while True:
+        rest = slope - information @ np.where(free, 0.0, z)
+        own = information[np.ix_(free, free)], rest[free]
+        gain, z[free] = max((_mode(*own, near) for near in (1.0, 1e-8)), key=lambda each: each[0])
+        if bounds is None or not (beyond := free & ((z < bounds[0]) | (z > bounds[1]))).any():
+            break
+        free &= ~beyond
+        z = np.clip(z, *bounds)
+    held = np.where(free, 0.0, z)
+    return gain + float(slope @ held - 0.5 * held @ information @ held), z
 
 
 def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array]:

@@ -272,10 +272,13 @@ class LinearProblem:
     def _bounds(self, fit: LinearFit) -> tuple[Array, Array]:
         lower, upper = np.full(len(fit.z), -np.inf), np.full(len(fit.z), np.inf)
         for name, places in fit.places.items():
-            parameters = fit.terms[name].candidate.parameters
-            lower[places] = [each.lower for each in parameters] / self.sizes[name]
-            upper[places] = [each.upper for each in parameters] / self.sizes[name]
+            lower[places], upper[places] = self._bounds_of(fit.terms[name].candidate)
         return lower, upper
+
+    def _bounds_of(self, candidate: Candidate) -> tuple[Array, Array]:
+        size = self.sizes[candidate.name]
+        lower = np.array([each.lower for each in candidate.parameters]) / size
+        return lower, np.array([each.upper for each in candidate.parameters]) / size
 
     def _best_shape(self, fit: LinearFit, terms: Mapping[str, Term], name: str) -> Shape:
         candidate, start = terms[name].candidate, terms[name].shape
@@ -307,7 +310,7 @@ class LinearProblem:
 
     def _trial(self, candidate: Candidate) -> Trial:
         blocks = [(shape, -self._whitened(candidate, shape)) for shape in candidate.shapes]
-        return Trial(candidate.name, True, tuple(blocks))
+        return Trial(candidate.name, True, tuple(blocks), *self._bounds_of(candidate))
 
     def _sizes(self, candidate: Candidate) -> Array:
         """Return the scales of the priors of the parameters, (k,)."""

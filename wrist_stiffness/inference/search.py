@@ -68,11 +68,15 @@ class Trial:
     blocks : tuple of ((s,) floats, (N, k) array)
         At points of the grid of what is not linear in it: change of what is left by each unknown,
         whitened, in standard deviations of the priors.
+    lower, upper : (k,) float
+        What is physically possible of the unknowns.
     """
 
     name: str
     smooth: bool
     blocks: tuple[tuple[tuple[float, ...], Array], ...]
+    lower: Array
+    upper: Array
 
     @property
     def law(self) -> str:
@@ -420,7 +424,9 @@ def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     best: dict[str, Ranked] = {}
     if not flat:
         return []
-    gains = at.gains([columns for _, _, columns in flat])
+    gains = at.gains(
+        [columns for _, _, columns in flat], [(each.lower, each.upper) for each, _, _ in flat]
+    )
     for (trial, shape, _), (gain, z) in zip(flat, gains, strict=True):
         gain -= _of_shape(shape, at.point)
         if trial.name not in best or best[trial.name].gain < gain:
