@@ -106,11 +106,6 @@ def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
     per_axis : int
         Grid points along each motor angle.
 
-    Returns
-    -------
-    Budget
-        On the grid.
-
     Raises
     ------
     LoadRangeError

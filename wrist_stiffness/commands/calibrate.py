@@ -83,11 +83,6 @@ def calibrate_model(
     asking : callable
         The same of a second fit, where a mistake of the load is likely.
 
-    Returns
-    -------
-    Calibrated
-        What was found.
-
     Raises
     ------
     WristError

@@ -144,11 +144,6 @@ def diagnose_recordings(
     seconds : float
         Time after which no further fit is begun.
 
-    Returns
-    -------
-    Diagnosed
-        Verdict, findings and what remains open.
-
     Raises
     ------
     WristError
@@ -177,19 +172,7 @@ def mistake_beside(
     sessions: Sequence[MeasuredSession],
     tell: Callable[[str], None] = lambda text: None,
 ) -> str:
-    """Return the mistake of signs, units or names that an answer makes likely; empty for none.
-
-    Parameters
-    ----------
-    known : ErrorModel
-        What the diagnosis began with.
-    answer : WristDiagnosis
-        What was found.
-    sessions : sequence of MeasuredSession
-        In which.
-    tell : callable, optional
-        Told what is being done.
-    """
+    """Return the mistake of signs, units or names that an answer makes likely; empty for none."""
     mistake = ""
     if _leaves_much(answer.diagnosis):
         tell("asking for wrong signs, units and names")

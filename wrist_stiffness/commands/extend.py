@@ -231,11 +231,6 @@ def extend_model(
     progress : callable
         Told steps done and steps at most.
 
-    Returns
-    -------
-    Extended
-        What was found.
-
     Raises
     ------
     WristError

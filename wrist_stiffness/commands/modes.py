@@ -86,11 +86,6 @@ def mode_map(table: Table, payload: RigidBody | None = None, per_axis: int = PER
     per_axis : int
         Grid points along each motor angle.
 
-    Returns
-    -------
-    ModeMap
-        On the grid.
-
     Raises
     ------
     TableError

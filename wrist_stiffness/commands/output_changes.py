@@ -94,13 +94,6 @@ def output_changes(
 ) -> tuple[TopicChanges, ...]:
     """Compare the outputs of two runs.
 
-    Parameters
-    ----------
-    old, new : path
-        Recordings.
-    topics : sequence of str
-        Outputs to compare.
-
     Returns
     -------
     tuple of TopicChanges

@@ -90,17 +90,7 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan and what it is for.
-
-    Parameters
-    ----------
-    model : ErrorModel
-        Of the wrist.
-    question : Question
-        What was asked.
-    plan : Plan
-        The experiment.
-    """
+    """A plan and what it is for."""
 
     model: ErrorModel
     question: Question
@@ -150,11 +140,6 @@ def plan_experiment(
         Those of the diagnosis: its rivals are fitted to them, and what it left open counts as open.
     progress : callable, optional
         Called with (done, total).
-
-    Returns
-    -------
-    Planned
-        The plan.
 
     Raises
     ------

@@ -326,11 +326,6 @@ def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCov
         At O in F [m, rad].
     covariance : (6, 6) float
         Of the twist.
-
-    Returns
-    -------
-    PoseWithCovarianceStamped
-        Position s, orientation R_err.
     """
     position, quaternion = pose_of_twist(twist)
     pose = Pose(Point(*position.tolist()), Quaternion(*quaternion.tolist()))

@@ -128,13 +128,7 @@ class BlockReplay:
         self._summary = summary
 
     def answer(self, block: RawBlock) -> bool:
-        """Write a block with its answers; False, and nothing is done, where that is not possible.
-
-        Parameters
-        ----------
-        block : RawBlock
-            The next messages of the recording.
-        """
+        """Write a block with its answers; False, and nothing is done, where that cannot be."""
         found: dict[str, _Joints] = {}
         for topic, rows in block.topics().items():
             standard = self._sampled.get(topic)

@@ -88,11 +88,6 @@ def simulate_recording(
     overwrite : bool
         Replace an existing recording.
 
-    Returns
-    -------
-    Simulated
-        What was written.
-
     Raises
     ------
     InputError
@@ -167,11 +162,6 @@ def hide(
         Its duration [s].
     tell : callable
         Is told before every run of the experiment that finds the size.
-
-    Returns
-    -------
-    CellSettings
-        The same with the effect.
 
     Raises
     ------

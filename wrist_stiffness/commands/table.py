@@ -65,11 +65,6 @@ def build(
     progress : callable
         Called with steps done and in all.
 
-    Returns
-    -------
-    Table
-        As written.
-
     Raises
     ------
     WristError
@@ -165,11 +160,6 @@ class MapSummary:
 
 def summarise(table: Table) -> MapSummary:
     """Return the statistics of Tables 1 and 2 for a table, on a fine grid over the map.
-
-    Parameters
-    ----------
-    table : Table
-        The lookup.
 
     Returns
     -------

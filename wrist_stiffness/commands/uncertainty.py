@@ -75,11 +75,6 @@ class Contribution:
 def contributions(table: Table) -> list[Contribution]:
     """Return all contributions of a table, those in its stated error first.
 
-    Parameters
-    ----------
-    table : Table
-        The lookup.
-
     Returns
     -------
     list of Contribution

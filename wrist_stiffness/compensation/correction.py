@@ -83,11 +83,6 @@ def correct(
     play : float
         What a motor may leave before its correction moves [rad].
 
-    Returns
-    -------
-    Correction
-        Angles to add and what remains.
-
     Raises
     ------
     UnreachablePoseError, SingularPoseError, LoadRangeError

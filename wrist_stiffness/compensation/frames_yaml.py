@@ -49,11 +49,6 @@ def frames_from_yaml(mapping: str) -> Frames:
     mapping : str
         Empty for none.
 
-    Returns
-    -------
-    Frames
-        By frame_id.
-
     Raises
     ------
     InputError

@@ -64,11 +64,6 @@ class RunningModel:
         theta_dot : (2,) float, optional
             Motor speeds; where absent the difference to the sample before [rad/s].
 
-        Returns
-        -------
-        Prediction
-            The pose error.
-
         Raises
         ------
         WristError

@@ -49,11 +49,6 @@ def static_transform(
     position, quaternion : sequence of 3 and 4 float
         [m], x y z w.
 
-    Returns
-    -------
-    StaticTransform
-        With a rotation matrix.
-
     Raises
     ------
     InputError

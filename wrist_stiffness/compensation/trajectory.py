@@ -50,11 +50,6 @@ def planned_point(
     positions, velocities, accelerations : sequence of float
         One a joint; the last two may be empty [rad, rad/s, rad/s^2].
 
-    Returns
-    -------
-    PlannedPoint
-        As arrays.
-
     Raises
     ------
     InputError

@@ -53,11 +53,6 @@ def condense_solid(solid: Solid, sizes: MeshSettings, interface: Interface) -> C
         Element sizes [m].
     interface : {"rigid", "distributing", "sliding"}
         How walls follow their frames.
-
-    Returns
-    -------
-    CondensedSolid
-        Superelement and mesh size.
     """
     body = assemble_body(solid, sizes)
     return CondensedSolid(condense(body, interface), len(body.mesh.nodes), len(body.mesh.elements))

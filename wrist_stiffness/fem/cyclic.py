@@ -69,11 +69,6 @@ def factorise_cyclic(
         Unknowns in cylindrical axes to solve for, sorted, the same in every slice.
     count : int
         Number of equal slices about z, at least 3.
-
-    Returns
-    -------
-    CyclicFactor
-        To solve with.
     """
     sliced = _slices(nodes, count)
     unknowns = (3 * sliced[:, :, None] + np.arange(3)).reshape(count, -1)

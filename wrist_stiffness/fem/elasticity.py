@@ -132,13 +132,6 @@ def mass_matrix(mesh: SolidMesh, density: float) -> sparse.csr_matrix:
 def surface_integrals(mesh: SolidMesh, surface: str) -> Array:
     """Integrals of each node's shape function N times 1, x, y, z over a named surface.
 
-    Parameters
-    ----------
-    mesh : SolidMesh
-        The mesh.
-    surface : str
-        Name of one of its surfaces.
-
     Returns
     -------
     Array

@@ -51,11 +51,6 @@ def factorise(matrix: sparse.spmatrix, unknowns: NDArray[np.int64]) -> Factor:
         (n, n).
     unknowns : (n,) int
         Number of each row; rows of one node, 3 k to 3 k + 2, are ordered together.
-
-    Returns
-    -------
-    Factor
-        To solve with.
     """
     _, group = np.unique(unknowns // 3, return_inverse=True)
     entries = sparse.coo_matrix(matrix)

@@ -113,11 +113,6 @@ def patch_bushing(body: ElasticBody, wall_rings: int) -> PatchedBushing:
         flange as its solid has rings.
     wall_rings : int
         Patches along the wall, of equal numbers of mesh lines, so finest where the mesh is.
-
-    Returns
-    -------
-    PatchedBushing
-        Without any frame.
     """
     mesh, solid = body.mesh, body.solid
     axes = cylindrical_axes(mesh.nodes)
@@ -218,11 +213,6 @@ def solve_patches(
         Radial clearance of every sliding wall [m].
     lifts : bool
         Whether walls lift off; if not they pull too, as the two-sided walls of a table do.
-
-    Returns
-    -------
-    Lifted
-        Twist and forces.
     """
     springs = [_Spring.placed(wrist, joint, configuration, clearance, lifts) for joint in JOINTS]
     ways = _free_ways(wrist.geometry)

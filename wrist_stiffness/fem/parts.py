@@ -168,11 +168,6 @@ def wrist_parts(geometry: Geometry, rings: int = RINGS) -> list[Part]:
         The wrist.
     rings : int
         Contact modes over the width of a flange.
-
-    Returns
-    -------
-    list of Part
-        Equal solids compare equal.
     """
     return [
         _link_part(geometry, name) if name in LINKS else _bushing_part(geometry, name, rings)
@@ -182,13 +177,6 @@ def wrist_parts(geometry: Geometry, rings: int = RINGS) -> list[Part]:
 
 def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
     """Mesh a solid and assemble its matrices.
-
-    Parameters
-    ----------
-    solid : Solid
-        What to mesh.
-    sizes : MeshSettings
-        Element sizes.
 
     Returns
     -------

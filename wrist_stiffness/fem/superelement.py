@@ -85,11 +85,6 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
         The solid's matrices.
     interface : {"rigid", "distributing", "sliding"}
         How the walls follow the frames.
-
-    Returns
-    -------
-    Superelement
-        At the solid's own origin.
     """
     loads = np.hstack([body.weight, body.pressure])
     if interface == "distributing":

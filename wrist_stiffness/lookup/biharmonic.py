@@ -105,11 +105,6 @@ class BiharmonicSpline:
         kernel : {'sandwell', 'thin_plate'}
             Green's function, see the module.
 
-        Returns
-        -------
-        BiharmonicSpline
-            Passes through every value.
-
         Raises
         ------
         InputError

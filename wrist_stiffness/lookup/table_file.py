@@ -59,11 +59,6 @@ def save_table(table: Table, path: str | Path) -> Table:
         Ends in `.npz`; an older file is replaced only when the new one is complete, a device or
         pipe is written to.
 
-    Returns
-    -------
-    Table
-        The same with its checksum.
-
     Raises
     ------
     TableError

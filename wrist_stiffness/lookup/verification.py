@@ -93,11 +93,6 @@ def spline_misses(
 def interpolation_errors(table: Table) -> dict[str, Any]:
     """State how well the table's splines follow the closed form at poses that they never saw.
 
-    Parameters
-    ----------
-    table : Table
-        With its grid.
-
     Returns
     -------
     dict

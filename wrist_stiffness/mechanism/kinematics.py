@@ -180,11 +180,6 @@ class Mechanism:
         theta : (..., 2) float
             Motor angles [rad].
 
-        Returns
-        -------
-        Configuration
-            Axes and rotations of all bodies.
-
         Raises
         ------
         InputError

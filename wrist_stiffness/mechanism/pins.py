@@ -31,17 +31,7 @@ def pin_length(geometry: Geometry, link: str, joint: str) -> float:
 
 
 def pin_flexibilities(geometry: Geometry, link: str, material: Material) -> tuple[Array, Array]:
-    """Return the flexibilities of a link's pins at O in F at home, motor side first (6, 6) each.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        The wrist.
-    link : str
-        The link that holds them.
-    material : Material
-        Of the pins.
-    """
+    """Return the flexibilities of a link's pins at O in F at home, motor side first (6, 6) each."""
     motor_side, platform_side = (
         _pin_flexibility(geometry, link, PINS.get((link, bore)), material)
         for bore in ("motor_bore", "platform_bore")

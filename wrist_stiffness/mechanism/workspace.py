@@ -22,15 +22,7 @@ BORDER_POINTS = 721
 
 @dataclass(frozen=True)
 class Workspace:
-    """Joint-space regions of one wrist.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The kinematic scheme.
-    limits : Limits
-        Tilt, margin and singularity limits.
-    """
+    """Joint-space regions of one wrist."""
 
     mechanism: Mechanism
     limits: Limits
@@ -114,11 +106,6 @@ class Workspace:
         ----------
         theta : (2,) float
             Motor angles [rad].
-
-        Returns
-        -------
-        Configuration
-            The rigid wrist.
 
         Raises
         ------

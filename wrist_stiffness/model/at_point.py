@@ -49,13 +49,6 @@ def cross_axes(geometry: Geometry, joint: str) -> Array:
 def end_screws(geometry: Geometry, joint: str) -> Array:
     """Return the screws for unit displacements of a sleeve's ends across its axis.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Of the wrist.
-    joint : str
-        The joint.
-
     Returns
     -------
     (4, 6) float

@@ -85,11 +85,6 @@ def predicted(
     recent : Recent, optional
         Of this block; then `models` begin with what it says is like the first.
 
-    Returns
-    -------
-    list of BlockPrediction
-        One for each model.
-
     Raises
     ------
     InputError

@@ -89,11 +89,6 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     sample : Sample
         Angles, load and other signals.
 
-    Returns
-    -------
-    Budget
-        Shares that add up.
-
     Raises
     ------
     UnreachablePoseError, SingularPoseError, LoadRangeError

@@ -81,13 +81,7 @@ LEFT_OUT = " is missing, left out"
 
 
 class MissingSignalError(Exception):
-    """A law asks for a signal that the samples do not have; the evaluation turns it to a warning.
-
-    Parameters
-    ----------
-    signal : str
-        What is missing.
-    """
+    """A law asks for a signal that the samples lack; the evaluation turns it to a warning."""
 
     def __init__(self, signal: str) -> None:
         super().__init__(signal)

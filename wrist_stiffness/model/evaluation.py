@@ -129,11 +129,6 @@ def evaluate_beside(
         What the block before left of each.
     like : Evaluated
         The first model.
-
-    Returns
-    -------
-    list of Evaluated
-        One for each model.
     """
     every = [
         staged(model, _start(model, like), memory, like.staged)

@@ -69,11 +69,6 @@ class Session:
         sample : Sample
             Not earlier than the one before.
 
-        Returns
-        -------
-        Prediction
-            Twist, covariance and contact state.
-
         Raises
         ------
         WristError
@@ -92,11 +87,6 @@ class Session:
         ----------
         sample : Sample
             Not earlier than the last one remembered.
-
-        Returns
-        -------
-        Prediction
-            Twist, covariance and contact state.
 
         Raises
         ------

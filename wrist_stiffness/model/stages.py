@@ -246,13 +246,7 @@ def _same(one: object, other: object) -> bool:
 
 
 class AtHome:
-    """What constant effects add at home; models of one table share it.
-
-    Parameters
-    ----------
-    table : Table
-        Geometry and mechanism.
-    """
+    """What constant effects add at home; models of one table share it."""
 
     def __init__(self, table: Table) -> None:
         self.table = table

@@ -90,11 +90,6 @@ def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
         Encapsulation and body; bytes behind the last field are ignored, because
         ``rclpy.serialization.serialize_message`` leaves some there behind empty sequences.
 
-    Returns
-    -------
-    AnyMessage
-        The message.
-
     Raises
     ------
     RecordingError

@@ -45,13 +45,6 @@ class Channel:
 def channel_of(topic: str, message_type: type[Message]) -> Channel:
     """Return the channel of a topic that carries one of this project's messages.
 
-    Parameters
-    ----------
-    topic : str
-        Absolute topic name.
-    message_type : type[Message]
-        Class of the messages.
-
     Returns
     -------
     Channel

@@ -100,13 +100,7 @@ class FixedLayout:
 
 
 class FixedReader(Generic[AnyMessage]):
-    """Reads the payloads of one topic.
-
-    Parameters
-    ----------
-    message_type : type[Message]
-        Class of the messages.
-    """
+    """Reads the payloads of one topic."""
 
     LAYOUTS = 8
     """So many senders or frames may take turns on a topic without being laid out anew."""

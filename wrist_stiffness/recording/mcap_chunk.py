@@ -139,16 +139,6 @@ class Contents:
 def contents_of(chunk: Chunk) -> Contents:
     """Read a chunk.
 
-    Parameters
-    ----------
-    chunk : Chunk
-        Where to read.
-
-    Returns
-    -------
-    Contents
-        Its records.
-
     Raises
     ------
     RecordingError

@@ -116,11 +116,6 @@ class McapIndex:
 def index_mcap(path: Path) -> McapIndex:
     """Walk over an MCAP file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
     Returns
     -------
     McapIndex

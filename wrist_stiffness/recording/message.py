@@ -17,11 +17,6 @@ def line(text: str, default: Any) -> Any:
         Line of the ``.msg`` file: type, name and, where the file has one, the default value.
     default : Any
         Value in Python where none is given; immutable.
-
-    Returns
-    -------
-    Any
-        The dataclass field.
     """
     return field(default=default, metadata={MSG_LINE: text})
 

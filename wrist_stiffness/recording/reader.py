@@ -200,11 +200,6 @@ class Recording:
     def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
         """Iterate over the payloads of topics, many of one topic at a time.
 
-        Parameters
-        ----------
-        topics : Collection[str]
-            Names.
-
         Yields
         ------
         tuple[str, array, Payloads]

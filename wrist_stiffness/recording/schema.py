@@ -68,11 +68,6 @@ def fields_of(ros_type: str) -> tuple[Field, ...]:
     ----------
     ros_type : str
         Full name of a type in `wrist_stiffness.recording.messages`.
-
-    Returns
-    -------
-    tuple[Field, ...]
-        One entry for each field.
     """
     if ros_type in SECONDS_NANOSECONDS:
         return (Field("sec", "sec", "int32"), Field("nanosec", "nanosec", "uint32"))

@@ -34,13 +34,6 @@ class GuardedNode(LifecycleNode):
     What they raise is counted, logged and told in the status; the node goes on, and a service
     answers with it.
 
-    Parameters
-    ----------
-    name : str
-        Node name.
-    options
-        Of rclpy's node.
-
     Attributes
     ----------
     health : Health

@@ -11,13 +11,7 @@ from wrist_stiffness.errors import WristError
 
 
 class Health:
-    """Counts of good samples and of faults by reason.
-
-    Parameters
-    ----------
-    name : str
-        Of the node.
-    """
+    """Counts of good samples and of faults by reason."""
 
     def __init__(self, name: str) -> None:
         self._name = name

@@ -57,15 +57,6 @@ class WristNode(GuardedNode, ABC):
     Unconfigured it has no model and knows nothing; inactive it takes in loads and slow signals;
     active it answers.
 
-    Parameters
-    ----------
-    name : str
-        Node name.
-    entries : sequence of ParameterEntry
-        Parameters beside the common ones.
-    options
-        Of rclpy's node.
-
     Attributes
     ----------
     stream : Stream

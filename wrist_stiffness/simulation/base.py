@@ -40,11 +40,6 @@ def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
     session : int
         Sessions of one wrist differ in the registrations of the pose sensor.
 
-    Returns
-    -------
-    list of Law
-        One wrist in one session.
-
     Raises
     ------
     InputError

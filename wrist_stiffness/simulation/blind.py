@@ -63,11 +63,6 @@ def draw(
     without : collection of str
         Effects that are not drawn, such as those that every session sets up anew.
 
-    Returns
-    -------
-    Secret
-        The same for the same arguments.
-
     Raises
     ------
     InputError

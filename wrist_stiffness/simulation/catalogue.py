@@ -63,13 +63,6 @@ def is_plausible(hidden: HiddenEffect) -> bool:
 def build(hidden: HiddenEffect, table: Table) -> Law:
     """Make the law of a hidden effect.
 
-    Parameters
-    ----------
-    hidden : HiddenEffect
-        Name, place, form, magnitude, shape.
-    table : Table
-        Of the wrist.
-
     Returns
     -------
     Law

@@ -185,11 +185,6 @@ class Pose:
         near : Equilibrium, optional
             Where the iteration begins.
 
-        Returns
-        -------
-        Equilibrium
-            Of the block.
-
         Raises
         ------
         InputError

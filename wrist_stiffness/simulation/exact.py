@@ -127,11 +127,6 @@ class ExactWrist:
         kelvin : (7,) float, optional
             Temperatures of `HEATED` above the reference [K].
 
-        Returns
-        -------
-        ExactState
-            Of this pose.
-
         Raises
         ------
         InputError

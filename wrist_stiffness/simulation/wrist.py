@@ -61,15 +61,7 @@ class TrueState:
 
 
 class TrueWrist:
-    """A wrist with hidden laws.
-
-    Parameters
-    ----------
-    table : Table
-        The elastic base.
-    laws : sequence of Law
-        What departs from it.
-    """
+    """A wrist with hidden laws."""
 
     def __init__(self, table: Table, laws: Sequence[Law]) -> None:
         self._mechanism = table.mechanism
@@ -92,11 +84,6 @@ class TrueWrist:
             Wrench on the platform at O in F [N, N m].
         room : (n,) float
             Temperature of the room above the reference [K].
-
-        Returns
-        -------
-        TrueState
-            Of the block.
         """
         angles = shaft + sum((law.turn(time_s, shaft) for law in self._laws), np.zeros_like(shaft))
         return self.at(time_s, angles, load, self._heat.run(time_s, angles, room))
@@ -114,11 +101,6 @@ class TrueWrist:
             Wrench on the platform at O in F [N, N m].
         kelvin : (n, 7) float
             Temperatures of `heat.HEATED` above the reference [K].
-
-        Returns
-        -------
-        TrueState
-            Of the block.
         """
         configuration = self._mechanism.forward(angles)
         pose = Pose(configuration, self.parts, self.gravity)

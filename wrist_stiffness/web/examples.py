@@ -77,19 +77,7 @@ EXAMPLES = (
 def recordings_of(
     example: Example, folder: Path, table: Table, tell: Callable[[str], None]
 ) -> list[Path]:
-    """Return the recordings of an example, made in a folder where they are not there.
-
-    Parameters
-    ----------
-    example : Example
-        Which.
-    folder : Path
-        Where examples are kept.
-    table : Table
-        Of the shipped wrist.
-    tell : callable
-        Told what is being done.
-    """
+    """Return the recordings of an example, made in a folder where they are not there."""
     own = folder / example.name
     paths = [own / f"day_{day}.mcap" for day in range(1, example.days + 1)]
     if all(path.is_file() for path in paths):

@@ -12,13 +12,7 @@ from wrist_stiffness.web.tab import Tab
 
 
 class FormulaForm:
-    """The form of one tab.
-
-    Parameters
-    ----------
-    tab : Tab
-        Whose it is.
-    """
+    """The form of one tab."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab = tab

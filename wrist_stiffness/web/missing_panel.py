@@ -20,13 +20,7 @@ FIRST = 12
 
 
 class MissingPanel:
-    """The panel of one tab.
-
-    Parameters
-    ----------
-    tab : Tab
-        Whose it is.
-    """
+    """The panel of one tab."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab = tab

@@ -12,13 +12,7 @@ from wrist_stiffness.web.tab import VERSIONS, Tab
 
 
 class ModelsPanel:
-    """The panel of one tab.
-
-    Parameters
-    ----------
-    tab : Tab
-        Whose it is.
-    """
+    """The panel of one tab."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab = tab

@@ -36,13 +36,7 @@ FORKS = get_context("forkserver")
 
 
 class Worker:
-    """A process that does the long work of one tab.
-
-    Parameters
-    ----------
-    folder : Path
-        Workspace.
-    """
+    """A process that does the long work of one tab."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -91,13 +85,7 @@ class Worker:
 
 
 class Tab:
-    """What a tab shows.
-
-    Parameters
-    ----------
-    workspace : Workspace
-        Where recordings and models lie.
-    """
+    """What a tab shows."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace

@@ -36,13 +36,7 @@ POINTS = """(e) => emit(e
 
 
 class Views:
-    """The pictures of one tab.
-
-    Parameters
-    ----------
-    tab : Tab
-        Whose they are.
-    """
+    """The pictures of one tab."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab = tab

@@ -47,13 +47,6 @@ def wrist_figure(
     exaggeration : float or None
         Factor on every displacement [-]; None for one that is seen well.
 
-    Returns
-    -------
-    dict
-        The picture.
-    float
-        The factor.
-
     Raises
     ------
     UnreachablePoseError, SingularPoseError, LoadRangeError

@@ -58,11 +58,6 @@ def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:
     push : Push
         The load; own weight is left out.
 
-    Returns
-    -------
-    list of Shape
-        Links, bushings and platform.
-
     Raises
     ------
     UnreachablePoseError, SingularPoseError, LoadRangeError

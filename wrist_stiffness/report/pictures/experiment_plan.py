@@ -19,17 +19,7 @@ ARROW_DEG = 6.0
 
 
 def draw_plan(table: Table, timeline: Timeline, path: Path) -> None:
-    """Draw the poses in the joint space and the time line.
-
-    Parameters
-    ----------
-    table : Table
-        Of the wrist.
-    timeline : Timeline
-        The experiment.
-    path : Path
-        PNG to write.
-    """
+    """Draw the poses in the joint space and the time line."""
     figure = new_figure(11.5, 6.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.25))
     _draw_poses(figure, figure.add_subplot(grid[:, 0]), table, timeline)

@@ -11,15 +11,7 @@ from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 
 def draw_tolerances(study: ToleranceStudy, path: Path) -> None:
-    """Draw a bar for each tolerance, in s and in phi.
-
-    Parameters
-    ----------
-    study : ToleranceStudy
-        The costs.
-    path : Path
-        PNG to write.
-    """
+    """Draw a bar for each tolerance, in s and in phi."""
     rows = (*study.costs, study.others)
     figure = new_figure(11.0, 1.2 + 0.22 * len(rows))
     places = np.arange(len(rows))

@@ -12,17 +12,7 @@ from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 
 def draw_uncertainty(table: Table, found: list[Contribution], path: Path) -> None:
-    """Draw a bar for each contribution, in s and in phi.
-
-    Parameters
-    ----------
-    table : Table
-        The lookup.
-    found : list of Contribution
-        Its contributions.
-    path : Path
-        PNG to write.
-    """
+    """Draw a bar for each contribution, in s and in phi."""
     figure = new_figure(9.0, 1.9 + 0.42 * len(found))
     plot = figure.subplots()
     places = np.arange(len(found))

@@ -36,11 +36,6 @@ def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
     paths : iterable of path
         Recordings, or folders in which recordings lie side by side.
 
-    Returns
-    -------
-    list of Path
-        Folders' recordings by name; none twice.
-
     Raises
     ------
     RecordingError

@@ -36,11 +36,6 @@ def gauge_of(column: str) -> str:
 def read_gauges(path: str | Path) -> dict[str, Gauge]:
     """Read what reads which column.
 
-    Parameters
-    ----------
-    path : path
-        YAML file.
-
     Returns
     -------
     dict of str to Gauge

@@ -153,13 +153,6 @@ class MachineSignals:
 def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
     """Return the signals of a recording, loads moved to O.
 
-    Parameters
-    ----------
-    samples : Samples
-        With joint states and loads.
-    frames : Frames
-        In which loads arrive.
-
     Returns
     -------
     MachineSignals

@@ -48,11 +48,6 @@ def agreement(measured: Array, rigid: Array) -> Agreement:
     ----------
     measured, rigid : (n, 3, 3) float
         U -> F, finite.
-
-    Returns
-    -------
-    Agreement
-        Of a thousand of them.
     """
     used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
     seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])

@@ -76,11 +76,6 @@ def in_order(time_ns: Stamps, values: Array) -> Signal:
     values : (n, ...) float
         Rows that are not finite are left out; of equal stamps the last one received counts, as in
         the nodes.
-
-    Returns
-    -------
-    Signal
-        Its stamps rise.
     """
     finite = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     time_ns, values = time_ns[finite], values[finite]

@@ -69,11 +69,6 @@ def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -
         Actual by standard topic name.
     mapped : Frames
         What the user says of frames goes before what the recording says.
-
-    Returns
-    -------
-    KnownFrames
-        And what is wrong with others.
     """
     topic = remaps.get(TF_STATIC, TF_STATIC)
     if topic not in {info.name for info in recording.topics}:
