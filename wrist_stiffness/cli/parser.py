@@ -107,8 +107,6 @@ def add_command(
 
     Parameters
     ----------
-    commands
-        Where to.
     name, what
         The command, and what it does in a line.
     texts

@@ -101,10 +101,6 @@ def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
     ----------
     table : Table
         The lookup; evaluated in closed form, because only that knows the components.
-    push : Push
-        The load.
-    per_axis : int
-        Grid points along each motor angle.
 
     Raises
     ------

@@ -70,14 +70,6 @@ def calibrate_model(
 
     Parameters
     ----------
-    model : path
-        Model file.
-    recordings : Recordings
-        With measured poses, of one wrist.
-    output : path
-        Model file to write.
-    run : Run
-        For the lineage.
     progress : callable
         Told steps done and steps at most.
     asking : callable

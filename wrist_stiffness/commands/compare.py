@@ -111,10 +111,6 @@ def compare(
     ----------
     models : sequence of path
         Model files, the one to be improved upon first.
-    recordings : Recordings
-        Each a session.
-    run : Run
-        For the report.
     progress : callable
         From a label to a function that is told steps done and in all.
 

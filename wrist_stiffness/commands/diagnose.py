@@ -129,16 +129,10 @@ def diagnose_recordings(
 
     Parameters
     ----------
-    model : path
-        Model file.
     recordings : Recordings
         Each a session; the last one judges what the others show.
-    run : Run
-        For the report.
     progress : callable
         From a label to a function that is told steps done and in all.
-    tell : callable
-        Told what is being done.
     naming : float
         Probability from which an effect is named.
     seconds : float

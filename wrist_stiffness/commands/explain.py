@@ -128,8 +128,6 @@ def explain(
 
     Parameters
     ----------
-    model : path
-        Model file.
     angles : sequence of 2 float
         Motor angles [rad].
     load : Load

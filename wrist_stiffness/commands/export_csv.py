@@ -95,8 +95,6 @@ def export_csv(
     ----------
     recording : path
         rosbag2 folder with MCAP storage, or `.mcap` file.
-    output : path
-        CSV file.
     table : Table
         Of the wrist: turns loads that are measured on the platform into F, and knows how small a
         swing of a motor is the chatter of a count.
@@ -104,8 +102,6 @@ def export_csv(
         Actual by standard topic name.
     settings : StreamSettings, optional
         Joint names, sensor frames and age limit of loads.
-    overwrite : bool
-        Replace an existing file.
     progress : callable
         Told rows done and in all.
 

@@ -218,16 +218,6 @@ def extend_model(
 
     Parameters
     ----------
-    model : path
-        Model file.
-    addition : CatalogueEffect, FileEffect or FormulaEffect
-        What to add.
-    recordings : Recordings
-        With measured poses, of one wrist.
-    output : path
-        Model file to write.
-    run : Run
-        For the lineage.
     progress : callable
         Told steps done and steps at most.
 

@@ -104,8 +104,6 @@ def each_recording(
     ----------
     command : callable
         Of recordings; can be pickled.
-    recordings : Recordings
-        Recordings, or folders of them.
     progress : callable
         As that of `map_recordings`.
 

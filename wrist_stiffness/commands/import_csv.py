@@ -123,12 +123,8 @@ def import_csv(
         rosbag2 folder, or file where it ends in `.mcap`.
     unloaded : bool
         The table has no load columns because nothing pulled at the platform.
-    overwrite : bool
-        Replace an existing recording.
     progress : callable
         Told rows done and in all.
-    frame : str
-        Of the measured poses.
     gauges_file : path, optional
         Which columns are dial gauges and inclinometers, and where these stand.
 

@@ -17,8 +17,6 @@ def write_json(path: str | Path, content: Any) -> None:
     ----------
     path : path
         File to write; an older one is replaced, a device or pipe is written to.
-    content : any
-        Of dicts, lists, texts and numbers.
 
     Raises
     ------

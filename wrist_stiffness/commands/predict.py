@@ -80,8 +80,6 @@ def predict(
 
     Parameters
     ----------
-    model : path
-        Model file.
     angles : sequence of 2 float
         Motor angles [rad].
     load : sequence of 6 float

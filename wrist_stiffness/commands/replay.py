@@ -110,16 +110,12 @@ def replay(
     ----------
     recording : path
         Folder or `.mcap` file.
-    model : path
-        Model file.
     output : path
         Folder or `.mcap` file to write: the input, plus the outputs that the nodes would have sent.
     settings : (StreamSettings, StreamSettings), optional
         As the nodes'; the defaults if None.
     topics : mapping, optional
         Actual by standard topic name.
-    overwrite : bool
-        Replace an existing recording.
     progress : callable
         Called with messages done and in all.
 
@@ -320,8 +316,6 @@ def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCov
 
     Parameters
     ----------
-    header : Header
-        Stamp and frame.
     twist : (6,) float
         At O in F [m, rad].
     covariance : (6, 6) float

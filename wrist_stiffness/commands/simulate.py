@@ -75,8 +75,6 @@ def simulate_recording(
     ----------
     path : path
         rosbag2 folder, or file where it ends in `.mcap`.
-    table : Table
-        Of the true wrist.
     settings : CellSettings
         Program, rate, sensors; sessions are days.
     seconds : float
@@ -85,8 +83,6 @@ def simulate_recording(
         Of all noise; the same seed gives the same bytes.
     progress : callable, optional
         Is told samples done and samples in all.
-    overwrite : bool
-        Replace an existing recording.
 
     Raises
     ------
@@ -154,10 +150,6 @@ def hide(
         `NAME@COMPONENT` or `NAME@COMPONENT:FORM` of the catalogue; the first form by default.
     size : float
         In units of one sample's noise, over this experiment.
-    table : Table
-        Of the wrist.
-    settings : CellSettings
-        The experiment.
     seconds : float
         Its duration [s].
     tell : callable

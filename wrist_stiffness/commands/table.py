@@ -48,8 +48,6 @@ def build(
 
     Parameters
     ----------
-    geometry : path
-        Geometry file.
     output : path
         Table file to write, `.npz`.
     evaluation : str
@@ -120,10 +118,6 @@ def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
     ----------
     step : path
         STEP file, see `fem/step_part.py`.
-    geometry : path
-        Geometry file of its wrist.
-    link : str
-        The link that it draws.
 
     Returns
     -------

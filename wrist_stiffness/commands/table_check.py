@@ -49,8 +49,6 @@ def check(
 
     Parameters
     ----------
-    path : path
-        Table file.
     geometry : path, optional
         Geometry file that the table must be of.
     rebuild : bool

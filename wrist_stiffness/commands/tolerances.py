@@ -242,16 +242,10 @@ def study_tolerances(
 
     Parameters
     ----------
-    model : path
-        Of the nominal wrist.
-    wrists : int
-        How many.
     load : sequence of 6 float
         On the platform at O in F [N, N m].
     limits : mapping
         See `tolerances_of`.
-    seed : int
-        Of the draws.
     workers, progress
         See `fleet.spread`.
 

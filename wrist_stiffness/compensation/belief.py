@@ -98,8 +98,6 @@ class Belief:
 
         Parameters
         ----------
-        scales : Scales
-            Of the wrist.
         settings : SupervisorSettings
             As of `Supervisor.judge`.
         reach : float

@@ -76,8 +76,6 @@ def correct(
         The rigid wrist and the table's domain.
     command : (2,) float
         Commanded motor angles [rad].
-    objective : Objective
-        What to make right.
     held : (2,) float, optional
         The correction so far; zero if None [rad].
     play : float
@@ -135,8 +133,6 @@ def compiled_task(objective: Objective, play: float) -> Array:
 
     Parameters
     ----------
-    objective : Objective
-        What to make right.
     play : float
         What a motor may leave before its correction moves [rad].
     """
@@ -157,8 +153,6 @@ def as_applied(correction: Correction, delta: Array) -> Correction:
 
     Parameters
     ----------
-    correction : Correction
-        At its fixed point.
     delta : (2,) float
         What is applied instead [rad].
 

@@ -281,10 +281,6 @@ class CorrectionStream(Stream):
         ----------
         stamp_ns : int
             Its start [ns].
-        frame_id : str
-            Its header's frame.
-        names : sequence of str
-            Joint names.
         points : sequence of PlannedPoint
             Of all these joints (see `planned_point`).
 

@@ -88,10 +88,6 @@ class Corrector:
 
         Parameters
         ----------
-        running : RunningModel
-            Predicts.
-        settings : StreamSettings
-            Objective and limits.
         stamp_ns : int
             Of the command [ns].
         theta : (2,) float

@@ -43,8 +43,6 @@ class HeldSignals:
             Of the component or of the covariate.
         stamp_ns : int
             [ns].
-        value : float
-            In the signal's unit.
 
         Raises
         ------

@@ -299,8 +299,6 @@ class LoadIntake:
         ----------
         stamps : (k,) int
             [ns].
-        frame_id : str
-            Frame of the messages.
         wrenches : (k, 6) float
             Force and moment [N, N m].
         """

@@ -40,8 +40,6 @@ def measured_pose(
     ----------
     frames : Frames
         Frames in which it may come.
-    frame_id : str
-        Its frame.
     position, quaternion : sequence of 3 and 4 float
         [m], x y z w.
     what : str
@@ -81,8 +79,6 @@ def pose_of_markers(
     ----------
     frames : Frames
         Frames in which they may come.
-    frame_id : str
-        Their frame.
     points : (n, 3) array_like
         Measured [m]; a marker with a NaN is lost.
     nominal : (n, 3) float

@@ -58,8 +58,6 @@ class Objective:
 
         Parameters
         ----------
-        configuration : Configuration
-            Where the platform is.
         jacobian : (3, 2) float
             Of the platform's angular velocity there.
 

@@ -48,10 +48,6 @@ def require_within_limits(what: str, theta: Array, limits: Limits, motors: Motor
         For the message.
     theta : (2,) float
         Motor angles [rad].
-    limits : Limits
-        Of the joints.
-    motors : MotorNames
-        For the message.
 
     Raises
     ------

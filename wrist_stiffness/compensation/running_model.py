@@ -59,8 +59,6 @@ class RunningModel:
             [ns].
         theta : (2,) float
             Motor angles [rad].
-        load : Load
-            What acts on the platform.
         theta_dot : (2,) float, optional
             Motor speeds; where absent the difference to the sample before [rad/s].
 

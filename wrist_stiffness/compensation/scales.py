@@ -43,12 +43,8 @@ class Scales:
 
         Parameters
         ----------
-        table : Table
-            Its domain and range of loads.
         theta : (2,) float
             Motor angles [rad].
-        load : Load
-            On the platform there.
 
         Raises
         ------
@@ -74,8 +70,6 @@ class Scales:
 
         Parameters
         ----------
-        table : Table
-            Its domain and range of loads.
         theta, wrench : (n, 2), (n, 6) float
             Motor angles [rad], loads at O [N, N m].
         on_platform : (n,) bool

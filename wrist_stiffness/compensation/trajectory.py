@@ -45,8 +45,6 @@ def planned_point(
 
     Parameters
     ----------
-    count : int
-        How many joints the trajectory names.
     positions, velocities, accelerations : sequence of float
         One a joint; the last two may be empty [rad, rad/s, rad/s^2].
 
@@ -71,8 +69,6 @@ def neighbours(point: PlannedPoint, places: Sequence[int]) -> list[Array]:
 
     Parameters
     ----------
-    point : PlannedPoint
-        Of the plan.
     places : (2,) sequence of int
         Where the motors stand among the joints.
 
@@ -104,8 +100,6 @@ def corrected_point(
 
     Parameters
     ----------
-    point : PlannedPoint
-        Of the plan.
     places : (2,) sequence of int
         Where the motors stand among the joints.
     corrected : sequence of (2,) float

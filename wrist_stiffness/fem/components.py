@@ -75,10 +75,6 @@ def elastic_components(
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
-    sizes : MeshSettings
-        Element sizes.
     interface : {"rigid", "distributing", "sliding"}
         How walls follow their frames.
     progress : callable, optional
@@ -92,8 +88,6 @@ def elastic_components(
     -------
     ElasticComponents
         At O in F with the wrist at home.
-    Provenance
-        How they were made.
 
     Raises
     ------
@@ -133,12 +127,8 @@ def place_components(
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
     parts : list of Part
         Its elastic parts, in the order of `ELASTIC`.
-    condensed : dict of Solid to Superelement
-        The condensed solid of each part.
 
     Returns
     -------

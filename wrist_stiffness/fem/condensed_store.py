@@ -47,8 +47,6 @@ def condense_solid(solid: Solid, sizes: MeshSettings, interface: Interface) -> C
 
     Parameters
     ----------
-    solid : Solid
-        Its shape and walls.
     sizes : MeshSettings
         Element sizes [m].
     interface : {"rigid", "distributing", "sliding"}

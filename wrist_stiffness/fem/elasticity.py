@@ -35,8 +35,6 @@ def stiffness_matrix(mesh: SolidMesh, material: AnyMaterial) -> sparse.csr_matri
 
     Parameters
     ----------
-    mesh : SolidMesh
-        Its mesh.
     material : Material or OrthotropicMaterial
         Its material; the axes of an orthotropic one turn about z.
 

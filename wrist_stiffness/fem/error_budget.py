@@ -63,12 +63,6 @@ def error_budget(
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
-    components : ElasticComponents
-        Of the table.
-    sizes : MeshSettings
-        The table's element sizes.
     interface : {"rigid", "distributing", "sliding"}
         How walls follow their frames.
     rings : int

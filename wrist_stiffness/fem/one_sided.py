@@ -203,10 +203,6 @@ def solve_patches(
 
     Parameters
     ----------
-    wrist : PatchedWrist
-        The wrist.
-    configuration : Configuration
-        One pose.
     wrench : (6,) float
         On the platform at O in F [N, N m].
     clearance : float
@@ -266,10 +262,6 @@ def lifting_misses(
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
-    components : ElasticComponents
-        For the flexibility of its links.
     sizes : MeshSettings
         Element sizes of the bushings in patches.
     poses : (n, 2) float

@@ -164,8 +164,6 @@ def wrist_parts(geometry: Geometry, rings: int = RINGS) -> list[Part]:
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
     rings : int
         Contact modes over the width of a flange.
     """

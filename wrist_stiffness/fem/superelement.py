@@ -81,8 +81,6 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
 
     Parameters
     ----------
-    body : ElasticBody
-        The solid's matrices.
     interface : {"rigid", "distributing", "sliding"}
         How the walls follow the frames.
     """
@@ -116,8 +114,6 @@ def frame_stiffness(
 
     Parameters
     ----------
-    body : ElasticBody
-        The solid's matrices.
     loads : (3 n, k) float
         Nodal forces.
     slides : bool

@@ -87,10 +87,6 @@ def build_table(
 
     Parameters
     ----------
-    values : mapping
-        As a geometry file reads.
-    settings : BuildSettings
-        Mesh, interface, grid.
     progress : callable
         Called with steps done and in all.
     condenser : callable

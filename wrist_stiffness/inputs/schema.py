@@ -189,8 +189,6 @@ def record(
         empty for none.
     others : bool
         Whether it may have other keys as well, which are left unread.
-    make : callable
-        Takes the values by keyword.
 
     Returns
     -------

@@ -34,8 +34,6 @@ def rated_map(
         n poses.
     operators : ContactOperators
         There; made without gravity for the paper's load-only figures.
-    geometry : Geometry
-        Readout points and load point.
 
     Returns
     -------

@@ -53,8 +53,6 @@ def save_table(table: Table, path: str | Path) -> Table:
 
     Parameters
     ----------
-    table : Table
-        What to write.
     path : path
         Ends in `.npz`; an older file is replaced only when the new one is complete, a device or
         pipe is written to.

@@ -66,8 +66,6 @@ def spline_misses(
 
     Parameters
     ----------
-    table : Table
-        With its grid.
     rng : Generator, optional
         Draws them; the same ones every time if None.
 

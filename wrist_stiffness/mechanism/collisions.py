@@ -88,8 +88,6 @@ def collision(geometry: Geometry, poses: Array) -> Collision | None:
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
     poses : (n, 2) float
         Motor angles [rad].
     """

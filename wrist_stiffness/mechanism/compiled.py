@@ -208,8 +208,6 @@ class CompiledWrist:
 
         Parameters
         ----------
-        configuration : Configuration
-            Of one pose.
         wrench : (6,) float
             Load on the platform at O in F, as it acts [N, N m].
         active : (m,) bool, optional
@@ -309,12 +307,8 @@ class CompiledWrist:
             n of them.
         state : CorrectorState
             Of the command before; afterwards that of the last command done.
-        found : CorrectedRows
-            To be filled.
         supervisor : CompiledSupervisor, optional
             Writes the loads to correct for over the measured ones, and the shares.
-        begin, end : int
-            Which of the commands.
 
         Returns
         -------

@@ -30,8 +30,6 @@ def solve_contacts(
     -------
     force : as `gap`
         Not negative [N].
-    active : as `gap`
-        Sectors in contact.
 
     Raises
     ------

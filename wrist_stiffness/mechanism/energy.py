@@ -23,8 +23,6 @@ def component_wrenches(
     ----------
     projectors : Influence
         Of configurations of shape (...).
-    components : ElasticComponents
-        Condensed parts.
     wrench : (..., 6) float
         On the platform at O in F [N, N m].
     force : (..., m) float
@@ -51,8 +49,6 @@ def component_screws(
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts.
     wrench : (..., 6) float
         On the platform at O in F [N, N m].
     force : (..., m) float
@@ -81,8 +77,6 @@ def strain_energies(
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts.
     wrench : (..., 6) float
         On the platform at O in F [N, N m].
     force : (..., m) float

@@ -120,8 +120,6 @@ def natural_modes(
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts with their masses.
     bodies : tuple of RigidBody
         What moves with the platform: its plate, and a payload.
     closed : (..., m) bool

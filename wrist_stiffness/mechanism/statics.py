@@ -47,8 +47,6 @@ def component_shares(configuration: Configuration, components: ElasticComponents
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts.
 
     Returns
     -------
@@ -94,8 +92,6 @@ def weight_response(
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts with their weights.
     gravity : (3,) float
         Acceleration of gravity in F [m/s^2].
 
@@ -122,12 +118,8 @@ def weight_wrench(
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts with their weights.
     gravity : (3,) float
         Acceleration of gravity in F [m/s^2].
-    projectors : Influence
-        Of the configuration.
     """
     r = component_rotations(configuration)
     field = _to_body(r, gravity)
@@ -222,8 +214,6 @@ def contact_operators(
     ----------
     configuration : Configuration
         Of shape (...).
-    components : ElasticComponents
-        Condensed parts.
     gravity : (3,) float
         Acceleration of gravity in F [m/s^2].
 
@@ -257,10 +247,6 @@ def assembled_operators(
     ----------
     configuration : Configuration
         Of shape (...).
-    projectors : Influence
-        Of the configuration.
-    components : ElasticComponents
-        Condensed parts.
     flexibility : (..., 8, 6, 6) float
         Of the components at O in F at the pose [m/N, rad/N, rad/(N m)].
     gravity : (3,) float
@@ -288,8 +274,6 @@ def changed_operators(
 
     Parameters
     ----------
-    operators : ContactOperators
-        Of the parts before.
     configuration : Configuration
         Of shape (...).
     before, after : ElasticComponents

@@ -42,8 +42,6 @@ def urdf(geometry: Geometry, motors: tuple[str, str]) -> str:
 
     Parameters
     ----------
-    geometry : Geometry
-        Of the wrist.
     motors : (str, str)
         Names of the motors' joints.
 

@@ -86,8 +86,6 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     ----------
     model : ErrorModel
         Its table is evaluated in closed form, which alone knows the components.
-    sample : Sample
-        Angles, load and other signals.
 
     Raises
     ------

@@ -91,8 +91,6 @@ def evaluate(
 
     Parameters
     ----------
-    model : Evaluable
-        Table and effects.
     block : Block
         n > 0 samples inside the table's domain and load range.
     memory : Memory or None

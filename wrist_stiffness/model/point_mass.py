@@ -19,8 +19,6 @@ def mass_columns(
     ----------
     parameters : sequence of Parameter
         Among them `mass_g`, `x_mm`, `y_mm` and `z_mm`.
-    mass_g : float
-        Of the trials.
     at : dict of str to float
         Values of all other parameters in the trials; the first moment counts from its place.
     arm_mm : float

@@ -99,10 +99,6 @@ def pressing(geometry: Geometry, joint: str, wrench: Array) -> Array:
 
     Parameters
     ----------
-    geometry : Geometry
-        Of the wrist.
-    joint : str
-        The joint.
     wrench : (n, 6) float
         Carried by the joint, at O in its home frame [N, N m].
 

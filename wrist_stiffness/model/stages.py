@@ -277,12 +277,8 @@ def constants_of(effects: Sequence[Effect], parts: ElasticComponents, at_home: A
 
     Parameters
     ----------
-    effects : sequence of Effect
-        Of a model.
     parts : ElasticComponents
         Elastic parts as they are with the model's effects.
-    at_home : AtHome
-        Of the model's table.
     """
     found = (at_home.of(effect, parts) for effect in effects if effect.law.constant)
     return sum(found, Constants())

@@ -43,8 +43,6 @@ def warmth(at: Situation, place: str, values: Mapping[str, float], state: Any) -
     -------
     (n,) float
         [K]
-    object
-        State for the next block.
 
     Raises
     ------

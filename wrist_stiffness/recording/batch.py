@@ -61,8 +61,6 @@ def decode_batches(
 
     Parameters
     ----------
-    message_type : type[Message]
-        Class of all of them.
     payloads : Sequence[bytes] or (n, size) uint8 array
         CDR of either byte order.
 
@@ -70,8 +68,6 @@ def decode_batches(
     -------
     batches : list[Batch]
         Together they hold every payload that can be decoded, with exactly the values of `decode`.
-    undecodable : list[int]
-        The other payloads.
     """
     batches: list[Batch] = []
     undecodable: list[int] = []

@@ -84,8 +84,6 @@ def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
 
     Parameters
     ----------
-    message_type : type[AnyMessage]
-        Class of the message.
     payload : bytes
         Encapsulation and body; bytes behind the last field are ignored, because
         ``rclpy.serialization.serialize_message`` leaves some there behind empty sequences.
@@ -158,8 +156,6 @@ def byte_order_of(message_type: type[Message], payload: bytes) -> ByteOrder:
     ----------
     message_type : type[Message]
         Class of the message, for the error's text.
-    payload : bytes
-        Encapsulation and body.
 
     Returns
     -------

@@ -77,8 +77,6 @@ class Messages:
 
         Parameters
         ----------
-        channel_id : int
-            The channel.
         order : (k,) int
             Their places among all messages; no two are the same.
         log_time_ns : (k,) int

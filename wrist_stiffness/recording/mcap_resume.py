@@ -38,8 +38,6 @@ def next_record(stream: BinaryIO, position: int, size: int) -> int | None:
 
     Parameters
     ----------
-    stream : binary stream
-        The file.
     position, size : int
         From which byte to search, and how many the file has.
     """

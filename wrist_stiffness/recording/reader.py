@@ -142,8 +142,6 @@ class Recording:
 
         Parameters
         ----------
-        block : RawBlock
-            Of this recording.
         rows : (k,) int
             Which ones.
 

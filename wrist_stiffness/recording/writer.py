@@ -127,8 +127,6 @@ class RecordingWriter:
 
         Parameters
         ----------
-        topic : str
-            Absolute topic name.
         message : Message
             Class of `wrist_stiffness.recording.messages`; one class for each topic.
         log_time_ns : int
@@ -147,10 +145,6 @@ class RecordingWriter:
 
         Parameters
         ----------
-        channel : Channel
-            Topic and type of the payload.
-        payload : bytes
-            In the channel's message encoding.
         log_time_ns : int
             Time of reception [ns]; need not increase.
 

@@ -132,8 +132,6 @@ def told_lines(
 
     Parameters
     ----------
-    parameters : iterable of FittedParameter
-        Of a fit.
     all_of_them : bool
         Also those that the data do not tell.
     usual : bool

@@ -61,10 +61,6 @@ def against(curve: Curve, title: str, models: Sequence[tuple[str, Observations]]
 
     Parameters
     ----------
-    curve : Curve
-        Of one of the models.
-    title : str
-        What it depends on.
     models : sequence of (str, Observations)
         Name and residuals of further models over the same units, shown along the same direction.
     """

@@ -40,12 +40,6 @@ def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) 
 
     Parameters
     ----------
-    table : Table
-        Of the wrist, for the picture.
-    timeline : Timeline
-        The experiment.
-    text : str
-        The summary.
     folder : path
         To make; its parent must exist.
 

@@ -36,8 +36,6 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
 
     Parameters
     ----------
-    table : Table
-        The lookup.
     folder : path
         Where the PNG files go; made if missing.
     push : Push, optional
@@ -87,10 +85,6 @@ def draw_modes(
 
     Parameters
     ----------
-    table : Table
-        The lookup.
-    found : ModeMap
-        Of the table and the payload.
     folder : path
         Where the PNG files go; made if missing.
     payload : RigidBody, optional

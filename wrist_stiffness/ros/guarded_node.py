@@ -77,14 +77,8 @@ class GuardedNode(LifecycleNode):
 
         Parameters
         ----------
-        message_type : type
-            Of the topic.
-        topic : str
-            Its name, within the node's namespace.
         callback : callable
             Takes a message; may raise anything.
-        qos : QoSProfile
-            Of the subscription.
         states : sequence of str
             States of the lifecycle in which messages count; in others they are dropped.
         read : callable, optional
@@ -125,10 +119,6 @@ class GuardedNode(LifecycleNode):
 
         Parameters
         ----------
-        service_type : type
-            Trigger or SetBool.
-        name : str
-            Of the service.
         act : callable
             Takes the request and returns what to say, or an awaitable of it; what it raises is the
             answer, too.

@@ -53,8 +53,6 @@ def declare(node: Node, entries: Sequence[ParameterEntry]) -> None:
     ----------
     node : Node
         Gets them, with the values it was started with.
-    entries : sequence of ParameterEntry
-        What to declare.
 
     Raises
     ------

@@ -102,8 +102,6 @@ def error_payload(
         Of the error, at O in F [m, rad].
     covariance : (6, 6) float
         Of the twist.
-    frame_id : str
-        Name of F.
     """
     place, turn = pose_of_twist(twist)
     return _in_frame(PoseWithCovarianceStamped, frame_id).payload(

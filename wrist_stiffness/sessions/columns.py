@@ -113,8 +113,6 @@ class SessionModel:
 
         Parameters
         ----------
-        trials : sequence of tuple of Effect
-            Full sets of effects.
         along : sequence of bool, optional
             Which of them are evaluated on the path; by default those that remember.
         """

@@ -20,10 +20,6 @@ def hidden_counts(table: Table, cuts: Sequence[Cut], theta: Array) -> Array:
 
     Parameters
     ----------
-    table : Table
-        Kinematics and the encoder's step.
-    cuts : sequence of Cut
-        Of the sessions.
     theta : (u, 2) float
         Mean angles of all units [rad].
     """

@@ -66,8 +66,6 @@ def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
 
     Parameters
     ----------
-    model : ErrorModel
-        Predicts.
     sessions : sequence of MeasuredSession
         In the order of time.
 

@@ -33,8 +33,6 @@ def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
     name : str
         `exact` (none) or `wrong`: stiffness of every part, every joint axis, both registrations of
         the pose sensor and the scale of the load sensor.
-    table : Table
-        Of the wrist.
     seed : int
         Draws how wrong it is.
     session : int

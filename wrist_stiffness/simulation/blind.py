@@ -52,8 +52,6 @@ def draw(
     ----------
     seed : int
         Not negative.
-    table : Table
-        Of the wrist.
     settings : CellSettings
         The size holds for this experiment.
     seconds : float

@@ -53,10 +53,6 @@ def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Prog
 
     Parameters
     ----------
-    workspace : Workspace
-        Of the wrist.
-    rng : numpy.random.Generator
-        Chooses poses and loads.
     seconds : float
         About how long the program takes [s].
 

@@ -29,8 +29,6 @@ def base_pose(table: Table, encoder: Array, wrench: Array) -> BasePose:
 
     Parameters
     ----------
-    table : Table
-        The base.
     encoder : (n, 2) float
         Motor angles [rad].
     wrench : (n, 6) float
@@ -64,8 +62,6 @@ def residual(table: Table, sample: CellSample) -> Array:
 
     Parameters
     ----------
-    table : Table
-        The base.
     sample : CellSample
         n samples with whole poses.
 

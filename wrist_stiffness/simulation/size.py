@@ -38,12 +38,8 @@ def sample_covariance(table: Table, theta: Array, name: str) -> Array:
 
     Parameters
     ----------
-    table : Table
-        For the encoder step.
     theta : (n, 2) float
         Motor angles [rad].
-    name : str
-        Pose instrument.
 
     Returns
     -------

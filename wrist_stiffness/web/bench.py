@@ -363,13 +363,9 @@ def work(folder: Path, wires: Connection, stop: Event) -> None:
 
     Parameters
     ----------
-    folder : Path
-        Workspace.
     wires : Connection
         Takes (method, arguments); answers ("told", words), ("done", done, total), and at the end
         ("good", changes) or ("bad", sentence).
-    stop : Event
-        Set by whoever cancels.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

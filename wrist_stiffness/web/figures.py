@@ -137,8 +137,6 @@ def error_map(shown: Shown, border: Array) -> Figure:
 
     Parameters
     ----------
-    shown : Shown
-        What to show.
     border : (n, 2) float
         Border of the operative workspace [rad].
     """
@@ -225,10 +223,6 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
 
     Parameters
     ----------
-    shown : Shown
-        What to show.
-    condition : str
-        Of the units.
     told : Curve, optional
         Of the comparison, where it is of this condition and version.
     """

@@ -56,8 +56,6 @@ def build_page(workspace: Workspace, largest: int) -> None:
 
     Parameters
     ----------
-    workspace : Workspace
-        Where recordings and models lie.
     largest : int
         Of an upload [bytes].
     """

@@ -25,10 +25,6 @@ def as_commands(model: Path, recordings: Sequence[Path], added: Sequence[str]) -
 
     Parameters
     ----------
-    model : Path
-        With which it began.
-    recordings : sequence of Path
-        That were opened.
     added : sequence of str
         Options of `extend`, in their order.
     """

@@ -36,8 +36,6 @@ def wrist_figure(
 
     Parameters
     ----------
-    table : Table
-        Of the wrist.
     theta : (2,) float
         Motor angles [rad].
     load : (6,) float

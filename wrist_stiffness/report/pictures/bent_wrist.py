@@ -51,8 +51,6 @@ def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:
 
     Parameters
     ----------
-    table : Table
-        The lookup.
     theta : (2,) float
         Motor angles [rad].
     push : Push
@@ -76,10 +74,6 @@ def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> l
 
     Parameters
     ----------
-    table : Table
-        The lookup.
-    configuration : Configuration
-        One pose.
     screws : (8, 6) float
         Elastic screw of each component at O in F [m, rad].
     """
@@ -95,14 +89,8 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
 
     Parameters
     ----------
-    table : Table
-        The lookup.
     theta : (2,) float
         Motor angles [rad].
-    push : Push
-        The load.
-    path : Path
-        PNG to write.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -133,14 +121,8 @@ def draw_mode_shapes(
 
     Parameters
     ----------
-    table : Table
-        The lookup.
     configuration : Configuration
         One pose, as a stack of one.
-    modes : NaturalModes
-        There.
-    path : Path
-        PNG to write.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

@@ -99,8 +99,6 @@ def draw_map(
         Motor angles of the units [rad].
     lengths : sequence of (str, (k, n) float)
         Quantity with unit, and the error of each model at each unit, NaN where not measured.
-    titles : sequence of str
-        Names of the k models.
     """
     figure = new_figure(0.5 + 3.8 * len(lengths), 0.9 + 3.4 * len(titles))
     plots = figure.subplots(len(titles), len(lengths), squeeze=False, sharex=True, sharey=True)
@@ -166,8 +164,6 @@ def draw_time_line(
         The last few are drawn where there are many.
     lengths : sequence of (str, (k, n) float, float)
         Quantity with unit, error of each model, and what noise alone gives.
-    titles : sequence of str
-        Names of the k models.
     """
     numbers = list(range(len(session_names)))[-MOST_SESSIONS:]
     figure = new_figure(1.5 + 6.0 * min(len(numbers), 2) ** 0.5, 2.3 * len(lengths) + 0.5)

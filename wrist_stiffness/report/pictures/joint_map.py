@@ -19,16 +19,12 @@ def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, p
 
     Parameters
     ----------
-    table : Table
-        The lookup.
     poses : (n, n, 2) float
         Motor angles on a grid, the first one along the first axis [rad].
     values : (n, n) float
         The quantity in the unit of the label; NaN outside the map domain.
     label, load : str
         What is shown, and under which load.
-    path : Path
-        PNG to write.
     """
     from matplotlib.ticker import MaxNLocator
 

@@ -91,8 +91,6 @@ def held_to(
 
     Parameters
     ----------
-    table : Table
-        Knows which way is up.
     gauges : sequence of Gauge
         K of them, as somebody measured where they stand.
     values : (n, K) float

@@ -121,8 +121,6 @@ def without_frame_motion(track: PoseTrack, frame: PoseTrack) -> PoseTrack:
 
     Parameters
     ----------
-    track : PoseTrack
-        Poses of the platform.
     frame : PoseTrack
         Poses of a target on the frame by the same instrument.
 

@@ -82,8 +82,6 @@ def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
         U -> F, finite.
     theta : (n, 2) float
         Motor angles as they were recorded [rad].
-    table : Table
-        Of the wrist.
     limit : float
         Largest misfit of rotations that agree [rad].
     """

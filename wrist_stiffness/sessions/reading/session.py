@@ -153,10 +153,6 @@ def session_of(
 
     Parameters
     ----------
-    name : str
-        Of the session.
-    machine : MachineSignals
-        Angles, loads and what is slow.
     track : PoseTrack
         Measured poses in F.
     table, load_age_limit_s

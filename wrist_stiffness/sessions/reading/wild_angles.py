@@ -31,7 +31,6 @@ def without_wild(angles: Signal) -> tuple[Signal, int]:
     -------
     kept : Signal
         The others; all of them where they are too sparse to tell.
-    left_out : int
     """
     if len(angles) < 5 or np.median(np.diff(angles.time_ns)) > DENSE_S * NANOSECONDS:
         return angles, 0
