@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.lookup.biharmonic import BiharmonicSpline
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -104,10 +103,21 @@ class PaperExperiment:
         """Return the poses of the paper's grid, (25, 2) [rad]."""
         return self.workspace.grid(PAPER_GRID)
 
-    def paper_spline(self, per_axis: int = PAPER_GRID) -> BiharmonicSpline:
-        """Interpolate as the paper did: Sandwell's biharmonic spline through a grid of poses."""
+    def paper_spline(self, per_axis: int = PAPER_GRID) -> Callable[[Array], Array]:
+        """Interpolate as the paper did: Sandwell's biharmonic spline through a grid of poses.
+
+        Green's functions r^2 (ln r - 1) alone, as in MATLAB's griddata 'v4', in the unit box.
+        """
         nodes = self.workspace.grid(per_axis)
-        return BiharmonicSpline.fit(nodes, self.solve(nodes), "sandwell")
+        size = np.ptp(nodes, axis=0)
+
+        def green(poses: Array) -> Array:
+            away = (poses[:, None] - nodes) / size
+            square = (away**2).sum(axis=-1)
+            return square * (0.5 * np.log(np.maximum(square, np.finfo(float).tiny)) - 1.0)
+
+        weights = np.linalg.solve(green(nodes), self.solve(nodes))
+        return lambda poses: green(poses) @ weights
 
     def by_spline(self) -> Figures:
         """Figures of the 25-pose spline: the paper's way."""

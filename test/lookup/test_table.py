@@ -194,6 +194,13 @@ def test_foreign_or_damaged_tables_are_refused(shipped_path, tmp_path, change, m
     assert "bad.npz" in str(caught.value)
 
 
+def test_a_table_for_other_splines_is_refused(shipped, tmp_path):
+    other = replace(shipped, header=replace(shipped.header, kernel="sandwell"))
+    save_table(other, tmp_path / "old.npz")
+    with pytest.raises(TableError, match="old.npz: kernel 'sandwell' of the splines is not thin_p"):
+        load_table(tmp_path / "old.npz")
+
+
 @pytest.mark.parametrize("kept", [0.0, 0.1, 0.5, 0.99])
 def test_truncated_tables_are_refused(shipped_path, tmp_path, kept):
     content = shipped_path.read_bytes()

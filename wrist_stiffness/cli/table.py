@@ -68,12 +68,6 @@ def add_parser(commands: Commands) -> None:
         "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
     )
     build.add_argument(
-        "--kernel",
-        choices=("thin_plate", "sandwell"),
-        default="thin_plate",
-        help="of the splines; the paper's is sandwell (default: thin_plate)",
-    )
-    build.add_argument(
         "--interface",
         choices=("rigid", "distributing", "sliding"),
         default="rigid",
@@ -149,7 +143,6 @@ def _build(arguments: argparse.Namespace) -> int:
         interface=arguments.interface,
         tolerance=arguments.tolerance,
         per_axis=arguments.grid,
-        kernel=arguments.kernel,
         progress=Progress("sweep"),
     )
     lines = [*fact_lines(built)]

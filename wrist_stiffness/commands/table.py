@@ -11,7 +11,6 @@ import numpy as np
 from wrist_stiffness.commands.uncertainty import with_second_order
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.inputs.document import read_yaml
-from wrist_stiffness.lookup.biharmonic import Kernel
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.mechanism.fits import check_fits
@@ -39,7 +38,6 @@ def build(
     interface: str = "rigid",
     tolerance: float = 0.02,
     per_axis: int | None = None,
-    kernel: Kernel = "thin_plate",
     progress: Progress = silent,
 ) -> Table:
     """Run the offline sweep and write its table; an interrupted build goes on where it was.
@@ -58,8 +56,6 @@ def build(
         Relative error of s and phi that mesh, contact rings and grid are refined to.
     per_axis : int or None
         Fixed grid, 5 for the paper's 25 poses; None refines it too.
-    kernel : str
-        `thin_plate`, or `sandwell` as in the paper.
     progress : callable
         Called with steps done and in all.
 
@@ -92,7 +88,6 @@ def build(
         interface=interface,  # type: ignore[arg-type]
         tolerance=tolerance,
         per_axis=per_axis,
-        kernel=kernel,
     )
     store = CondensedStore(output.with_name(f".{output.stem}.parts"))
     try:

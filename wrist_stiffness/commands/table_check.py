@@ -103,7 +103,6 @@ def check(
             sizes=sizes,
             interface=header.interface,  # type: ignore[arg-type]
             evaluation=header.evaluation,
-            kernel=header.kernel,
             rings=header.mesh["rings"],
             tolerance=np.inf,
             per_axis=header.per_axis,

@@ -22,7 +22,7 @@ from wrist_stiffness.fem.error_budget import FINE_RINGS, error_budget
 from wrist_stiffness.fem.parts import RINGS
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.superelement import Interface
-from wrist_stiffness.lookup.biharmonic import Kernel
+from wrist_stiffness.lookup.biharmonic import KERNEL
 from wrist_stiffness.lookup.operators import pack
 from wrist_stiffness.lookup.rated_load import rated_map
 from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
@@ -58,8 +58,6 @@ class BuildSettings:
         Interface model of the condensation.
     evaluation : str
         What the nodes shall use.
-    kernel : str
-        Kernel of the splines.
     rings : int
         Contact modes over the width of a flange.
     tolerance : float
@@ -71,7 +69,6 @@ class BuildSettings:
     sizes: MeshSettings = SHIPPED_SIZES
     interface: Interface = "rigid"
     evaluation: Evaluation = "closed_form"
-    kernel: Kernel = "thin_plate"
     rings: int = RINGS
     tolerance: float = 0.025
     per_axis: int | None = None
@@ -135,7 +132,7 @@ def build_table(
         geometry=dict(values),
         interface=settings.interface,
         evaluation=settings.evaluation,
-        kernel=settings.kernel,
+        kernel=KERNEL,
         per_axis=0,
         mesh={
             "sizes_mm": {key: round(1e3 * v, 9) for key, v in asdict(sizes).items()},

@@ -13,7 +13,7 @@ from math import hypot
 from typing import Any, Literal
 
 from wrist_stiffness.errors import LoadRangeError
-from wrist_stiffness.lookup.biharmonic import BiharmonicSpline, Kernel
+from wrist_stiffness.lookup.biharmonic import BiharmonicSpline
 from wrist_stiffness.lookup.operators import unpack
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -43,7 +43,7 @@ class TableHeader:
     evaluation : str
         `closed_form` or `spline`: what the nodes use.
     kernel : str
-        Kernel of the splines.
+        Of the splines: `lookup.biharmonic.KERNEL`.
     per_axis : int
         Grid points along each motor angle.
     mesh : dict
@@ -57,7 +57,7 @@ class TableHeader:
     geometry: dict[str, Any]
     interface: str
     evaluation: Evaluation
-    kernel: Kernel
+    kernel: str
     per_axis: int
     mesh: dict[str, Any]
     versions: dict[str, str]
@@ -109,12 +109,12 @@ class Table:
     @cached_property
     def operator_spline(self) -> BiharmonicSpline:
         """Spline of the operators over the motor angles."""
-        return BiharmonicSpline.fit(self.nodes, self.operators, self.header.kernel)
+        return BiharmonicSpline.fit(self.nodes, self.operators)
 
     @cached_property
     def map_spline(self) -> BiharmonicSpline:
         """Spline of the rated load's s and phi: the paper's maps."""
-        return BiharmonicSpline.fit(self.nodes, self.map_values, self.header.kernel)
+        return BiharmonicSpline.fit(self.nodes, self.map_values)
 
     def operators_at(
         self, configuration: Configuration, evaluation: Evaluation | None = None

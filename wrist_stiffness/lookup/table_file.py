@@ -23,6 +23,7 @@ import numpy as np
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import TableError, WristError
 from wrist_stiffness.inputs.opening import open_input
+from wrist_stiffness.lookup.biharmonic import KERNEL, TREND
 from wrist_stiffness.lookup.operators import column_count
 from wrist_stiffness.lookup.table import EVALUATIONS, MAP_COLUMNS, Table, TableHeader
 from wrist_stiffness.mechanism.components import (
@@ -73,8 +74,8 @@ def save_table(table: Table, path: str | Path) -> Table:
         "checksum": checksum,
         **_header_values(table.header),
         "spline": {
-            "kernel": table.map_spline.kernel,
-            "trend": table.map_spline.trend,
+            "kernel": KERNEL,
+            "trend": TREND,
             "offset_rad": table.map_spline.offset.tolist(),
             "scale_rad": table.map_spline.scale.tolist(),
         },
@@ -189,6 +190,8 @@ def _check(table: Table, path: str | Path) -> None:
             raise TableError(f"{path}: {name} has shape {array.shape}, not {shape}")
         if not np.all(np.isfinite(array)):
             raise TableError(f"{path}: {name} holds values that are not finite")
+    if table.header.kernel != KERNEL:
+        raise TableError(f"{path}: kernel {table.header.kernel!r} of the splines is not {KERNEL}")
     if table.header.evaluation not in EVALUATIONS:
         raise TableError(
             f"{path}: evaluation {table.header.evaluation!r} is not one of {EVALUATIONS}"
