@@ -32,12 +32,8 @@ class Calibrated:
 
     Parameters
     ----------
-    calibration : Calibration
-        What was found.
     sessions : tuple of MeasuredSession
         What was measured, in the order of time.
-    output : Path
-        The model file that was written.
     mistake : str
         Of signs, units or names, where one explains most of what is left; else empty.
     """

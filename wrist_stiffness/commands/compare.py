@@ -31,8 +31,6 @@ class Compared:
 
     Parameters
     ----------
-    comparison : Comparison
-        What was found.
     border : (b, 2) float
         Motor angles on the border of the operative workspace [rad].
     remarks : tuple of str
@@ -41,8 +39,6 @@ class Compared:
         Models that were fitted to one of these very recordings.
     as_drawn : bool
         Whether the last model was never fitted to any recording.
-    provenance : Provenance
-        Files and versions.
     """
 
     comparison: Comparison

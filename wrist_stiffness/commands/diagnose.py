@@ -42,18 +42,12 @@ class Diagnosed:
 
     Parameters
     ----------
-    answer : WristDiagnosis
-        What was found.
     recordings : tuple of str
         Names of the sessions.
     mistake : str
         Of signs, units or names, where one explains most of the error; else empty.
     remarks : tuple of str
         What could not be used of the recordings.
-    provenance : Provenance
-        Files and versions.
-    model : str
-        File of the model.
     paths : tuple of str
         Recordings as they were named.
     """

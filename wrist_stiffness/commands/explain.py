@@ -83,8 +83,6 @@ class Explanation:
     ----------
     total : (6,) float
         Twist that is explained: the measured one if there is one, else the predicted [m, rad].
-    measured : bool
-        Whether the total was measured.
     rows : tuple of Row
         Their twists add up to the total.
     sigma : (2,) float

@@ -68,10 +68,6 @@ class FormulaEffect:
 
     Parameters
     ----------
-    id : str
-        Name of the effect.
-    component : str
-        Where it is.
     direction : sequence of 6 float
         Screw for a value of 1, at O in the component's home frame [m, rad].
     expression : str
@@ -164,8 +160,6 @@ class Extended:
 
     Parameters
     ----------
-    extension : Extension
-        What was found.
     sessions : tuple of MeasuredSession
         What was measured, in the order of time.
     """

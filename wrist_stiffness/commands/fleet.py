@@ -57,8 +57,6 @@ class FleetRow(Generic[Result]):
 
     Parameters
     ----------
-    path : Path
-        The recording.
     result : any
         What the function returned; None where it failed.
     error : str

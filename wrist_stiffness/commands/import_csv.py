@@ -83,8 +83,6 @@ class Imported:
 
     Parameters
     ----------
-    path : Path
-        The recording.
     rows, measured : int
         Rows of the table; those in which something was measured.
     seconds : float

@@ -31,8 +31,6 @@ class NodeEntry:
     ----------
     executable : str
         Name of the executable and of the module in `wrist_stiffness.ros`.
-    name : str
-        Name of the node.
     parameters : dict
         Values by parameter name.
     remappings : tuple of (str, str)

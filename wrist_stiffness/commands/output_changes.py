@@ -63,8 +63,6 @@ class TopicChanges:
 
     Parameters
     ----------
-    topic : str
-        Its name.
     common, only_old, only_new : int
         Messages that both runs have, and those that one of them lacks.
     changed : int

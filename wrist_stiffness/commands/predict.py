@@ -25,8 +25,6 @@ class PosePrediction:
 
     Parameters
     ----------
-    prediction : Prediction
-        As the nodes would give it.
     evaluation : str
         How the nodes evaluate the table.
     other : Prediction or None

@@ -47,8 +47,6 @@ class Provenance:
 
     Parameters
     ----------
-    command : str
-        What was run.
     date : str
         When, ISO 8601.
     models, recordings : dict of str to str

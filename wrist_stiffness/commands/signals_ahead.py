@@ -36,8 +36,6 @@ class _Run:
 
     Parameters
     ----------
-    topic : str
-        Its name.
     time_ns : (k,) int
         Log times [ns].
     stamps, frame_id, wrenches
@@ -60,8 +58,6 @@ class SignalsAhead:
 
     Parameters
     ----------
-    source : Recording
-        Where the signals are.
     names : mapping
         Standard by actual topic name: the load, static transforms, temperatures and covariates.
     streams : sequence of Stream

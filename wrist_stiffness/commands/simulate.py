@@ -47,8 +47,6 @@ class Simulated:
 
     Parameters
     ----------
-    path : Path
-        The recording.
     samples : int
         Samples on each topic.
     seconds : float

@@ -30,8 +30,6 @@ class Finding:
     ----------
     name, text : str
         What was checked and what was found, with the limit.
-    passed : bool
-        Whether it holds.
     """
 
     name: str

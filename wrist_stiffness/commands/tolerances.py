@@ -165,10 +165,6 @@ class ToleranceStudy:
 
     Parameters
     ----------
-    model : str
-        Of the nominal wrist.
-    wrists, poses : int
-        How many.
     load : sequence of 6 float
         At O in F [N, N m].
     costs : tuple of Cost

@@ -72,8 +72,6 @@ class WristDrawing:
 
     Parameters
     ----------
-    geometry : Geometry
-        Its dimensions.
     exaggeration : float
         Factor on the error's twist [-].
     frame_id : str
@@ -204,15 +202,7 @@ drawing_of = lru_cache(maxsize=2)(WristDrawing)
 
 
 class Drawings:
-    """Draws some samples of a replay, at the pace of a node.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Of the wrist.
-    settings : StreamSettings
-        Rate and exaggeration.
-    """
+    """Draws some samples of a replay, at the pace of a node."""
 
     def __init__(self, geometry: Geometry, settings: StreamSettings) -> None:
         self._pace, self._rate_hz = Pace(), settings.marker_rate_hz

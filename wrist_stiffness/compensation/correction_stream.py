@@ -52,8 +52,6 @@ class CorrectionStream(Stream):
     ----------
     model : ErrorModel or None
         May be replaced between samples; without one commands pass unchanged.
-    settings : StreamSettings
-        Names, frames, objective, limits.
     enabled : bool
         Whether commands are corrected; else they pass unchanged.
 

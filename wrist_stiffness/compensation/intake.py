@@ -25,13 +25,7 @@ MOST_NAMES = 32
 
 @dataclass(frozen=True)
 class MotorNames:
-    """The two motor joints among the names of a joint state.
-
-    Parameters
-    ----------
-    motor_1, motor_2 : str
-        Joint names.
-    """
+    """The two motor joints among the names of a joint state."""
 
     motor_1: str = "motor_1_joint"
     motor_2: str = "motor_2_joint"

@@ -63,8 +63,6 @@ class MonitorStream(Stream):
     ----------
     model : ErrorModel or None
         May be replaced between samples; the baseline is then learned anew.
-    settings : StreamSettings
-        Names, frames, limits.
     monitoring : MonitorSettings
         What counts as a change.
     joint_age_limit_s, frame_age_limit_s : float

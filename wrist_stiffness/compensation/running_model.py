@@ -27,8 +27,6 @@ class RunningModel:
 
     Parameters
     ----------
-    model : ErrorModel
-        Predicts.
     temperatures, covariates : HeldSignals
         What the stream has heard of them.
 

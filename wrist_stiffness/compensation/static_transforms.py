@@ -23,8 +23,6 @@ class StaticTransform:
 
     Parameters
     ----------
-    parent, child : str
-        Frame names.
     rotation : (3, 3) float
         Turns the child's components into the parent's.
     position : (3,) float

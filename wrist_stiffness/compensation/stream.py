@@ -168,8 +168,6 @@ class PredictionStream(Stream):
     ----------
     model : ErrorModel or None
         May be replaced between samples; without one nothing is predicted.
-    settings : StreamSettings
-        Names, frames, limits.
     """
 
     def on_joint_state(

@@ -31,12 +31,8 @@ class PlanCorrector:
     ----------
     running : RunningModel
         A model with its memory at the plan's start.
-    settings : StreamSettings
-        Objective and limits.
     stamp_ns : int
         The plan's start [ns].
-    held : Held
-        What is corrected for.
 
     Attributes
     ----------

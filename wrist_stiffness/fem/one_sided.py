@@ -160,14 +160,10 @@ class PatchedWrist:
 
     Parameters
     ----------
-    geometry : Geometry
-        The wrist.
     parts : list of Part
         In the order of `ELASTIC`.
     components : ElasticComponents
         For the flexibility of the links.
-    bushings : dict of str to PatchedBushing
-        By joint.
     """
 
     geometry: Geometry

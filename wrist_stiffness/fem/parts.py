@@ -136,10 +136,6 @@ class ElasticBody:
 
     Parameters
     ----------
-    solid : Solid
-        What it is.
-    mesh : SolidMesh
-        Its mesh.
     stiffness : sparse.csr_matrix
         (3 n, 3 n) [N/m].
     mass : sparse.csr_matrix

@@ -70,10 +70,6 @@ class Table:
 
     Parameters
     ----------
-    header : TableHeader
-        Provenance and stated errors.
-    components : ElasticComponents
-        Condensed parts at home.
     nodes : (n, 2) float
         Motor angles of the grid [rad].
     operators : (n, columns) float

@@ -44,8 +44,6 @@ class _Body:
 
     Parameters
     ----------
-    carrier : str
-        What it turns with.
     axes : (3, 3) float
         Its axes in F at home, as columns.
     lower, upper : (3,) float

@@ -157,8 +157,6 @@ class CompiledWrist:
     ----------
     mechanism : (MECHANISM,) float
         From `mechanism_constants`.
-    components : ElasticComponents
-        Condensed parts.
     gravity : (3,) float
         Acceleration of gravity in F [m/s^2].
     screws : (5, 6) float, optional

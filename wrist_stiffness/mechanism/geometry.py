@@ -32,8 +32,6 @@ class LinkDimensions:
         Arc length of the bar past each bore's centre [m].
     motor_bore, platform_bore : float
         Diameter of the radial bore at the motor-side and platform-side joint [m].
-    material : Material or OrthotropicMaterial
-        Material of the bar.
     stiffness : OwnStiffness or None
         Given by the file instead of the bar's; the bar still says what it weighs.
     """
@@ -69,8 +67,6 @@ class BushingDimensions:
         Of each flange present [m].
     inner_gap, outer_gap : float or None
         Gap between flange and hub face [m]; None where there is no flange.
-    material : Material or OrthotropicMaterial
-        Material of the sleeve.
     stiffness : OwnStiffness or None
         Given by the file, or of its ball bearings, instead of the sleeve's, where no flange takes
         part in contact.

@@ -37,8 +37,6 @@ class BlockStatics:
         Of shape (n,).
     evaluation : str
         `closed_form` or `spline`.
-    table : Table
-        Geometry and mechanism.
     parts : ElasticComponents
         Elastic parts as they are with a model's effects.
     """

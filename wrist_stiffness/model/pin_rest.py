@@ -101,8 +101,6 @@ class Pin:
     ----------
     at : Situation
         n samples.
-    place : str
-        Its joint.
     radial : float
         How far an end may move from the middle [m], above 0.
     small_force : float

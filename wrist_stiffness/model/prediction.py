@@ -24,8 +24,6 @@ class Prediction:
     ----------
     twist : (6,) float
         At O in F, own weight included [m, rad].
-    configuration : Configuration
-        The rigid wrist.
     active : (m,) bool
         Flange sectors in contact.
     of_table : callable

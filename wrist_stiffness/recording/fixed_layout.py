@@ -34,8 +34,6 @@ class FixedLayout:
 
     Parameters
     ----------
-    message_type : type[Message]
-        Class of the message.
     payload : bytes
         A CDR payload that `cdr.decode` accepts, in either byte order.
     """

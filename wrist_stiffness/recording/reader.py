@@ -50,8 +50,6 @@ class Recording:
 
     Attributes
     ----------
-    path : Path
-        Folder or file.
     topics : tuple[TopicInfo, ...]
         By name; also those that cannot be decoded.
     """

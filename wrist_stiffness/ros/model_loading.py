@@ -22,8 +22,6 @@ class Loading:
 
     Parameters
     ----------
-    path : path
-        Model file.
     limit_s : float
         Longest time that may take [s].
     allow_python_laws : bool

@@ -59,8 +59,6 @@ class WristNode(GuardedNode, ABC):
 
     Attributes
     ----------
-    stream : Stream
-        Of the core.
     base_frame : str
         Name of F on topics.
     left_out : tuple of str

@@ -145,8 +145,6 @@ class Readings:
     ----------
     gauges : tuple of Gauge
         K of them, as they stand.
-    mechanism : Mechanism
-        The rigid wrist.
     up : (3,) float
         Unit vector against gravity in F.
     values : (n, K) float

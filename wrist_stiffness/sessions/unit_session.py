@@ -52,8 +52,6 @@ class UnitSession:
 
     Parameters
     ----------
-    name : str
-        Of the session.
     cut : Cut
         Its units, and the moments that tell its path.
     shift, turn : (u, 3) float

@@ -20,8 +20,6 @@ class HiddenEffect:
 
     Parameters
     ----------
-    effect, component, form : str
-        Names of the catalogue.
     magnitude : float
         In the unit of the catalogue's entry (SI).
     shape_seed : int

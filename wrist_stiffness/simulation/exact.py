@@ -102,8 +102,6 @@ class ExactWrist:
 
     Parameters
     ----------
-    table : Table
-        The elastic base.
     laws : sequence of Law
         Hidden; sensor laws, motor laws and creep are not looked at.
     """

@@ -33,8 +33,6 @@ class PoseInstrument:
 
     Parameters
     ----------
-    name : str
-        What people call it.
     shift, rotation : Noise
         On each component [m], [rad].
     static : bool

@@ -59,8 +59,6 @@ class Scale:
 
     Parameters
     ----------
-    table : Table
-        Of the wrist.
     settings : CellSettings
         Experiment, rate and instrument; other hidden effects in it act in both runs.
     seconds : float

@@ -19,10 +19,6 @@ class Example:
 
     Parameters
     ----------
-    name : str
-        Of its folder.
-    title, story : str
-        For the page.
     hidden : str
         `law@component:form`.
     size : float

@@ -29,8 +29,6 @@ class OpenPanel:
 
     Parameters
     ----------
-    tab : Tab
-        Whose it is.
     largest : int
         Of an upload [bytes].
     """

@@ -28,12 +28,8 @@ class Served:
         Workspace.
     host : str
         Address; beyond this machine it needs a token, which is drawn.
-    port : int
-        Of TCP.
     largest_mb : int
         Of an upload [MB].
-    browser : bool
-        Whether to open one.
     """
 
     folder: str

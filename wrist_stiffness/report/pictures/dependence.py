@@ -23,8 +23,6 @@ class Against:
 
     Parameters
     ----------
-    title : str
-        What is shown.
     conditions : tuple of str
         Name of the condition with unit, or of both angles of a map.
     label : str

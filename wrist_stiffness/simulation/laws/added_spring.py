@@ -19,8 +19,6 @@ class MountSpring(Law):
 
     Parameters
     ----------
-    motor : str
-        Which motor.
     flexibility : (6, 6) float
         At O in F, positive semi-definite.
     """

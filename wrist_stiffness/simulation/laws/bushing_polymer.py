@@ -17,8 +17,6 @@ class BushingHardening(Bending):
 
     Parameters
     ----------
-    joint : str
-        Joint.
     fall : float
         How much of the flexibility is gone at high load (`saturating`, up to 0.65), or the power
         by which it falls (`power`, up to 0.5) [-].
@@ -61,8 +59,6 @@ class ThermalSoftening(Bending):
 
     Parameters
     ----------
-    joint : str
-        Joint.
     bodies : tuple of str
         Whose mean temperature the bushing has.
     rate : float

@@ -21,10 +21,6 @@ class JointClearance(Bending):
 
     Parameters
     ----------
-    joint : str
-        Joint.
-    seat : Seat
-        Of its bushing.
     clearance : float
         Diametral [m].
     squeeze : float

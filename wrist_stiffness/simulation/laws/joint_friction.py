@@ -41,8 +41,6 @@ class JointFriction(Rubbing):
     ----------
     joint : str
         Passive joint.
-    seat : Seat
-        Of its bushing.
     mu : float
         Coefficient of friction [-].
     preload : float

@@ -15,8 +15,6 @@ class Backlash(Law):
 
     Parameters
     ----------
-    motor : str
-        Which one.
     widths : (k,) float
         Full widths of k play operators in parallel [rad]; one is a single pair of teeth, several
         (Prandtl-Ishlinskii) a train whose teeth take hold one after the other.
@@ -45,8 +43,6 @@ class EncoderOffset(Law):
 
     Parameters
     ----------
-    motor : str
-        Which one.
     offset : float
         Link ahead of the reading [rad].
     """
@@ -67,8 +63,6 @@ class EccentricEncoder(Law):
 
     Parameters
     ----------
-    motor : str
-        Which one.
     eccentricity : float
         Offset of the disc's centre over its radius [-].
     phase : float
@@ -98,8 +92,6 @@ class TransmissionError(Law):
 
     Parameters
     ----------
-    motor : str
-        Which one.
     amplitude : float
         [rad].
     orders : (k,) float

@@ -72,8 +72,6 @@ class OilFilm(Law):
     ----------
     joint : str
         Passive joint.
-    seat : Seat
-        Of its bushing.
     lift : (3,) float
         Greatest lift, across the axis with the wrist at home [m].
     speed : float

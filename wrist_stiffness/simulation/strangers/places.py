@@ -51,8 +51,6 @@ class Dent(Law):
     ----------
     joint : str
         Passive joint.
-    seat : Seat
-        Of its bushing.
     lift : (3,) float
         Radial and tilting motion, as a translation at the outer ring [m].
     at, width : float
@@ -82,8 +80,6 @@ class WornSector(Bending):
 
     Parameters
     ----------
-    motor : str
-        Which one.
     axis : (3,) float
         Motor axis in F.
     softness : float

@@ -69,8 +69,6 @@ class Swelling(Law):
 
     Parameters
     ----------
-    joint : str
-        Which one.
     screw : (6,) float
         At O with the wrist at home at 1 [m, rad].
     periods_s, phases : (k,) float
@@ -97,8 +95,6 @@ class LooseningScrew(Bending):
 
     Parameters
     ----------
-    link : str
-        Which one.
     flexibility : (6, 6) float
         Of the open clamp, at O with the wrist at home [m/N, rad/N, rad/(N m)].
     path : float
@@ -141,8 +137,6 @@ class SqueezeFilm(Flowing):
     ----------
     joint : str
         Passive joint.
-    seat : Seat
-        Of its bushing.
     gap : float
         Radial gap, the farthest that the pin sinks [m].
     time_s : float

@@ -58,8 +58,6 @@ class PlasticSet(Flowing):
 
     Parameters
     ----------
-    component : str
-        Elastic component.
     direction : (6,) float
         Of screw and wrench at O with the wrist at home; unit in force.
     per_newton : float
