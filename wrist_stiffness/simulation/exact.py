@@ -111,7 +111,7 @@ class ExactWrist:
         self._parts, self._gravity = table.components, table.geometry.gravity
         for law in laws:
             self._parts, self._gravity = law.parts(self._parts), law.gravity(self._gravity)
-        self._drags = {law.rubs: _Drag(law) for law in laws if isinstance(law, JointFriction)}
+        self._drags = {law.component: _Drag(law) for law in laws if isinstance(law, JointFriction)}
 
     def solve(self, theta: Array, load: Array, kelvin: Array | None = None) -> ExactState:
         """Find the equilibrium of the next pose.
@@ -206,7 +206,7 @@ class _System:
         self._load = block.load[0] + sum((law.wrench(block)[0] for law in laws), np.zeros(6))
         self._screws = sum((law.screws(block)[0] for law in laws), np.zeros((len(ELASTIC), 6)))
         self._bends = [
-            (ELASTIC.index(law.bends), partial(law.bend, block))
+            (ELASTIC.index(law.component), partial(law.bend, block))
             for law in laws
             if isinstance(law, Bending)
         ]

@@ -25,11 +25,7 @@ from wrist_stiffness.simulation.laws.added_spring import (
     drive_flexibility,
 )
 from wrist_stiffness.simulation.laws.axis_misalignment import AxisMisalignment
-from wrist_stiffness.simulation.laws.bushing_polymer import (
-    JOINED,
-    BushingHardening,
-    ThermalSoftening,
-)
+from wrist_stiffness.simulation.laws.bushing_polymer import BushingHardening, ThermalSoftening
 from wrist_stiffness.simulation.laws.cable_wrench import CableWrench
 from wrist_stiffness.simulation.laws.creep import Creep
 from wrist_stiffness.simulation.laws.flange_contact import FlangeGap
@@ -37,7 +33,7 @@ from wrist_stiffness.simulation.laws.gravity import AddedMass, MountingTilt
 from wrist_stiffness.simulation.laws.inertia import Inertia
 from wrist_stiffness.simulation.laws.joint_clearance import JointClearance
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
-from wrist_stiffness.simulation.laws.law import DRIVEN, Law
+from wrist_stiffness.simulation.laws.law import DRIVEN, JOINED, Law
 from wrist_stiffness.simulation.laws.load_sensor import (
     LoadBias,
     LoadMatrix,

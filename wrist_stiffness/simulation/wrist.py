@@ -143,7 +143,7 @@ class TrueWrist:
     def _passes(self, block: Block, pose: Pose, load: Array, screws: Array) -> Equilibrium | None:
         """Return the equilibrium with the histories of creep and friction, None if not found."""
         bends = [
-            (ELASTIC.index(law.bends), partial(law.bend, block))
+            (ELASTIC.index(law.component), partial(law.bend, block))
             for law in self._laws
             if isinstance(law, Bending)
         ]
@@ -160,7 +160,7 @@ class TrueWrist:
             moved, acting = along.towards(moved, new_moved), across.towards(acting, new_acting)
             friction = np.zeros((len(block.time_s), len(PASSIVE_JOINTS), 2))
             for law, force in zip(rubbing, acting, strict=True):
-                friction[:, PASSIVE_JOINTS.index(law.rubs)] += force
+                friction[:, PASSIVE_JOINTS.index(law.component)] += force
             state = pose.solve(load, moved, bends, pose.friction_wrench(friction), state)
             # What whole steps would have changed.
             share = np.minimum(
@@ -189,7 +189,7 @@ class TrueWrist:
         rubbed: list[Array] = []
         for law in self._laws:
             if isinstance(law, Flowing):
-                k = ELASTIC.index(law.flows)
+                k = ELASTIC.index(law.component)
                 moved[:, k] += law.flow(block, state.through[:, k], remember)
             if isinstance(law, Rubbing):
                 rubbed.append(law.rub(block, give, state, acting[len(rubbed)], remember))

@@ -39,19 +39,14 @@ class _Drive(Bending):
 
     Parameters
     ----------
-    joint : str
+    component : str
         Driven joint.
     axis : (3,) float
         Motor axis in F.
     """
 
-    joint: str
+    component: str
     axis: Array
-
-    @property
-    def bends(self) -> str:
-        """The joint."""
-        return self.joint
 
     @property
     def column(self) -> Array:

@@ -26,19 +26,14 @@ class BushingHardening(Bending):
         `saturating` or `power`.
     """
 
-    joint: str
+    component: str
     fall: float
     energy: float
     form: str
 
-    @property
-    def bends(self) -> str:
-        """The joint."""
-        return self.joint
-
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Take back a part of the elastic screw; the tangent follows from the energy."""
-        flexibility = block.flexibility[:, ELASTIC.index(self.joint)]
+        flexibility = block.flexibility[:, ELASTIC.index(self.component)]
         screw = (flexibility @ wrench[..., None])[..., 0]
         x = 0.5 * np.sum(screw * wrench, axis=-1) / self.energy
         if self.form == "saturating":
@@ -67,15 +62,10 @@ class ThermalSoftening(Bending):
         `exponential`, or `glassy`: little at first, then a drop around 10 K above the reference.
     """
 
-    joint: str
+    component: str
     bodies: tuple[str, str]
     rate: float
     form: str
-
-    @property
-    def bends(self) -> str:
-        """The joint."""
-        return self.joint
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Add flexibility in proportion to the lost modulus."""
@@ -84,15 +74,5 @@ class ThermalSoftening(Bending):
             extra = np.expm1(np.clip(self.rate * kelvin, -5.0, 5.0))
         else:
             extra = 20.0 * self.rate * (np.tanh((kelvin - 10.0) / 6.0) + np.tanh(10.0 / 6.0))
-        tangent = extra[:, None, None] * block.flexibility[:, ELASTIC.index(self.joint)]
+        tangent = extra[:, None, None] * block.flexibility[:, ELASTIC.index(self.component)]
         return (tangent @ wrench[..., None])[..., 0], tangent
-
-
-JOINED = {
-    "joint_1": ("frame", "link_1"),
-    "joint_2": ("link_1", "platform"),
-    "joint_3": ("link_3", "platform"),
-    "joint_4": ("link_2", "link_3"),
-    "joint_5": ("frame", "link_2"),
-}
-"""Bodies that a joint joins."""

@@ -27,19 +27,14 @@ class Creep(Flowing):
     """
 
     def __init__(self, joint: str, shares: Array, times_s: Array) -> None:
-        self._joint = joint
+        self.component = joint
         self._shares = np.asarray(shares)[:, None]
         self._times_s = np.asarray(times_s)[:, None]
         self._state: tuple[float, Array, Array] | None = None
 
-    @property
-    def flows(self) -> str:
-        """The joint."""
-        return self._joint
-
     def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
         """Integrate exactly for a wrench that changes linearly between samples."""
-        joint = self._joint
+        joint = self.component
         turn = block_diagonal(block.rotation(joint))
         k = ELASTIC.index(joint)
         elastic = (block.flexibility[:, k] @ wrench[..., None])[..., 0]

@@ -29,20 +29,15 @@ class JointClearance(Bending):
         `algebraic`, g = x/sqrt(1+x^2), or `exponential`, g = 1-exp(-x) with a rounded tip.
     """
 
-    joint: str
+    component: str
     seat: Seat
     clearance: float
     squeeze: float
     form: str
 
-    @property
-    def bends(self) -> str:
-        """The joint."""
-        return self.joint
-
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Push both ends of the pin against the bore."""
-        to_origin = self.seat.to_origin(block.rotation(self.joint))
+        to_origin = self.seat.to_origin(block.rotation(self.component))
         local = wrench[:, None] @ to_origin
         rings = self.seat.rings
         push = (local[:, None] @ np.swapaxes(rings, -1, -2))[..., 0, :]

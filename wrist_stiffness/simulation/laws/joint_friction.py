@@ -11,16 +11,8 @@ from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.law import Rubbing
+from wrist_stiffness.simulation.laws.law import JOINED, Rubbing
 from wrist_stiffness.simulation.seat import Seat
-
-BODIES_JOINED = {
-    "joint_2": ("link_1", "platform"),
-    "joint_3": ("link_3", "platform"),
-    "joint_4": ("link_2", "link_3"),
-}
-"""Inner and outer body of each passive joint."""
-
 
 BUDGET_TOLERANCE = 1e-12
 """Error of the friction of a joint that slips, relative to its budget."""
@@ -63,21 +55,16 @@ class JointFriction(Rubbing):
         stiffness: float,
         stribeck: float,
     ) -> None:
-        self._joint = joint
+        self.component = joint
         self.seat, self._mu, self._preload = seat, mu, preload
         self.stiffness, self._stribeck = stiffness, stribeck
         self._state: tuple[float, Pair, Pair] | None = None
-
-    @property
-    def rubs(self) -> str:
-        """The joint."""
-        return self._joint
 
     def rub(
         self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
     ) -> Array:
         """Return the friction of each sample by an implicit step from the one before."""
-        joint = self._joint
+        joint = self.component
         j, arm = PASSIVE_JOINTS.index(joint), self.seat.radius
         to_slip = np.array([1.0, arm])
         path = state.slips[:, j] * to_slip
@@ -110,7 +97,7 @@ class JointFriction(Rubbing):
 
     def turn_of(self, block: Block) -> Array:
         """Turn of the joint from home, (n,) [rad]."""
-        return joint_turn(block, self._joint, self.seat.axis)
+        return joint_turn(block, self.component, self.seat.axis)
 
     def budget(self, reaction: Array) -> Array:
         """Friction in motion for a reaction (...) [N]."""
@@ -118,7 +105,7 @@ class JointFriction(Rubbing):
 
     def reaction(self, block: Block, through: Array) -> Array:
         """Sum of the radial forces at both ends of the bushing, (n,) [N], for its wrench (n, 6)."""
-        to_origin = self.seat.to_origin(block.rotation(self._joint))
+        to_origin = self.seat.to_origin(block.rotation(self.component))
         local = np.einsum("nji,nj->ni", to_origin, through)
         push = np.einsum("rij,nj->nri", self.seat.rings, local)
         return np.asarray(np.sqrt(dot(push, push)).sum(axis=-1))
@@ -126,7 +113,7 @@ class JointFriction(Rubbing):
 
 def joint_turn(block: Block, joint: str, axis: Array) -> Array:
     """Return the turn of a passive joint from home about its axis there (3,), (n,) [rad]."""
-    inner, outer = BODIES_JOINED[joint]
+    inner, outer = JOINED[joint]
     bodies = block.configuration.rotations
     relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
     across = np.linalg.svd(axis[None])[2][1]

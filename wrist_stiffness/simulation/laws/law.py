@@ -70,10 +70,7 @@ class Law:
 class Bending(Law, ABC):
     """A component with a law of its own between wrench and screw."""
 
-    @property
-    @abstractmethod
-    def bends(self) -> str:
-        """The component."""
+    component: str
 
     @abstractmethod
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
@@ -83,10 +80,7 @@ class Bending(Law, ABC):
 class Flowing(Law, ABC):
     """A component whose screw follows the history of its wrench."""
 
-    @property
-    @abstractmethod
-    def flows(self) -> str:
-        """The component."""
+    component: str
 
     @abstractmethod
     def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
@@ -96,10 +90,7 @@ class Flowing(Law, ABC):
 class Rubbing(Law, ABC):
     """A passive joint with friction."""
 
-    @property
-    @abstractmethod
-    def rubs(self) -> str:
-        """The joint."""
+    component: str
 
     @abstractmethod
     def rub(
@@ -129,3 +120,12 @@ DRIVEN = {"motor_1": "joint_1", "motor_2": "joint_5"}
 
 MOTOR = {"motor_1": 0, "motor_2": 1}
 """Number of a motor among the motor angles."""
+
+JOINED = {
+    "joint_1": ("frame", "link_1"),
+    "joint_2": ("link_1", "platform"),
+    "joint_3": ("link_3", "platform"),
+    "joint_4": ("link_2", "link_3"),
+    "joint_5": ("frame", "link_2"),
+}
+"""Bodies that a joint joins."""

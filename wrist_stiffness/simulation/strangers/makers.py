@@ -10,7 +10,7 @@ import numpy as np
 from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS
 from wrist_stiffness.mechanism.vectors import unit
 from wrist_stiffness.simulation.effect_entry import Draw, effect
-from wrist_stiffness.simulation.laws.law import DRIVEN, Law
+from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Law
 from wrist_stiffness.simulation.makers import spring
 from wrist_stiffness.simulation.strangers.motion import OilFilm, Resonance, SpinningTool
 from wrist_stiffness.simulation.strangers.places import CableStop, Dent, WornSector
@@ -110,9 +110,10 @@ def swelling(d: Draw) -> Law:
 @effect(MOTORS, "rad/(N m)", 0.01, 0.1, 5.0)
 def worn_sector(d: Draw) -> Law:
     """Return a gear that is worn where the cell works most."""
-    axis = d.table.geometry.axes[DRIVEN[d.component]]
+    joint = DRIVEN[d.component]
+    axis = d.table.geometry.axes[joint]
     at, width = d.rng.uniform(-0.3, 0.3), d.rng.uniform(0.1, 0.2)
-    return WornSector(d.component, axis, d.magnitude, at, width)
+    return WornSector(joint, MOTOR[d.component], axis, d.magnitude, at, width)
 
 
 # A rotor of half a kilogram, at 20 000 turns a minute.

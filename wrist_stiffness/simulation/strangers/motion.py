@@ -9,8 +9,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross, dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.joint_friction import BODIES_JOINED
-from wrist_stiffness.simulation.laws.law import Law, at_component
+from wrist_stiffness.simulation.laws.law import JOINED, Law, at_component
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -84,7 +83,7 @@ class OilFilm(Law):
 
     def screws(self, block: Block) -> Array:
         """Lift by the speed of the joint's turn."""
-        inner, outer = BODIES_JOINED[self._joint]
+        inner, outer = JOINED[self._joint]
         bodies = block.configuration.rotations
         relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
         trace = np.einsum("nii->n", relative)

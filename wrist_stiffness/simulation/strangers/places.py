@@ -10,7 +10,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
-from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Bending, Law, at_component
+from wrist_stiffness.simulation.laws.law import Bending, Law, at_component
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -80,6 +80,10 @@ class WornSector(Bending):
 
     Parameters
     ----------
+    component : str
+        The driven joint.
+    column : int
+        Number of its motor.
     axis : (3,) float
         Motor axis in F.
     softness : float
@@ -88,21 +92,17 @@ class WornSector(Bending):
         Place and width of the sector on the motor's angle [rad].
     """
 
-    motor: str
+    component: str
+    column: int
     axis: Array
     softness: float
     at: float
     width: float
 
-    @property
-    def bends(self) -> str:
-        """The driven joint."""
-        return DRIVEN[self.motor]
-
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Turn about the motor axis."""
-        column = np.concatenate([np.zeros(3), self.axis])
-        theta = block.configuration.theta[:, MOTOR[self.motor]]
+        about = np.concatenate([np.zeros(3), self.axis])
+        theta = block.configuration.theta[:, self.column]
         soft = self.softness * np.exp(-0.5 * ((theta - self.at) / self.width) ** 2)
-        turn = (soft * (wrench @ column))[:, None] * column
-        return turn, soft[:, None, None] * np.outer(column, column)
+        turn = (soft * (wrench @ about))[:, None] * about
+        return turn, soft[:, None, None] * np.outer(about, about)

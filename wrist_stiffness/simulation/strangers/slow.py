@@ -102,14 +102,9 @@ class LooseningScrew(Bending):
     """
 
     def __init__(self, link: str, flexibility: Array, path: float) -> None:
-        self._link, self._flexibility, self._path = link, flexibility, path
+        self.component, self._flexibility, self._path = link, flexibility, path
         self._past: tuple[float, Array] | None = None
         self._loose = np.zeros(0), np.zeros(0)
-
-    @property
-    def bends(self) -> str:
-        """The link."""
-        return self._link
 
     def screws(self, block: Block) -> Array:
         """Count what the motors move."""
@@ -122,7 +117,7 @@ class LooseningScrew(Bending):
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Give way to the wrench, as loose as the screw is by now."""
-        turn = block_diagonal(block.rotation(self._link))
+        turn = block_diagonal(block.rotation(self.component))
         loose = np.interp(block.time_s, *self._loose)[:, None, None]
         soft = loose * (turn @ self._flexibility @ np.swapaxes(turn, -1, -2))
         return (soft @ wrench[..., None])[..., 0], soft
@@ -146,23 +141,18 @@ class SqueezeFilm(Flowing):
     """
 
     def __init__(self, joint: str, seat: Seat, gap: float, time_s: float, turn: float) -> None:
-        self._joint, self._seat, self._gap = joint, seat, gap
+        self.component, self._seat, self._gap = joint, seat, gap
         self._time_s, self._turn = time_s, turn
         self._past: tuple[float, float, Array] | None = None
 
-    @property
-    def flows(self) -> str:
-        """The joint."""
-        return self._joint
-
     def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
         """Sink by time and force, rise by turn."""
-        to_origin = self._seat.to_origin(block.rotation(self._joint))
+        to_origin = self._seat.to_origin(block.rotation(self.component))
         across = np.eye(3) - np.outer(self._seat.axis, self._seat.axis)
         force = np.einsum("nji,nj->ni", to_origin, wrench)[:, :3] @ across
         size = np.sqrt(np.sum(force * force, axis=-1))
         wall = self._gap * force / np.maximum(size, 1e-12)[:, None]
-        turn = joint_turn(block, self._joint, self._seat.axis)
+        turn = joint_turn(block, self.component, self._seat.axis)
         # It was turned before the start.
         before, angle, sunk = self._past or (block.time_s[0], turn[0], np.zeros(3))
         out = np.zeros_like(wrench)

@@ -69,19 +69,14 @@ class PlasticSet(Flowing):
     def __init__(
         self, component: str, direction: Array, per_newton: float, yielding: float
     ) -> None:
-        self._component = component
+        self.component = component
         self._direction, self._per_newton = direction, per_newton
         self._worst = np.full(2, yielding)
         self._yielding = yielding
 
-    @property
-    def flows(self) -> str:
-        """The joint."""
-        return self._component
-
     def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
         """Set grows with the largest load so far, to each side on its own."""
-        turn = block_diagonal(block.rotation(self._component))
+        turn = block_diagonal(block.rotation(self.component))
         load = np.einsum("nji,nj->ni", turn, wrench) @ self._direction
         both = np.stack([load, -load], axis=-1)
         worst = np.maximum(np.maximum.accumulate(both, axis=0), self._worst)
