@@ -35,10 +35,7 @@ def model_named(arguments: argparse.Namespace) -> Path:
 def table_named(arguments: argparse.Namespace) -> Table:
     """Return the lookup table that is named, or the shipped one.
 
-    Raises
-    ------
-    WristError
-        If it cannot be read.
+    Raises `WristError` if it cannot be read.
     """
     from wrist_stiffness.lookup.table_file import load_table
 
@@ -60,10 +57,7 @@ def add_load(parser: OneLineParser) -> None:
 def whole_load(numbers: list[float]) -> list[float]:
     """Return a force and a moment from what `--load` was given.
 
-    Raises
-    ------
-    InputError
-        If there are neither 3 nor 6 numbers.
+    Raises `InputError` if there are neither 3 nor 6 numbers.
     """
     if len(numbers) not in (3, 6):
         raise InputError(f"--load takes 3 or 6 numbers, not {len(numbers)}")
@@ -95,10 +89,7 @@ def add_sensor_names(
 def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordings:
     """Return the recordings of a command with those options.
 
-    Raises
-    ------
-    InputError
-        If an option cannot be read.
+    Raises `InputError` if an option cannot be read.
     """
     from wrist_stiffness.commands.read_sessions import Recordings
     from wrist_stiffness.topics import parse_topic_remaps
@@ -110,10 +101,7 @@ def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordi
 def settings_named(arguments: argparse.Namespace) -> tuple[StreamSettings, StreamSettings]:
     """Return the settings of predictor and corrector by those options.
 
-    Raises
-    ------
-    InputError
-        If an option cannot be read.
+    Raises `InputError` if an option cannot be read.
     """
     from wrist_stiffness.commands.parameter_file import node_settings
 
@@ -136,10 +124,7 @@ def add_compared_recordings(parser: OneLineParser) -> None:
 def for_each(arguments: argparse.Namespace) -> bool:
     """Tell whether every recording is taken by itself.
 
-    Raises
-    ------
-    InputError
-        If another option does not go with that.
+    Raises `InputError` if another option does not go with that.
     """
     if arguments.each and arguments.report:
         raise InputError("--report draws one wrist; leave out --each")

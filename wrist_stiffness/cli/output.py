@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 def say(arguments: argparse.Namespace, lines: Iterable[str], values: Any) -> int:
     """Print the answer, write it for programs where `--json` asks for that; return the exit code.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises `InputError` if the file cannot be written.
     """
     print("\n".join(lines))
     if arguments.json:

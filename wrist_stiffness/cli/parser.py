@@ -133,10 +133,7 @@ def add_command(
 def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
     """Return the numbers of an option that takes NAME=NUMBER, by their names.
 
-    Raises
-    ------
-    InputError
-        If a text is no such pair, or a name comes twice.
+    Raises `InputError` if a text is no such pair, or a name comes twice.
     """
     values: dict[str, float] = {}
     for text in texts:

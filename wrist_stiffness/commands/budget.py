@@ -45,10 +45,7 @@ class Push:
     def of_millimetres(cls, load: Sequence[float], point_mm: Sequence[float]) -> Push:
         """Return a load from 3 or 6 numbers [N, N m] and its point in U [mm].
 
-        Raises
-        ------
-        InputError
-            If all numbers are zero: no load, no shares of it.
+        Raises `InputError` if all numbers are zero: no load, no shares of it.
         """
         if not np.any(load):
             raise InputError("load: all numbers are 0, there is nothing to share out")
@@ -97,15 +94,8 @@ class Budget:
 def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
     """Compute twist and energy shares of a load over the workspace.
 
-    Parameters
-    ----------
-    table : Table
-        The lookup; evaluated in closed form, because only that knows the components.
-
-    Raises
-    ------
-    LoadRangeError
-        If the load at O is outside the table's range.
+    `table`: the lookup; evaluated in closed form, because only that knows the components.  Raises
+    `LoadRangeError` if the load at O is outside the table's range.
     """
     theta = table.workspace.grid(per_axis)
     configuration = table.mechanism.forward(theta)

@@ -64,17 +64,9 @@ def calibrate_model(
 ) -> Calibrated:
     """Fit a model to recordings and write it as it holds for the newest one.
 
-    Parameters
-    ----------
-    progress : callable
-        Told steps done and steps at most.
-    asking : callable
-        The same of a second fit, where a mistake of the load is likely.
-
-    Raises
-    ------
-    WristError
-        If a file cannot be read, used or written; then no model is written.
+    `progress`: told steps done and steps at most; `asking`: the same of a second fit, where a
+    mistake of the load is likely.  Raises `WristError` if a file cannot be read, used or written;
+    then no model is written.
     """
     output = writable(output)
     parent = load_model(model)
@@ -107,11 +99,8 @@ def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, askin
 def writable(output: str | Path) -> Path:
     """Return the path of a model to write, so that no fit ends in a typing error.
 
-    Raises
-    ------
-    InputError
-        If its folder does not exist or takes no file, it is a folder, or its name is that of a
-        recording.
+    Raises `InputError` if its folder does not exist or takes no file, it is a folder, or its name
+    is that of a recording.
     """
     output = Path(output)
     if not output.parent.is_dir():

@@ -89,10 +89,8 @@ class Diagnosed:
     def as_values(self, ranking: bool = False) -> dict[str, Any]:
         """Return what programs read, with units in the names.
 
-        Parameters
-        ----------
-        ranking : bool
-            Whether every candidate is told, and what each fitted rival changes in every unit.
+        `ranking`: whether every candidate is told, and what each fitted rival changes in every
+        unit.
         """
         found = {
             **self.result.as_json(ranking),

@@ -210,16 +210,8 @@ def extend_model(
 ) -> Extended:
     """Add an effect to a model, fit it with what is there, and write the model.
 
-    Parameters
-    ----------
-    progress : callable
-        Told steps done and steps at most.
-
-    Raises
-    ------
-    WristError
-        If a file cannot be read, used or written, or the effect cannot be added; then no model is
-        written.
+    `progress`: told steps done and steps at most.  Raises `WristError` if a file cannot be read,
+    used or written, or the effect cannot be added; then no model is written.
     """
     output = writable(output)
     parent = load_model(model)

@@ -312,10 +312,7 @@ def _blank_if_nan(cell: str) -> str:
 def _with_points(place: str, text: dict[str, str], mark: str) -> str:
     """Write decimal commas of a row as points, and return the table's decimal mark.
 
-    Raises
-    ------
-    InputError
-        If the table has both: one of them then stands between thousands.
+    Raises `InputError` if the table has both: one of them then stands between thousands.
     """
     for name, cell in text.items():
         if found := DECIMAL.fullmatch(cell.strip()):

@@ -13,15 +13,8 @@ from wrist_stiffness.errors import InputError
 def write_json(path: str | Path, content: Any) -> None:
     """Write a result, complete or not at all.
 
-    Parameters
-    ----------
-    path : path
-        File to write; an older one is replaced, a device or pipe is written to.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    `path`: file to write; an older one is replaced, a device or pipe is written to.  Raises
+    `InputError` if the file cannot be written.
     """
     text = json.dumps(content, indent=2) + "\n"
     try:

@@ -31,17 +31,9 @@ def payload_of(
 ) -> RigidBody | None:
     """Return a payload from what people type.
 
-    Parameters
-    ----------
-    mass_and_place : 4 numbers or None
-        Mass [kg] and centre of gravity in U [mm].
-    inertia_kg_mm2 : 3 numbers or None
-        Moments of inertia about that, along the axes of U [kg mm^2]; a point if None.
-
-    Raises
-    ------
-    InputError
-        If the mass is not above zero, no body has this inertia, or there is no mass to it.
+    `mass_and_place` (4 numbers): mass [kg] and centre of gravity in U [mm]; `inertia_kg_mm2` (3
+    numbers): moments of inertia about that, along the axes of U [kg mm^2]; a point if None.  Raises
+    `InputError` if the mass is not above zero, no body has this inertia, or there is no mass to it.
     """
     if mass_and_place is None:
         if inertia_kg_mm2 is not None:

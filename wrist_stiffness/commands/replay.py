@@ -314,12 +314,7 @@ def _plan(
 def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
     """Return a twist as a recording's message.
 
-    Parameters
-    ----------
-    twist : (6,) float
-        At O in F [m, rad].
-    covariance : (6, 6) float
-        Of the twist.
+    `twist` (6,): at O in F [m, rad]; `covariance` (6, 6): of the twist.
     """
     position, quaternion = pose_of_twist(twist)
     pose = Pose(Point(*position.tolist()), Quaternion(*quaternion.tolist()))

@@ -113,10 +113,7 @@ def simulate_recording(
 def check_bounds(seconds: float, rate_hz: float, seed: int) -> None:
     """Refuse what would be no recording, or never end.
 
-    Raises
-    ------
-    InputError
-        With the limit.
+    Raises `InputError` with the limit.
     """
     if not 0.0 < seconds <= LONGEST_S:
         raise InputError(
@@ -209,10 +206,7 @@ def on_day(day: int, settings: CellSettings) -> CellSettings:
 
     The instrument was set up anew, and the wrist moves to other poses under other loads.
 
-    Raises
-    ------
-    InputError
-        If there is no such day.
+    Raises `InputError` if there is no such day.
     """
     if not 1 <= day <= LAST_DAY:
         raise InputError(f"simulate: day {day} is not 1 to {LAST_DAY}")

@@ -72,16 +72,9 @@ class Tolerance:
 def tolerances_of(limits: Mapping[str, float]) -> tuple[Tolerance, ...]:
     """Return what differs from wrist to wrist, with the usual limits or others.
 
-    Parameters
-    ----------
-    limits : mapping
-        Limit of a part, of a gap its standard deviation, by `law.key` for all places or by
-        `law@place.key`; 0 for no tolerance.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, a limit negative, or none is left.
+    `limits`: limit of a part, of a gap its standard deviation, by `law.key` for all places or by
+    `law@place.key`; 0 for no tolerance.  Raises `InputError` if a name is unknown, a limit
+    negative, or none is left.
     """
     found: list[Tolerance] = []
     used: set[str] = set()

@@ -96,12 +96,7 @@ class Belief:
     ) -> tuple[Array, NDArray[np.int64]]:
         """Return what compiled rules need, and the stamps of last command and state (2,) [ns].
 
-        Parameters
-        ----------
-        settings : SupervisorSettings
-            As of `Supervisor.judge`.
-        reach : float
-            As there [rad].
+        `settings`: as of `Supervisor.judge`; `reach`: as there [rad].
         """
         expected = None if self._expected is None else scales.estimate(self._expected)
         share, of_wrist = self._share, scales.geometry.limits
@@ -128,10 +123,7 @@ class Belief:
     def take_over(self, row: Array, stamps: NDArray[np.int64]) -> bool:
         """Believe what compiled rules left, and tell whether they judged the last command.
 
-        Parameters
-        ----------
-        row, stamps : (SUPERVISOR,) float, (2,) int
-            From `rows`.
+        `row`, `stamps` (SUPERVISOR,) float, (2,) int: from `rows`.
         """
         self._stamp_ns, self._since_ns = stamps.tolist()
         values = iter(row[RULES:].tolist())

@@ -139,10 +139,7 @@ class CorrectedBlock:
     def residuals(self, tool_point: Array) -> list[tuple[Array, Array]]:
         """Return the same as `CorrectedCommand` of the k commands that have a correction.
 
-        Returns
-        -------
-        list of ((k, 6) float, (k, 6, 6) float)
-            Twists and covariances.
+        Gives list of ((k, 6) float, (k, 6, 6) float): twists and covariances.
         """
         own = np.flatnonzero(self.corrected)
         rows = self.after[own], self.covariance[own], self.platform[own], self.valid[own]

@@ -131,10 +131,7 @@ def _step(missing: float, last_missing: float, last_step: float, play: float) ->
 def compiled_task(objective: Objective, play: float) -> Array:
     """Return an objective as the compiled search takes it, (10,).
 
-    Parameters
-    ----------
-    play : float
-        What a motor may leave before its correction moves [rad].
+    `play`: what a motor may leave before its correction moves [rad].
     """
     vector = objective.tool_point if objective.name == "tool_point" else objective.normal
     search = [TOLERANCE, UNCHECKED, ANSWERS, DEPENDENT, MAX_ITERATIONS]
@@ -172,17 +169,8 @@ def as_applied(correction: Correction, delta: Array) -> Correction:
 def residual_twist(prediction: Prediction, desired: Array) -> Array:
     """Return log(T_err T_nominal T_desired^-1), actual minus desired.
 
-    Parameters
-    ----------
-    prediction : Prediction
-        Predicted error at the angles that are driven.
-    desired : (3, 3) float
-        Desired rotation U -> F of the platform, its point at O resting at O.
-
-    Returns
-    -------
-    (6,) float
-        Twist at O in F [m, rad].
+    `prediction`: predicted error at the angles that are driven; `desired` (3, 3): desired rotation
+    U -> F of the platform, its point at O resting at O.  Gives (6,): twist at O in F [m, rad].
     """
     rotation, shift = prediction.motion
     return log_motion(rotation.dot(prediction.configuration.platform).dot(desired.T), shift)

@@ -265,10 +265,7 @@ def search(
 ) -> Correction:
     """Return the correction that meets the objective; refused beyond the limit.
 
-    Raises
-    ------
-    WristError
-        If there is none, or it is too large.
+    Raises `WristError` if there is none, or it is too large.
     """
     predict = running.preview(stamp_ns, load, theta_dot)
     objective = objective_of(running.model, settings)

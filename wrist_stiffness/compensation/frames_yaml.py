@@ -44,15 +44,8 @@ def frames_from_yaml(mapping: str) -> Frames:
     For example ``{ft: {parent: wrist_platform, position_mm: [0, 0, 40], rpy_deg: [0, 0, 90],
     acts_on: environment}}``; roll, pitch and yaw turn about the parent's fixed x, y and z.
 
-    Parameters
-    ----------
-    mapping : str
-        Empty for none.
-
-    Raises
-    ------
-    InputError
-        If it is no such mapping; the message names the frame and the key.
+    `mapping`: empty for none.  Raises `InputError` if it is no such mapping; the message names the
+    frame and the key.
     """
     root = yaml_node(mapping, "frames", InputError)
     if root.value is None:

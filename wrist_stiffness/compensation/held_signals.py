@@ -37,17 +37,8 @@ class HeldSignals:
     def add(self, name: str, stamp_ns: int, value: float) -> None:
         """Keep a value; a stamp before others says that these are of another time.
 
-        Parameters
-        ----------
-        name : str
-            Of the component or of the covariate.
-        stamp_ns : int
-            [ns].
-
-        Raises
-        ------
-        InputError
-            If the value is not finite.
+        `name`: of the component or of the covariate; `stamp_ns` [ns].  Raises `InputError` if the
+        value is not finite.
         """
         if not np.isfinite(value):
             raise InputError(f"{name}: {value} is not finite")

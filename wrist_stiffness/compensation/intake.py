@@ -33,17 +33,8 @@ class MotorNames:
     def places(self, names: Sequence[str], what: str = JOINT_STATE) -> tuple[int, int]:
         """Return where the motors stand in a list of joint names.
 
-        Parameters
-        ----------
-        names : sequence of str
-            In any order, other joints ignored.
-        what : str
-            What the names are of, for the message.
-
-        Raises
-        ------
-        InputError
-            If a motor is missing or named twice.
+        `names`: in any order, other joints ignored; `what`: what the names are of, for the message.
+        Raises `InputError` if a motor is missing or named twice.
         """
         names = tuple(names)
         known = self._known.get(names)
@@ -89,17 +80,9 @@ class MotorNames:
     def speeds(self, names: Sequence[str], velocities: Sequence[float]) -> Array | None:
         """Return the motor speeds of a joint state or command whose angles are usable.
 
-        Parameters
-        ----------
-        names : sequence of str
-            In any order, other joints ignored.
-        velocities : sequence of float
-            One a name, or none at all, as many drivers send it [rad/s].
-
-        Returns
-        -------
-        (2,) float or None
-            Motor speeds [rad/s]; None where the message does not have both of them.
+        `names`: in any order, other joints ignored; `velocities`: one a name, or none at all, as
+        many drivers send it [rad/s].  Gives (2,): motor speeds [rad/s]; None where the message does
+        not have both of them.
         """
         if len(velocities) != len(names):
             return None
@@ -238,10 +221,7 @@ class Frames:
     ) -> tuple[float, float, float]:
         """Return the place in U of a point in a frame of the platform [m].
 
-        Raises
-        ------
-        FrameError
-            If the frame is neither `wrist_platform` nor mapped to it.
+        Raises `FrameError` if the frame is neither `wrist_platform` nor mapped to it.
         """
         frame = self._mapped(frame_id, PLATFORM_FRAME, ON_PLATFORM, what)
         x, y, z = (frame.rotation @ np.array(point) + frame.position).tolist()
@@ -250,24 +230,9 @@ class Frames:
     def in_base(self, frame_id: str, what: str) -> tuple[Array, Array]:
         """Return how to turn and move what was measured in a frame to F.
 
-        Parameters
-        ----------
-        frame_id : str
-            Frame of the message.
-        what : str
-            What was measured, for the message.
-
-        Returns
-        -------
-        rotation : (3, 3) float
-            From the frame to F.
-        position : (3,) float
-            The frame's origin in F [m].
-
-        Raises
-        ------
-        FrameError
-            If the frame is neither `wrist_base` nor mapped to it.
+        `frame_id`: frame of the message; `what`: what was measured, for the message.  Gives
+        `rotation` (3, 3): from the frame to F, and `position` (3,): the frame's origin in F [m].
+        Raises `FrameError` if the frame is neither `wrist_base` nor mapped to it.
         """
         frame = self._mapped(frame_id, BASE_FRAME, IN_BASE, what)
         return frame.rotation, frame.position

@@ -22,10 +22,7 @@ def judged_load(
 ) -> Load:
     """Return the load to correct for at a command's motor angles (2,) [rad].
 
-    Raises
-    ------
-    WristError
-        If the angles or the measured load are beyond the table.
+    Raises `WristError` if the angles or the measured load are beyond the table.
     """
     if settings.supervisor.follow:
         supervisor.follow(stamp_ns, measured)

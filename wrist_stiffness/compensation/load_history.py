@@ -295,12 +295,7 @@ class LoadIntake:
     ) -> list[WristError]:
         """Take in wrench messages of one frame and return why some cannot be used.
 
-        Parameters
-        ----------
-        stamps : (k,) int
-            [ns].
-        wrenches : (k, 6) float
-            Force and moment [N, N m].
+        `stamps` (k,) int [ns]; `wrenches` (k, 6): force and moment [N, N m].
         """
         finite = bool(np.isfinite(wrenches).all())
         if finite and self.history.rises_with(stamps) and self.frames.is_at_origin(frame_id):
@@ -326,10 +321,8 @@ class LoadIntake:
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`).
 
-        Raises
-        ------
-        InputError
-            If there is none that is young enough, or the tare was taken in another frame.
+        Raises `InputError` if there is none that is young enough, or the tare was taken in another
+        frame.
         """
         load_stamp_ns, load = self.history.at(stamp_ns)
         return load_stamp_ns, self._tared(load)

@@ -113,12 +113,8 @@ class ResidualMonitor:
     def add(self, residual: Array, model_variance: Array) -> None:
         """Take in a residual.
 
-        Parameters
-        ----------
-        residual : (6,) float
-            Measured minus predicted [m, rad]; NaN where not measured.
-        model_variance : (6,) float
-            Variance of the prediction [m^2, rad^2].
+        `residual` (6,): measured minus predicted [m, rad]; NaN where not measured; `model_variance`
+        (6,): variance of the prediction [m^2, rad^2].
         """
         measured = np.where(np.isfinite(residual), residual, self._mean)
         learning = self.learning

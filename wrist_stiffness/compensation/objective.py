@@ -56,16 +56,9 @@ class Objective:
     def cancelling(self, configuration: Configuration, jacobian: Array) -> Array:
         """Return the matrix from a residual twist at O in F to the motor angles that cancel it.
 
-        Parameters
-        ----------
-        jacobian : (3, 2) float
-            Of the platform's angular velocity there.
-
-        Returns
-        -------
-        (2, 6) float
-            (M J)^+ M with the task's `matrix` M and the twists J of the motors, for the least
-            squares; no motion where the motors do not reach the task.
+        `jacobian` (3, 2): of the platform's angular velocity there.  Gives (2, 6): (M J)^+ M with
+        the task's `matrix` M and the twists J of the motors, for the least squares; no motion where
+        the motors do not reach the task.
         """
         matrix = np.zeros((2, 6))
         if self.name == "tool_point":

@@ -57,10 +57,7 @@ class ParameterEntry:
 def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) -> None:
     """Refuse a text that is not among its choices, which ROS itself cannot check.
 
-    Raises
-    ------
-    InputError
-        With the parameter, its value and the choices.
+    Raises `InputError` with the parameter, its value and the choices.
     """
     for entry in entries:
         if entry.choices and values[entry.name] not in entry.choices:
@@ -310,10 +307,7 @@ MONITOR = (
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     """Return what counts as a change, from the parameters `MONITOR` by name.
 
-    Raises
-    ------
-    InputError
-        If a text is not among its choices.
+    Raises `InputError` if a text is not among its choices.
     """
     check_choices(MONITOR, values)
     noise = np.repeat([1e-6 * values["noise_s_um"], radians(1e-3 * values["noise_phi_mdeg"])], 3)
@@ -371,10 +365,7 @@ def prediction_settings(values: Mapping[str, Any]) -> StreamSettings:
 def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
     """Return the same of a node that corrects, from the parameters `COMMON` and `CORRECTION`.
 
-    Raises
-    ------
-    InputError
-        As `stream_settings`, and if a text is not among its choices.
+    Raises `InputError` as `stream_settings`, and if a text is not among its choices.
     """
     check_choices(CORRECTION, values)
     return replace(

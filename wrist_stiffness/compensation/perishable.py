@@ -42,17 +42,8 @@ def require_fresh(what: str, stamp_ns: int, now_ns: int, limit_s: float) -> None
 def require_within_limits(what: str, theta: Array, limits: Limits, motors: MotorNames) -> None:
     """Refuse angles beyond the joint limits by more than one encoder step.
 
-    Parameters
-    ----------
-    what : str
-        For the message.
-    theta : (2,) float
-        Motor angles [rad].
-
-    Raises
-    ------
-    InputError
-        With the motor, its angle and its limits.
+    `what`: for the message; `theta` (2,): motor angles [rad].  Raises `InputError` with the motor,
+    its angle and its limits.
     """
     for motor, (angle, (low, high)) in enumerate(zip(theta.tolist(), limits.reach, strict=True)):
         if not low <= angle <= high:

@@ -13,17 +13,9 @@ from wrist_stiffness.mechanism.vectors import dot, skew
 def pose_of_twist(twist: Array) -> tuple[Array, Array]:
     """Return the rigid motion of a twist as messages carry it.
 
-    Parameters
-    ----------
-    twist : (..., 6) float
-        (translation; rotation) at O in F [m, rad].
-
-    Returns
-    -------
-    position : (..., 3) float
-        Where the point at O goes [m].
-    quaternion : (..., 4) float
-        Rotation, x y z w with w >= 0 for angles up to pi.
+    `twist` (..., 6): (translation; rotation) at O in F [m, rad].  Gives `position` (..., 3): where
+    the point at O goes [m], and `quaternion` (..., 4): rotation, x y z w with w >= 0 for angles up
+    to pi.
     """
     if native is not None:
         pose = np.empty((*twist.shape[:-1], 7))
@@ -39,16 +31,8 @@ def pose_of_twist(twist: Array) -> tuple[Array, Array]:
 def seen_from(point: Array) -> Array:
     """Return the matrix that takes a twist at O to the twist of the same motion at another point.
 
-    Parameters
-    ----------
-    point : (3,) float
-        In F [m].
-
-    Returns
-    -------
-    (6, 6) float
-        Its congruence takes covariances along.  Exact for finite motions, too: the exponential of
-        the result is the same motion with the point as origin.
+    `point` (3,): in F [m].  Gives (6, 6): its congruence takes covariances along.  Exact for finite
+    motions, too: the exponential of the result is the same motion with the point as origin.
     """
     matrix = np.eye(6)
     matrix[:3, 3:] = -skew(point)

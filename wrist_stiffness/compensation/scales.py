@@ -41,15 +41,8 @@ class Scales:
     def read(self, table: Table, theta: Array, load: Load) -> Reading:
         """Read a load.
 
-        Parameters
-        ----------
-        theta : (2,) float
-            Motor angles [rad].
-
-        Raises
-        ------
-        WristError
-            If the pose or the load is out of range.
+        `theta` (2,): motor angles [rad].  Raises `WristError` if the pose or the load is out of
+        range.
         """
         if native is not None:
             rows, usable = self.rows_of(
@@ -68,17 +61,9 @@ class Scales:
     ) -> tuple[Array, Flags]:
         """Read many loads, compiled.
 
-        Parameters
-        ----------
-        theta, wrench : (n, 2), (n, 6) float
-            Motor angles [rad], loads at O [N, N m].
-        on_platform : (n,) bool
-            Which loads are in U, not in F.
-
-        Returns
-        -------
-        (n, 11) float, (n,) bool
-            What `Reading.of_row` takes, and where that could be had.
+        `theta`, `wrench` (n, 2), (n, 6): motor angles [rad], loads at O [N, N m]; `on_platform`
+        (n,) bool: which loads are in U, not in F.  Gives (n, 11) float, (n,) bool: what
+        `Reading.of_row` takes, and where that could be had.
         """
         n = len(on_platform)
         rows, status = np.empty((n, native.READING)), np.empty(n, dtype=np.uint8)

@@ -40,17 +40,9 @@ def static_transform(
 ) -> StaticTransform:
     """Return a transform as geometry_msgs/TransformStamped states it.
 
-    Parameters
-    ----------
-    parent, child : str
-        `header.frame_id` and `child_frame_id`.
-    position, quaternion : sequence of 3 and 4 float
-        [m], x y z w.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite or the quaternion is no unit quaternion.
+    `parent`, `child`: `header.frame_id` and `child_frame_id`; `position`, `quaternion` (sequence of
+    3 and 4 float) [m], x y z w.  Raises `InputError` if a number is not finite or the quaternion is
+    no unit quaternion.
     """
     numbers = np.array([*position, *quaternion], dtype=float)
     norm = float(np.linalg.norm(numbers[3:]))

@@ -63,10 +63,7 @@ class Supervisor(Belief):
     def declare_payload(self, payload: Payload | None) -> None:
         """Take over what the gripper tells.
 
-        Parameters
-        ----------
-        payload : Payload or None
-            Counts as soon as the load agrees; None where the gripper holds nothing.
+        `payload`: counts as soon as the load agrees; None where the gripper holds nothing.
         """
         if self._payload is not None:
             self._enter(State.RELEASED if payload is None else State.UNSURE)
@@ -216,10 +213,7 @@ class Supervisor(Belief):
 
         Less where a contact works against it, and where it is not known what the platform carries.
 
-        Parameters
-        ----------
-        turn : list of 3 float
-            By which the correction turns the platform, in F [rad].
+        `turn` (list of 3 float): by which the correction turns the platform, in F [rad].
         """
         along = (0.0, 0.0, 0.0) if self._scales is None else self._scales.along(turn)
         return self._trust * self._share.after(self._step_s, along)

@@ -43,15 +43,9 @@ def planned_point(
 ) -> PlannedPoint:
     """Return a point of a trajectory from what a message says of it.
 
-    Parameters
-    ----------
-    positions, velocities, accelerations : sequence of float
-        One a joint; the last two may be empty [rad, rad/s, rad/s^2].
-
-    Raises
-    ------
-    InputError
-        If a number of values is wrong or a value is not finite or beyond all bounds.
+    `positions`, `velocities`, `accelerations`: one a joint; the last two may be empty [rad, rad/s,
+    rad/s^2].  Raises `InputError` if a number of values is wrong or a value is not finite or beyond
+    all bounds.
     """
     named = {"positions": positions, "velocities": velocities, "accelerations": accelerations}
     for name, values in named.items():
@@ -67,16 +61,9 @@ def planned_point(
 def neighbours(point: PlannedPoint, places: Sequence[int]) -> list[Array]:
     """Return the motor angles whose corrections say how a point of the corrected path moves.
 
-    Parameters
-    ----------
-    places : (2,) sequence of int
-        Where the motors stand among the joints.
-
-    Returns
-    -------
-    list of (2,) float
-        The point itself, then one step ahead and one back along its speed and along its
-        acceleration, where the plan has them and they are not zero [rad].
+    `places` (2,) sequence of int: where the motors stand among the joints.  Gives list of (2,)
+    float: the point itself, then one step ahead and one back along its speed and along its
+    acceleration, where the plan has them and they are not zero [rad].
     """
     at = list(places)
     theta = point.positions[at]

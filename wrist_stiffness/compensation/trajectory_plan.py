@@ -58,10 +58,7 @@ class PlanCorrector:
     ) -> Generator[None, None, tuple[PlannedPoint, ...]]:
         """Correct points whose motors stand at two places of the joints, some at a step.
 
-        Raises
-        ------
-        WristError
-            If one of them cannot be corrected.
+        Raises `WristError` if one of them cannot be corrected.
         """
         done: list[PlannedPoint] = []
         for start in range(0, len(points), AT_ONCE):

@@ -45,12 +45,8 @@ class CondensedSolid:
 def condense_solid(solid: Solid, sizes: MeshSettings, interface: Interface) -> CondensedSolid:
     """Mesh, assemble and condense one solid.
 
-    Parameters
-    ----------
-    sizes : MeshSettings
-        Element sizes [m].
-    interface : {"rigid", "distributing", "sliding"}
-        How walls follow their frames.
+    `sizes`: element sizes [m]; `interface` ({"rigid", "distributing", "sliding"}): how walls follow
+    their frames.
     """
     body = assemble_body(solid, sizes)
     return CondensedSolid(condense(body, interface), len(body.mesh.nodes), len(body.mesh.elements))
@@ -71,10 +67,7 @@ class CondensedStore:
     def __call__(self, solid: Solid, sizes: MeshSettings, interface: Interface) -> CondensedSolid:
         """Return the condensed solid, from the folder where it is there already.
 
-        Raises
-        ------
-        TableError
-            If the folder cannot be written.
+        Raises `TableError` if the folder cannot be written.
         """
         path = self.folder / f"{_key(solid, sizes, interface)}.npz"
         kept = _load(path)

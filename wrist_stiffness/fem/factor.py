@@ -45,12 +45,8 @@ def factorise(matrix: sparse.spmatrix, unknowns: NDArray[np.int64]) -> Factor:
     METIS orders the graph of the nodes; on the wrist's solids this is three times faster than a
     minimum-degree ordering of the unknowns.
 
-    Parameters
-    ----------
-    matrix : sparse.spmatrix
-        (n, n).
-    unknowns : (n,) int
-        Number of each row; rows of one node, 3 k to 3 k + 2, are ordered together.
+    `matrix`: (n, n); `unknowns` (n,) int: number of each row; rows of one node, 3 k to 3 k + 2, are
+    ordered together.
     """
     _, group = np.unique(unknowns // 3, return_inverse=True)
     entries = sparse.coo_matrix(matrix)

@@ -106,13 +106,9 @@ class PatchedBushing:
 def patch_bushing(body: ElasticBody, wall_rings: int) -> PatchedBushing:
     """Condense a bushing onto its contact patches.
 
-    Parameters
-    ----------
-    body : ElasticBody
-        A bushing; there are as many patches around as its mesh has slices, and over the width of a
-        flange as its solid has rings.
-    wall_rings : int
-        Patches along the wall, of equal numbers of mesh lines, so finest where the mesh is.
+    `body`: a bushing; there are as many patches around as its mesh has slices, and over the width
+    of a flange as its solid has rings; `wall_rings`: patches along the wall, of equal numbers of
+    mesh lines, so finest where the mesh is.
     """
     mesh, solid = body.mesh, body.solid
     axes = cylindrical_axes(mesh.nodes)

@@ -158,10 +158,7 @@ class ElasticBody:
 def wrist_parts(geometry: Geometry, rings: int = RINGS) -> list[Part]:
     """List the elastic parts of a wrist in the order of `ELASTIC`.
 
-    Parameters
-    ----------
-    rings : int
-        Contact modes over the width of a flange.
+    `rings`: contact modes over the width of a flange.
     """
     return [
         _link_part(geometry, name) if name in LINKS else _bushing_part(geometry, name, rings)

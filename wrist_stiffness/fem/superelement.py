@@ -79,10 +79,7 @@ class Superelement:
 def condense(body: ElasticBody, interface: Interface) -> Superelement:
     """Condense a solid onto its two frames.
 
-    Parameters
-    ----------
-    interface : {"rigid", "distributing", "sliding"}
-        How the walls follow the frames.
+    `interface` ({"rigid", "distributing", "sliding"}): how the walls follow the frames.
     """
     loads = np.hstack([body.weight, body.pressure])
     if interface == "distributing":

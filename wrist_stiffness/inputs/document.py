@@ -86,11 +86,8 @@ class Node:
 def read_yaml(path: str | Path, error: type[WristError]) -> Node:
     """Read the one document of a YAML file; that of an empty file holds None.
 
-    Raises
-    ------
-    WristError
-        Of the given type, here and in the schema that reads the nodes: if the file cannot be read,
-        is too large, is not YAML, or has something in it that this module refuses.
+    Raises `WristError`: of the given type, here and in the schema that reads the nodes: if the file
+    cannot be read, is too large, is not YAML, or has something in it that this module refuses.
     """
     return yaml_node(read_text(path, error, LARGEST_BYTES), str(path), error)
 

@@ -13,11 +13,8 @@ from wrist_stiffness.errors import WristError
 def open_input(path: str | Path, error: type[WristError]) -> BufferedReader:
     """Open a regular file, or a link to one, to read bytes.
 
-    Raises
-    ------
-    WristError
-        Of the given type, if there is no such file, it cannot be opened, or it is a pipe or a
-        device: those may never end, or never begin.
+    Raises `WristError`: of the given type, if there is no such file, it cannot be opened, or it is
+    a pipe or a device: those may never end, or never begin.
     """
     try:
         # Without waiting for who writes to a pipe.
@@ -37,11 +34,8 @@ def open_input(path: str | Path, error: type[WristError]) -> BufferedReader:
 def read_text(path: str | Path, error: type[WristError], limit: int) -> str:
     """Return the text of a file.
 
-    Raises
-    ------
-    WristError
-        Of the given type, if the file cannot be opened or read, has more than `limit` bytes or is
-        not UTF-8.
+    Raises `WristError`: of the given type, if the file cannot be opened or read, has more than
+    `limit` bytes or is not UTF-8.
     """
     try:
         with open_input(path, error) as stream:

@@ -61,18 +61,9 @@ class BiharmonicSpline:
     def fit(cls, nodes: ArrayLike, values: ArrayLike) -> "BiharmonicSpline":
         """Spline through values at nodes.
 
-        Parameters
-        ----------
-        nodes : (n, 2) array
-            Joint angles [rad], at least three nodes that are not on a line, in any order.
-        values : (n, m) array
-            m value columns, any units.
-
-        Raises
-        ------
-        InputError
-            Wrong shapes, values that are not finite, too few or duplicate nodes, nodes on a
-            line.
+        `nodes` (n, 2): joint angles [rad], at least three nodes that are not on a line, in any
+        order; `values` (n, m): m value columns, any units.  Raises `InputError`: wrong shapes,
+        values that are not finite, too few or duplicate nodes, nodes on a line.
         """
         nodes = np.array(nodes, dtype=float)
         values = np.array(values, dtype=float)
@@ -93,22 +84,10 @@ class BiharmonicSpline:
         return np.ascontiguousarray(((self.nodes - self.offset) / self.scale).T)
 
     def __call__(self, theta: ArrayLike) -> NDArray[np.float64]:
-        """Evaluate the spline.
+        """Evaluate the spline, (..., m): values [unit of the values].
 
-        Parameters
-        ----------
-        theta : (..., 2) array
-            Joint angles [rad].
-
-        Returns
-        -------
-        (..., m) array
-            Values [unit of the values].
-
-        Raises
-        ------
-        InputError
-            The last dimension of theta is not 2.
+        `theta` (..., 2): joint angles [rad].  Raises `InputError`: the last dimension of theta is
+        not 2.
         """
         theta = np.asarray(theta, dtype=float)
         if theta.ndim < 1 or theta.shape[-1] != 2:
@@ -131,15 +110,9 @@ class BiharmonicSpline:
         Closed form from the inverse A^-1 of the system matrix (Rippa 1999): coefficient i over
         element (i, i) of A^-1, for all nodes and columns at the cost of one inverse.
 
-        Returns
-        -------
-        (n, m) array
-            Prediction from the other nodes minus the value [unit of the values].
-
-        Raises
-        ------
-        InputError
-            The nodes that remain without some node cannot carry a spline (too few, or on a line).
+        Gives (n, m): prediction from the other nodes minus the value [unit of the values].  Raises
+        `InputError`: the nodes that remain without some node cannot carry a spline (too few, or on
+        a line).
         """
         count = len(self.nodes)
         inverse = inv(_system_matrix(self._scaled_nodes.T))

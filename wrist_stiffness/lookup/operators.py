@@ -25,20 +25,9 @@ def column_count(sectors: int) -> int:
 def pack(operators: ContactOperators) -> Array:
     """Return the operators at n poses as spline columns.
 
-    Parameters
-    ----------
-    operators : ContactOperators
-        At n poses.
-
-    Returns
-    -------
-    (n, columns) float
-        Lower Cholesky factor of [[C, B], [B', A]], then gaps, then the twist of own weight.
-
-    Raises
-    ------
-    TableError
-        If the flexibility is not positive definite at a pose.
+    `operators`: at n poses.  Gives (n, columns): lower Cholesky factor of [[C, B], [B', A]], then
+    gaps, then the twist of own weight.  Raises `TableError` if the flexibility is not positive
+    definite at a pose.
     """
     b_transposed = np.swapaxes(operators.force_twist, -1, -2)
     whole = np.concatenate(
@@ -64,17 +53,8 @@ def column_sizes(columns: Array, sectors: int) -> Array:
     A factor's entry is measured by its row, whose length is the root of a diagonal flexibility:
     an entry that vanishes by symmetry is rounding and has no size of its own.
 
-    Parameters
-    ----------
-    columns : (n, columns) float
-        As `pack` orders them.
-    sectors : int
-        Flange sectors m.
-
-    Returns
-    -------
-    (columns,) float
-        Positive, in the columns' units.
+    `columns` (n, columns): as `pack` orders them; `sectors`: flange sectors m.  Gives (columns,):
+    positive, in the columns' units.
     """
     size = 6 + sectors
     rows, _ = np.tril_indices(size)

@@ -28,17 +28,8 @@ def rated_map(
 ) -> Array:
     """Return the paper's figures at n poses: the wrist's answer to the rated load.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        n poses.
-    operators : ContactOperators
-        There; made without gravity for the paper's load-only figures.
-
-    Returns
-    -------
-    (n, 5) float
-        s_x, s_y, s_z, |s| [m] and phi [rad], through the readout points.
+    `configuration`: n poses; `operators`: there; made without gravity for the paper's load-only
+    figures.  Gives (n, 5): s_x, s_y, s_z, |s| [m] and phi [rad], through the readout points.
     """
     twist = respond(operators, rated_wrench(configuration, geometry)).twist
     points = np.einsum("nij,pj->npi", configuration.platform, geometry.platform.readout_points)

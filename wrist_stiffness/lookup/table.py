@@ -140,15 +140,8 @@ class Table:
     def check_load(self, wrench: Array) -> None:
         """Refuse a load outside the range for which the table was made.
 
-        Parameters
-        ----------
-        wrench : (6,) float
-            Load on the platform at O [N, N m].
-
-        Raises
-        ------
-        LoadRangeError
-            If a force or a moment is larger than the geometry's limits or not finite.
+        `wrench` (6,): load on the platform at O [N, N m].  Raises `LoadRangeError` if a force or a
+        moment is larger than the geometry's limits or not finite.
         """
         limits = self.geometry.limits
         components = wrench.tolist()

@@ -52,16 +52,8 @@ UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; mom
 def save_table(table: Table, path: str | Path) -> Table:
     """Write a table.
 
-    Parameters
-    ----------
-    path : path
-        Ends in `.npz`; an older file is replaced only when the new one is complete, a device or
-        pipe is written to.
-
-    Raises
-    ------
-    TableError
-        If the file cannot be written.
+    `path`: ends in `.npz`; an older file is replaced only when the new one is complete, a device or
+    pipe is written to.  Raises `TableError` if the file cannot be written.
     """
     path = Path(path)
     arrays = _to_arrays(table)

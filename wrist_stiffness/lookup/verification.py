@@ -64,17 +64,9 @@ def spline_misses(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Compare splines and closed form at random poses under own weight and random loads.
 
-    Parameters
-    ----------
-    rng : Generator, optional
-        Draws them; the same ones every time if None.
-
-    Returns
-    -------
-    (n, 2) float
-        Errors of s and phi as vectors, relative to their lengths.
-    (n,) bool
-        Whether the pose is in the operative workspace.
+    `rng`: draws them; the same ones every time if None.  Gives (n, 2): errors of s and phi as
+    vectors, relative to their lengths, and (n,) bool: whether the pose is in the operative
+    workspace.
     """
     poses = unseen_poses(table.workspace, rng)
     loads = random_loads(

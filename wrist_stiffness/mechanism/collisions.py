@@ -84,10 +84,7 @@ def collision(geometry: Geometry, poses: Array) -> Collision | None:
     Bars may hit bars, the plate, the boss of another one and the pins of joints that are not
     theirs; hubs of the platform are not described, and what a joint connects may touch there.
 
-    Parameters
-    ----------
-    poses : (n, 2) float
-        Motor angles [rad].
+    `poses` (n, 2): motor angles [rad].
     """
     turns = mechanism_of(geometry).forward(poses).rotations
     bars = {name: _bar(geometry, name) for name in LINKS}

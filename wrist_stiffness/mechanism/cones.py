@@ -16,12 +16,7 @@ def gram_determinant(k: Array, cos_u: float, cos_v: float) -> Array:
 
     Negative where no w has these cosines.
 
-    Parameters
-    ----------
-    k : (...) float
-        u . v
-    cos_u, cos_v : float
-        w . u and w . v
+    `k` (...): u . v.  `cos_u`, `cos_v`: w . u and w . v.
     """
     return 1.0 - k * k - cos_u * cos_u - cos_v * cos_v + 2.0 * cos_u * cos_v * k
 

@@ -90,12 +90,7 @@ class Configuration:
     def turn(self, joint: str, axis: Array) -> Array:
         """Turn of a passive joint from home, platform side against motor side, (...) [rad].
 
-        Parameters
-        ----------
-        joint : str
-            One of `TURNING`.
-        axis : (3,) float
-            Of the joint at home.
+        `joint`: one of `TURNING`; `axis` (3,): of the joint at home.
         """
         before, after = (self.rotations[body] for body in TURNING[joint])
         relative = np.swapaxes(before, -1, -2) @ after

@@ -103,10 +103,7 @@ def settle(
 def held_force(approach: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
     """Return the forces that close the given sectors of one pose, of either sign, (m,) [N].
 
-    Raises
-    ------
-    InputError
-        If the flexibility of these sectors is not positive definite.
+    Raises `InputError` if the flexibility of these sectors is not positive definite.
     """
     force = np.zeros(len(gap))
     places, square = _places(closed.tobytes())

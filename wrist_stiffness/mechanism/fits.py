@@ -43,17 +43,8 @@ diamond has 18,500 (M. F. Ashby, Materials Selection in Mechanical Design, chart
 def check_fits(root: Node, geometry: Geometry) -> None:
     """Refuse impossible materials, pins and sleeves that do not fit, and bodies that collide.
 
-    Parameters
-    ----------
-    root : Node
-        The opened geometry file, for the places of its values.
-    geometry : Geometry
-        As read from it.
-
-    Raises
-    ------
-    GeometryError
-        Names the first value that is in the way, its line and the limit.
+    `root`: the opened geometry file, for the places of its values; `geometry`: as read from it.
+    Raises `GeometryError`: names the first value that is in the way, its line and the limit.
     """
     for name, material in root["materials"].value.items():
         if name != "source":

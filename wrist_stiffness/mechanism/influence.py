@@ -36,10 +36,8 @@ _DUAL_SIGN = np.array([-1.0, 1.0, 1.0])[:, None]
 def _frame_laws() -> tuple[Array, Array]:
     """Return how frames move with a screw at a component: X I + Y P.
 
-    Returns
-    -------
-    motor_side, platform_side : (2, 8, 8) float
-        Entries X[m, k] and Y[m, k] for the frame of component m and a screw at component k.
+    Gives `motor_side`, `platform_side` (2, 8, 8): entries X[m, k] and Y[m, k] for the frame of
+    component m and a screw at component k.
     """
     motor_side, platform_side = np.zeros((2, 2, len(ELASTIC), len(ELASTIC)))
     number = {name: i for i, name in enumerate(ELASTIC)}
@@ -91,10 +89,8 @@ class Influence:
     def of_frames(self) -> tuple[Array, Array]:
         """Motion of both interface frames of each component for a screw at each component.
 
-        Returns
-        -------
-        motor_side, platform_side : (..., 8, 8, 3, 3) float
-            Entry [m, k] maps a screw at component k to the screw of component m's frame.
+        Gives `motor_side`, `platform_side` (..., 8, 8, 3, 3): entry [m, k] maps a screw at
+        component k to the screw of component m's frame.
         """
         link_3 = self.link_3[..., None, None, :, :]
         motor_side, platform_side = (
@@ -108,15 +104,8 @@ class Influence:
 
         The transpose of `of_frames`.
 
-        Parameters
-        ----------
-        motor_side, platform_side : (..., 8, 6) float
-            Wrench at O on the two frames of each component.
-
-        Returns
-        -------
-        (..., 8, 6) float
-            Wrench at O through each component.
+        `motor_side`, `platform_side` (..., 8, 6): wrench at O on the two frames of each component.
+        Gives (..., 8, 6): wrench at O through each component.
         """
         direct, by_link_3 = (
             MOTOR_SIDE_LAW[part].T @ motor_side + PLATFORM_SIDE_LAW[part].T @ platform_side

@@ -148,20 +148,8 @@ class Mechanism:
     def closure_radicand(self, theta: Array) -> Array:
         """Gram determinant of b, c and d, which is D^2; negative where the loop cannot close.
 
-        Parameters
-        ----------
-        theta : (..., 2) float
-            Motor angles [rad].
-
-        Returns
-        -------
-        (...) float
-            Dimensionless, 1 at best.
-
-        Raises
-        ------
-        InputError
-            If an angle is not finite.
+        `theta` (..., 2): motor angles [rad].  Gives (...): dimensionless, 1 at best.  Raises
+        `InputError` if an angle is not finite.
         """
         driven = self._turned(np.asarray(theta, dtype=float), slice(3, 4))[..., 0]
         return gram_determinant(dot(driven[..., 0, :], driven[..., 1, :]), *self._cosines)
@@ -175,17 +163,9 @@ class Mechanism:
 
         A stack of poses goes through the same formulas as one pose; the last digit may differ.
 
-        Parameters
-        ----------
-        theta : (..., 2) float
-            Motor angles [rad].
-
-        Raises
-        ------
-        InputError
-            If an angle is not finite.
-        UnreachablePoseError
-            If the loop does not close at one of the poses (the first one is named).
+        `theta` (..., 2): motor angles [rad].  Raises `InputError` if an angle is not finite;
+        `UnreachablePoseError` if the loop does not close at one of the poses (the first one is
+        named).
         """
         theta = np.asarray(theta, dtype=float)
         turned = self._turned(theta)
@@ -210,22 +190,9 @@ class Mechanism:
     def platform_rotation(self, theta: Array) -> Array:
         """Rotation U -> F of the rigid platform alone, in a third of the time of `forward`.
 
-        Parameters
-        ----------
-        theta : (..., 2) float
-            Motor angles [rad].
-
-        Returns
-        -------
-        (..., 3, 3) float
-            The same as `forward` gives.
-
-        Raises
-        ------
-        InputError
-            If an angle is not finite.
-        UnreachablePoseError
-            If the loop does not close at one of the poses (the first one is named).
+        `theta` (..., 2): motor angles [rad].  Gives (..., 3, 3): the same as `forward` gives.
+        Raises `InputError` if an angle is not finite; `UnreachablePoseError` if the loop does not
+        close at one of the poses (the first one is named).
         """
         theta = np.asarray(theta, dtype=float)
         driven = self._turned(theta, slice(3, 4))[..., 0]
@@ -264,20 +231,8 @@ class Mechanism:
     def jacobian(self, configuration: Configuration) -> Array:
         """Jacobian of the platform's angular velocity, omega = J theta_dot.
 
-        Parameters
-        ----------
-        configuration : Configuration
-            Of shape (...).
-
-        Returns
-        -------
-        (..., 3, 2) float
-            Dimensionless, in F.
-
-        Raises
-        ------
-        SingularPoseError
-            If D vanishes at one of the poses.
+        `configuration`: of shape (...).  Gives (..., 3, 2): dimensionless, in F.  Raises
+        `SingularPoseError` if D vanishes at one of the poses.
         """
         determinant = configuration.singularity
         singular = np.abs(determinant) < HOME_TOLERANCE
@@ -298,21 +253,9 @@ class Mechanism:
     def inverse(self, normal: Array) -> Array:
         """Inverse kinematics of a platform normal: all solutions of this assembly mode.
 
-        Parameters
-        ----------
-        normal : (..., 3) float
-            Desired platform normals in F (any length but zero).
-
-        Returns
-        -------
-        (..., 4, 2) float
-            Motor angles in [-pi, pi]; rows that do not exist or belong to the other assembly
-            mode are NaN.
-
-        Raises
-        ------
-        InputError
-            If a normal is not finite or has no length.
+        `normal` (..., 3): desired platform normals in F (any length but zero).  Gives (..., 4, 2):
+        motor angles in [-pi, pi]; rows that do not exist or belong to the other assembly mode are
+        NaN.  Raises `InputError` if a normal is not finite or has no length.
         """
         normal = np.asarray(normal, dtype=float)
         wrong = ~(np.isfinite(normal).all(axis=-1) & (normal != 0.0).any(axis=-1))
@@ -342,24 +285,9 @@ class Mechanism:
     def inverse_near(self, normal: Array, theta: Array) -> Array:
         """Inverse kinematics: the solution nearest to given motor angles.
 
-        Parameters
-        ----------
-        normal : (..., 3) float
-            Desired platform normals in F.
-        theta : (..., 2) float
-            Where to stay near to [rad].
-
-        Returns
-        -------
-        (..., 2) float
-            Motor angles [rad].
-
-        Raises
-        ------
-        InputError
-            If a normal is not a direction or an angle is not finite.
-        UnreachablePoseError
-            If a normal has no solution.
+        `normal` (..., 3): desired platform normals in F; `theta` (..., 2): where to stay near to
+        [rad].  Gives (..., 2): motor angles [rad].  Raises `InputError` if a normal is not a
+        direction or an angle is not finite; `UnreachablePoseError` if a normal has no solution.
         """
         normal, theta = np.asarray(normal, dtype=float), np.asarray(theta, dtype=float)
         if not np.isfinite(theta).all():

@@ -131,10 +131,8 @@ _ORTHOTROPIC = record(
 def read_material(node: Node) -> AnyMaterial:
     """Read a material: orthotropic where `young_GPa` is a list.
 
-    Raises
-    ------
-    GeometryError
-        If a value is missing or outside its limits, or some stress would do negative work.
+    Raises `GeometryError` if a value is missing or outside its limits, or some stress would do
+    negative work.
     """
     young = node.value.get("young_GPa") if isinstance(node.value, dict) else None
     if young is None or not isinstance(young.value, list):

@@ -42,17 +42,8 @@ def pin_flexibilities(geometry: Geometry, link: str, material: Material) -> tupl
 def in_series(first: Array, middle: Array, last: Array) -> tuple[Array, Array]:
     """Put a part between two massless ones.
 
-    Parameters
-    ----------
-    first, middle, last : (6, 6) float
-        Flexibilities at O.
-
-    Returns
-    -------
-    flexibility : (6, 6) float
-        Of all three.
-    follow : (12, 12) float
-        Screws of the middle part's two frames by those of the outer frames.
+    `first`, `middle`, `last` (6, 6): flexibilities at O.  Gives `flexibility` (6, 6): of all three,
+    and `follow` (12, 12): screws of the middle part's two frames by those of the outer frames.
     """
     whole = first + middle + last
     by_first, by_last = (np.linalg.solve(whole, end).T for end in (first, last))

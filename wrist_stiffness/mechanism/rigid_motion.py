@@ -26,17 +26,8 @@ COSINE_OF_LARGE_ANGLE = -0.5
 def exp_twist(twist: Array) -> tuple[Array, Array]:
     """Return the rigid motion of a twist held for unit time.
 
-    Parameters
-    ----------
-    twist : (..., 6) float
-        (translation; rotation) at O in F [m, rad].
-
-    Returns
-    -------
-    rotation : (..., 3, 3) float
-        Rotation matrix.
-    shift : (..., 3) float
-        Where the point at O goes [m].
+    `twist` (..., 6): (translation; rotation) at O in F [m, rad].  Gives `rotation` (..., 3, 3):
+    rotation matrix, and `shift` (..., 3): where the point at O goes [m].
     """
     if twist.ndim == 1 and native is not None:
         rotation, shift = np.empty((3, 3)), np.empty(3)
@@ -84,17 +75,8 @@ def rotation_vector(rotation: Array) -> Array:
 def log_motion(rotation: Array, shift: Array) -> Array:
     """Return the twist whose exponential is a rigid motion (inverse of `exp_twist`).
 
-    Parameters
-    ----------
-    rotation : (..., 3, 3) float
-        Rotation matrix, angle below pi.
-    shift : (..., 3) float
-        Where the point at O goes [m].
-
-    Returns
-    -------
-    (..., 6) float
-        Twist at O in F [m, rad].
+    `rotation` (..., 3, 3): rotation matrix, angle below pi; `shift` (..., 3): where the point at O
+    goes [m].  Gives (..., 6): twist at O in F [m, rad].
     """
     if shift.ndim == 1 and native is not None:
         twist = np.empty(6)

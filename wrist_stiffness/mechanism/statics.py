@@ -43,15 +43,8 @@ def turned_flexibilities(configuration: Configuration, components: ElasticCompon
 def component_shares(configuration: Configuration, components: ElasticComponents) -> Array:
     """Share G_k C_k G_k' of each component in the platform's compliance.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-
-    Returns
-    -------
-    (..., 8, 6, 6) float
-        In the order of `ELASTIC`; symmetric positive semi-definite; they add up to C.
+    `configuration`: of shape (...).  Gives (..., 8, 6, 6): in the order of `ELASTIC`; symmetric
+    positive semi-definite; they add up to C.
     """
     g = influence(configuration).of_components()
     carried = block_diagonal(g @ component_rotations(configuration))
@@ -114,12 +107,7 @@ def weight_wrench(
 ) -> Array:
     """Return the wrench of own weight through the elastic components, (..., 8, 6) [N, N m].
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
+    `configuration`: of shape (...); `gravity` (3,): acceleration of gravity in F [m/s^2].
     """
     r = component_rotations(configuration)
     field = _to_body(r, gravity)

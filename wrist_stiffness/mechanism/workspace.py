@@ -31,10 +31,8 @@ class Workspace:
     def operative_border(self) -> Array:
         """Motor angles on the border of the operative workspace, a closed line (n, 2) [rad].
 
-        Raises
-        ------
-        UnreachablePoseError
-            If the wrist cannot reach the operative tilt in every direction.
+        Raises `UnreachablePoseError` if the wrist cannot reach the operative tilt in every
+        direction.
         """
         azimuth = np.linspace(0.0, 2.0 * np.pi, BORDER_POINTS)
         n0 = self.mechanism.n0
@@ -77,15 +75,8 @@ class Workspace:
     def grid(self, per_axis: int) -> Array:
         """Return the poses of an equally spaced grid over the rectangle that lie in the domain.
 
-        Parameters
-        ----------
-        per_axis : int
-            Points along each motor angle; 5 gives the paper's 25 poses.
-
-        Returns
-        -------
-        (n, 2) float
-            Motor angles [rad].
+        `per_axis`: points along each motor angle; 5 gives the paper's 25 poses.  Gives (n, 2):
+        motor angles [rad].
         """
         poses = self.rectangle_grid(per_axis)
         return poses[self.domain(poses)]
@@ -102,19 +93,9 @@ class Workspace:
     def configuration(self, theta: Array) -> Configuration:
         """Forward kinematics of one pose that must lie in the map domain.
 
-        Parameters
-        ----------
-        theta : (2,) float
-            Motor angles [rad].
-
-        Raises
-        ------
-        InputError
-            If an angle is not finite.
-        UnreachablePoseError
-            If the pose is outside the domain's rectangle or the loop does not close.
-        SingularPoseError
-            If |D| is below its limit.
+        `theta` (2,): motor angles [rad].  Raises `InputError` if an angle is not finite;
+        `UnreachablePoseError` if the pose is outside the domain's rectangle or the loop does not
+        close; `SingularPoseError` if |D| is below its limit.
         """
         theta = np.array(theta, dtype=float)
         if native is not None:

@@ -49,10 +49,7 @@ def cross_axes(geometry: Geometry, joint: str) -> Array:
 def end_screws(geometry: Geometry, joint: str) -> Array:
     """Return the screws for unit displacements of a sleeve's ends across its axis.
 
-    Returns
-    -------
-    (4, 6) float
-        Upper end along u and v, lower end along u and v; at O in the joint's home frame.
+    Gives (4, 6): upper end along u and v, lower end along u and v; at O in the joint's home frame.
     """
     axis, length = geometry.axes[joint], geometry.bushings[joint].length
     across = cross_axes(geometry, joint)[:2]

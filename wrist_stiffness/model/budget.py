@@ -82,15 +82,9 @@ class Budget:
 def budget(model: ErrorModel, sample: Sample) -> Budget:
     """Split the pose error of one sample, at rest and with nothing before it.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Its table is evaluated in closed form, which alone knows the components.
-
-    Raises
-    ------
-    UnreachablePoseError, SingularPoseError, LoadRangeError
-        If pose or load are out of range.
+    `model`: its table is evaluated in closed form, which alone knows the components.  Raises
+    `UnreachablePoseError` or `SingularPoseError` or `LoadRangeError` if pose or load are out of
+    range.
     """
     model = model.with_evaluation("closed_form")
     configuration = model.table.workspace.configuration(sample.theta)

@@ -52,10 +52,7 @@ class Contribution:
     def check(self, samples: int, sectors: int) -> None:
         """Refuse arrays of other shapes than n samples and m sectors ask for, or not finite.
 
-        Raises
-        ------
-        InputError
-            The message names the field.
+        Raises `InputError`: the message names the field.
         """
         shapes = {"through": (samples, 8, 6), "gap": (samples, sectors)}
         for name in (f.name for f in fields(self) if f.name != "rubbing"):

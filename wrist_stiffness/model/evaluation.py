@@ -191,12 +191,7 @@ def _settled_alike(
 def seen(twist: Array, left: Array | None, right: Array | None) -> Array:
     """Return the twist that the pose sensor reports, log(exp(X) exp(xi) exp(Y)).
 
-    Parameters
-    ----------
-    twist : (..., 6) float
-        xi [m, rad].
-    left, right : (..., 6) float or None
-        X and Y of the sensor [m, rad].
+    `twist` (..., 6): xi [m, rad]; `left`, `right` (..., 6): X and Y of the sensor [m, rad].
     """
     if left is None and right is None:
         return twist

@@ -139,10 +139,7 @@ DEEPEST = 50
 def names_in(text: str) -> frozenset[str]:
     """Return the names of variables in an expression.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no formula whatever its names stand for.
+    Raises `InputError` if it cannot be read, or is no formula whatever its names stand for.
     """
     used = {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
     names = frozenset(used - COUNTS.keys())
@@ -201,17 +198,8 @@ class Formula:
     def __call__(self, values: Mapping[str, Value], past: Past | None = None) -> Array:
         """Return the value for variables of n samples.
 
-        Parameters
-        ----------
-        values : dict of str to float or (n,) float
-            At least the `names`.
-        past : Past, optional
-            Of a formula that remembers; brought up to the last sample.
-
-        Returns
-        -------
-        (n,) float or float
-            Not finite where the formula is not defined.
+        `values`: at least the `names`; `past`: of a formula that remembers; brought up to the last
+        sample.  Gives (n,) float or float: not finite where the formula is not defined.
         """
         with np.errstate(all="ignore"):
             return np.asarray(_value(self._tree, values, past or Past(np.zeros(1))), dtype=float)
@@ -219,17 +207,8 @@ class Formula:
     def undefined(self, values: Mapping[str, float], per_si: Mapping[str, float] = NO_UNITS) -> str:
         """Return the term that makes the formula undefined for one sample, and its variables.
 
-        Parameters
-        ----------
-        values : dict of str to float
-            At least the `names`.
-        per_si : dict of str to float, optional
-            By what those are told larger whose name ends in a unit.
-
-        Returns
-        -------
-        str
-            The innermost term without a finite value, as it was typed.
+        `values`: at least the `names`; `per_si`: by what those are told larger whose name ends in a
+        unit.  Gives the innermost term without a finite value, as it was typed.
         """
         with np.errstate(all="ignore"):
             terms = [

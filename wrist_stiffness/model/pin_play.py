@@ -66,16 +66,9 @@ class Play:
     def resting(self, near: Array | None = None) -> Array:
         """Return the displacements of both ends, (n, 4) [m].
 
-        Parameters
-        ----------
-        near : (n, 4) float, optional
-            Where the search begins.  The energy is convex, so it changes the cost and not the
-            result beyond rounding [m].
-
-        Returns
-        -------
-        (n, 4) float
-            Upper end, lower end; each across the axis.
+        `near` (n, 4): where the search begins.  The energy is convex, so it changes the cost and
+        not the result beyond rounding [m].  Gives (n, 4): upper end, lower end; each across the
+        axis.
         """
         new = self._unlike_the_one_before()
         if not new.all():

@@ -115,10 +115,7 @@ class Pin:
     def rest(self, before: Rest | None) -> tuple[Contribution, Rest]:
         """Return what the play adds, and where the pin rests.
 
-        Parameters
-        ----------
-        before : Rest or None
-            Of the block before, with a place for the search to begin.
+        `before`: of the block before, with a place for the search to begin.
         """
         near, feet = None, None
         if before is not None:
@@ -135,12 +132,8 @@ class Pin:
     def _held(self, x: Array, before: Array | None) -> tuple[Contribution, Array]:
         """Return what the held pin adds and the bristles' feet after it.
 
-        Parameters
-        ----------
-        x : (n, 4) float
-            Where it would rest if nothing rubbed [m].
-        before : (PASSES, j, 2) float or None
-            Feet before the first sample [m].
+        `x` (n, 4): where it would rest if nothing rubbed [m]; `before` (PASSES, j, 2): feet before
+        the first sample [m].
         """
         at, rubbing = self.at, self.at.given.rubbing
         drag = np.stack([self._drag(each) for each in rubbing], axis=1)

@@ -26,10 +26,7 @@ def python_laws(allowed: bool) -> Iterator[None]:
 def require_python_laws(reference: str) -> None:
     """Refuse the Python file that a model names, unless somebody said that it may be run.
 
-    Raises
-    ------
-    InputError
-        With how to say so.
+    Raises `InputError` with how to say so.
     """
     if os.environ.get(ALLOWED) != "1":
         raise InputError(

@@ -97,15 +97,7 @@ class Rubbing:
 def pressing(geometry: Geometry, joint: str, wrench: Array) -> Array:
     """Return the sum of the radial forces at both ends of a sleeve; a moment presses both.
 
-    Parameters
-    ----------
-    wrench : (n, 6) float
-        Carried by the joint, at O in its home frame [N, N m].
-
-    Returns
-    -------
-    (n,) float
-        [N].
+    `wrench` (n, 6): carried by the joint, at O in its home frame [N, N m].  Gives (n,) [N].
     """
     ends = wrench @ end_screws(geometry, joint).T
     return np.asarray(lengths(ends[:, :2]) + lengths(ends[:, 2:]))

@@ -64,16 +64,8 @@ class Session:
     def advance(self, sample: Sample) -> Prediction:
         """Predict one sample and remember it.
 
-        Parameters
-        ----------
-        sample : Sample
-            Not earlier than the one before.
-
-        Raises
-        ------
-        WristError
-            If the sample is out of range, not finite or earlier than the one before; it is not
-            remembered.
+        `sample`: not earlier than the one before.  Raises `WristError` if the sample is out of
+        range, not finite or earlier than the one before; it is not remembered.
         """
         prediction, self._memory, varied = self._predicted(sample)
         if self.model.variations:
@@ -83,15 +75,7 @@ class Session:
     def preview(self, sample: Sample) -> Prediction:
         """Predict what `advance` would, and forget it: to try other angles.
 
-        Parameters
-        ----------
-        sample : Sample
-            Not earlier than the last one remembered.
-
-        Raises
-        ------
-        WristError
-            As in `advance`.
+        `sample`: not earlier than the last one remembered.  Raises `WristError` as in `advance`.
         """
         return self._predicted(sample)[0]
 

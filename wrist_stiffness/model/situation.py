@@ -225,17 +225,8 @@ class Situation:
     def screws_under(self, through: Array, force: Array) -> Array:
         """Return the elastic screw of each component; a bushing's flanges belong to it.
 
-        Parameters
-        ----------
-        through : (n, 8, 6) float
-            Wrench through the components at O in F [N, N m].
-        force : (n, m) float
-            Of the flange sectors [N].
-
-        Returns
-        -------
-        (n, 8, 6) float
-            At O in F [m, rad].
+        `through` (n, 8, 6): wrench through the components at O in F [N, N m]; `force` (n, m): of
+        the flange sectors [N].  Gives (n, 8, 6): at O in F [m, rad].
         """
         screws: Array = (self.statics.turned_flexibility @ through[..., None])[..., 0]
         own = self.parts.sectors.component
@@ -261,17 +252,8 @@ class Situation:
     def carried(self, added: Contribution) -> tuple[Array, Array]:
         """Carry a contribution to the platform and to the flange gaps, with slides free.
 
-        Parameters
-        ----------
-        added : Contribution
-            Of n samples; what it says of the pose sensor is left out.
-
-        Returns
-        -------
-        twist : (n, 6) float
-            Of the platform [m, rad].
-        gap : (n, m) float
-            Opening of the sectors [m].
+        `added`: of n samples; what it says of the pose sensor is left out.  Gives `twist` (n, 6):
+        of the platform [m, rad], and `gap` (n, m): opening of the sectors [m].
         """
         projectors, sectors = self.influence, self.parts.sectors
         n = len(self.block)
@@ -327,12 +309,7 @@ class Situation:
     def slide_flexibility(self, joint: str) -> tuple[Array, Array]:
         """Return how far a joint slides, and turns, for a unit force, and torque, along its axis.
 
-        Returns
-        -------
-        slide : (n,) float
-            [m/N]; with all flanges open.
-        turn : (n,) float
-            [rad/(N m)].
+        Gives `slide` (n,): [m/N]; with all flanges open, and `turn` (n,): [rad/(N m)].
         """
         row = self.influence.slides()[..., PASSIVE_JOINTS.index(joint), :]
         flexibility = self.statics.turned_flexibility

@@ -275,10 +275,7 @@ class AtHome:
 def constants_of(effects: Sequence[Effect], parts: ElasticComponents, at_home: AtHome) -> Constants:
     """Put the constant ones of some effects together, as they are at home.
 
-    Parameters
-    ----------
-    parts : ElasticComponents
-        Elastic parts as they are with the model's effects.
+    `parts`: elastic parts as they are with the model's effects.
     """
     found = (at_home.of(effect, parts) for effect in effects if effect.law.constant)
     return sum(found, Constants())

@@ -50,10 +50,8 @@ class Bag:
 def bag_of(folder: Path) -> Bag:
     """Read what a folder says of its recording.
 
-    Raises
-    ------
-    RecordingError
-        If it holds no recording, one of another storage or compression, or none of its files.
+    Raises `RecordingError` if it holds no recording, one of another storage or compression, or none
+    of its files.
     """
     metadata = folder / METADATA_FILE
     if not metadata.exists():

@@ -59,15 +59,9 @@ def decode_batches(
 ) -> tuple[list[Batch], list[int]]:
     """Decode payloads column by column.
 
-    Parameters
-    ----------
-    payloads : Sequence[bytes] or (n, size) uint8 array
-        CDR of either byte order.
-
-    Returns
-    -------
-    batches : list[Batch]
-        Together they hold every payload that can be decoded, with exactly the values of `decode`.
+    `payloads` (Sequence[bytes] or (n, size) uint8 array): CDR of either byte order.  Gives
+    `batches`: together they hold every payload that can be decoded, with exactly the values of
+    `decode`.
     """
     batches: list[Batch] = []
     undecodable: list[int] = []

@@ -82,16 +82,9 @@ def encode(message: Message) -> bytes:
 def decode(message_type: type[AnyMessage], payload: bytes) -> AnyMessage:
     """Return the message in a CDR payload of either byte order.
 
-    Parameters
-    ----------
-    payload : bytes
-        Encapsulation and body; bytes behind the last field are ignored, because
-        ``rclpy.serialization.serialize_message`` leaves some there behind empty sequences.
-
-    Raises
-    ------
-    RecordingError
-        If the payload is cut, of another encapsulation or holds invalid text.
+    `payload`: encapsulation and body; bytes behind the last field are ignored, because
+    ``rclpy.serialization.serialize_message`` leaves some there behind empty sequences.  Raises
+    `RecordingError` if the payload is cut, of another encapsulation or holds invalid text.
     """
     byte_order = byte_order_of(message_type, payload)
     body = payload[ENCAPSULATION_SIZE:]

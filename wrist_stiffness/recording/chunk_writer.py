@@ -93,10 +93,8 @@ class Messages:
     ) -> tuple[NDArray[np.uint8], Integers, Integers, Integers]:
         """Return the records in their order.
 
-        Returns
-        -------
-        (size,) uint8, (n + 1,) int, (n,) int, (n,) int
-            All bytes, where each record begins and the last one ends, channels, log times [ns].
+        Gives (size,) uint8, (n + 1,) int, (n,) int, (n,) int: all bytes, where each record begins
+        and the last one ends, channels, log times [ns].
         """
         sizes = [
             np.full(len(order), payloads.shape[1])

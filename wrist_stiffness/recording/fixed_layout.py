@@ -62,10 +62,8 @@ class FixedLayout:
     def rows(self, *columns: NDArray[Any]) -> NDArray[np.uint8]:
         """Return the payloads of n messages, (n, size), with zeros for padding.
 
-        Parameters
-        ----------
-        columns : (n,) or (n, k) arrays
-            One for each number, time [ns] and run of numbers, in the order of the wire.
+        `columns` (n,) or (n, k) arrays: one for each number, time [ns] and run of numbers, in the
+        order of the wire.
         """
         n = len(columns[0])
         fixed = np.frombuffer(self._fixed.to_bytes(self._size, "little"), np.uint8)
@@ -85,10 +83,7 @@ class FixedLayout:
     def payload(self, *numbers: float) -> bytes:
         """Return the payload of other numbers, with zeros for padding.
 
-        Raises
-        ------
-        RecordingError
-            If there are more or fewer of them, or one does not fit its type.
+        Raises `RecordingError` if there are more or fewer of them, or one does not fit its type.
         """
         try:
             packed = self._struct.pack(*numbers)
@@ -110,22 +105,9 @@ class FixedReader(Generic[AnyMessage]):
     def read(self, payload: bytes) -> tuple[AnyMessage, tuple[float, ...]]:
         """Take a payload apart.
 
-        Parameters
-        ----------
-        payload : bytes
-            CDR of either byte order.
-
-        Returns
-        -------
-        like : Message
-            With this payload's texts and lengths, but maybe with other numbers.
-        numbers : tuple of float or int
-            Of this payload (see `FixedLayout`).
-
-        Raises
-        ------
-        RecordingError
-            If the payload cannot be decoded.
+        `payload`: CDR of either byte order.  Gives `like`: with this payload's texts and lengths,
+        but maybe with other numbers, and `numbers`: of this payload (see `FixedLayout`).  Raises
+        `RecordingError` if the payload cannot be decoded.
         """
         for layout, like in self._known:
             if layout.matches(payload):

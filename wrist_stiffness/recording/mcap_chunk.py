@@ -139,11 +139,9 @@ class Contents:
 def contents_of(chunk: Chunk) -> Contents:
     """Read a chunk.
 
-    Raises
-    ------
-    RecordingError
-        If the bytes cannot be read or decompressed, do not match size or checksum, a record is
-        damaged, or a log time is before the stated start or after the last that ROS knows.
+    Raises `RecordingError` if the bytes cannot be read or decompressed, do not match size or
+    checksum, a record is damaged, or a log time is before the stated start or after the last that
+    ROS knows.
     """
     found = _walked(_bytes_of(chunk), chunk)
     times = found.heads["log_time"]

@@ -116,15 +116,8 @@ class McapIndex:
 def index_mcap(path: Path) -> McapIndex:
     """Walk over an MCAP file.
 
-    Returns
-    -------
-    McapIndex
-        What it holds; a damaged file gives what stands before and behind the damage.
-
-    Raises
-    ------
-    RecordingError
-        If the file is empty, no MCAP file, or cannot be opened.
+    Gives what it holds; a damaged file gives what stands before and behind the damage.  Raises
+    `RecordingError` if the file is empty, no MCAP file, or cannot be opened.
     """
     with open_input(path, RecordingError) as stream:
         try:

@@ -36,10 +36,7 @@ _MOST_CANDIDATES = 10_000
 def next_record(stream: BinaryIO, position: int, size: int) -> int | None:
     """Return where the next record begins: one that is followed by another, or by the end.
 
-    Parameters
-    ----------
-    position, size : int
-        From which byte to search, and how many the file has.
+    `position`, `size`: from which byte to search, and how many the file has.
     """
     left = _MOST_CANDIDATES
     while position + RECORD_HEAD.size <= size and left > 0:

@@ -11,12 +11,8 @@ MSG_LINE = "msg_line"
 def line(text: str, default: Any) -> Any:
     """Declare one field of a message.
 
-    Parameters
-    ----------
-    text : str
-        Line of the ``.msg`` file: type, name and, where the file has one, the default value.
-    default : Any
-        Value in Python where none is given; immutable.
+    `text`: line of the ``.msg`` file: type, name and, where the file has one, the default value;
+    `default`: value in Python where none is given; immutable.
     """
     return field(default=default, metadata={MSG_LINE: text})
 

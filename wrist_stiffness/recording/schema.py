@@ -64,10 +64,7 @@ class Field:
 def fields_of(ros_type: str) -> tuple[Field, ...]:
     """Return the fields of a message type in the order of the wire.
 
-    Parameters
-    ----------
-    ros_type : str
-        Full name of a type in `wrist_stiffness.recording.messages`.
+    `ros_type`: full name of a type in `wrist_stiffness.recording.messages`.
     """
     if ros_type in SECONDS_NANOSECONDS:
         return (Field("sec", "sec", "int32"), Field("nanosec", "nanosec", "uint32"))

@@ -98,11 +98,8 @@ class RecordingWriter:
     def check_target(self) -> None:
         """Refuse a path under which no recording can be written, as the ``with`` block does.
 
-        Raises
-        ------
-        RecordingError
-            If the path exists, or its parent does not or is a recording itself, or an earlier
-            part is where this one's would be kept.
+        Raises `RecordingError` if the path exists, or its parent does not or is a recording itself,
+        or an earlier part is where this one's would be kept.
         """
         if not self.path.parent.is_dir():
             raise RecordingError(f"{self.path}: folder {self.path.parent} does not exist")
@@ -143,16 +140,9 @@ class RecordingWriter:
     def write_raw(self, channel: Channel, payload: bytes, log_time_ns: int) -> None:
         """Append a payload as it is, of any type: copies from another recording, or from DDS.
 
-        Parameters
-        ----------
-        log_time_ns : int
-            Time of reception [ns]; need not increase.
-
-        Raises
-        ------
-        RecordingError
-            If the topic has another type, the time is out of range or the disk refuses, or has
-            refused a message before.
+        `log_time_ns`: time of reception [ns]; need not increase.  Raises `RecordingError` if the
+        topic has another type, the time is out of range or the disk refuses, or has refused a
+        message before.
         """
         self._check_open()
         if not 0 <= log_time_ns <= _LAST_TIME_NS:
@@ -169,10 +159,7 @@ class RecordingWriter:
     def channel_id(self, channel: Channel) -> int:
         """Return the number of a channel, for `write_block`; it is made known where it is new.
 
-        Raises
-        ------
-        RecordingError
-            If its topic has another type.
+        Raises `RecordingError` if its topic has another type.
         """
         self._check_open()
         return self._register(channel)
@@ -180,10 +167,7 @@ class RecordingWriter:
     def write_block(self, messages: Messages) -> None:
         """Append many messages, with log times as `write_raw` takes them.
 
-        Raises
-        ------
-        RecordingError
-            If the disk refuses, or has refused a message before.
+        Raises `RecordingError` if the disk refuses, or has refused a message before.
         """
         self._check_open()
         try:
@@ -207,11 +191,8 @@ class RecordingWriter:
     ) -> None:
         """Give the recording its name, or remove what was written of it.
 
-        Raises
-        ------
-        RecordingError
-            If the disk refuses the end, or has refused a message before; says where the part is
-            that was kept.
+        Raises `RecordingError` if the disk refuses the end, or has refused a message before; says
+        where the part is that was kept.
         """
         kept = ""
         try:

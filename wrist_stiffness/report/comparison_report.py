@@ -57,10 +57,7 @@ HOW = (
 def report_of_comparison(compared: Compared) -> Page:
     """Return the report of a comparison.
 
-    Parameters
-    ----------
-    compared : Compared
-        Of `commands.compare.compare`.
+    `compared`: of `commands.compare.compare`.
     """
     found = compared.comparison
     models = ", ".join(model.name for model in found.models)

@@ -130,12 +130,8 @@ def told_lines(
 ) -> list[str]:
     """Return the estimates that the data tell, or all of them, a line each.
 
-    Parameters
-    ----------
-    all_of_them : bool
-        Also those that the data do not tell.
-    usual : bool
-        Whether they have a typical magnitude: those of a user's formula have none.
+    `all_of_them`: also those that the data do not tell; `usual`: whether they have a typical
+    magnitude: those of a user's formula have none.
     """
     lines = []
     for each in parameters:

@@ -138,10 +138,7 @@ def html_of(page: Page) -> str:
 def write_page(path: str | Path, page: Page) -> None:
     """Write a page, complete or not at all.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises `InputError` if the file cannot be written.
     """
     try:
         with replacing(path) as written:

@@ -59,10 +59,8 @@ def plus_minus(value: float, sigma: float) -> str:
 def against(curve: Curve, title: str, models: Sequence[tuple[str, Observations]] = ()) -> Against:
     """Return what a picture needs of one dependence.
 
-    Parameters
-    ----------
-    models : sequence of (str, Observations)
-        Name and residuals of further models over the same units, shown along the same direction.
+    `models`: name and residuals of further models over the same units, shown along the same
+    direction.
     """
     columns = list(curve.quantity.components)
     used = curve.direction != 0.0

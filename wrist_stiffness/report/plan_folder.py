@@ -21,10 +21,7 @@ from wrist_stiffness.report.pictures.experiment_plan import draw_plan
 def require_new_folder(folder: str | Path) -> None:
     """Refuse a place that is taken or cannot be.
 
-    Raises
-    ------
-    InputError
-        If it exists, or its parent does not.
+    Raises `InputError` if it exists, or its parent does not.
     """
     folder = Path(folder)
     if folder.exists():
@@ -38,15 +35,8 @@ def require_new_folder(folder: str | Path) -> None:
 def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) -> None:
     """Write `plan.csv`, the recording `trajectory`, `plan.png` and `summary.txt`, all or nothing.
 
-    Parameters
-    ----------
-    folder : path
-        To make; its parent must exist.
-
-    Raises
-    ------
-    InputError
-        If the folder exists or cannot be written.
+    `folder`: to make; its parent must exist.  Raises `InputError` if the folder exists or cannot be
+    written.
     """
     folder = Path(folder)
     require_new_folder(folder)

@@ -53,10 +53,7 @@ class PreparedChange:
     def commit(self, wanted: bool) -> str:
         """Make the change that was prepared, or drop or undo it.
 
-        Raises
-        ------
-        InputError
-            If nothing was prepared.
+        Raises `InputError` if nothing was prepared.
         """
         change, undo = self._change, self._undo
         self._change = self._undo = None

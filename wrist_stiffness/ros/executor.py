@@ -100,10 +100,7 @@ class StreamExecutor(SingleThreadedExecutor):
 def take_in_order(subscriptions: Sequence[Subscription]) -> bool:
     """Take messages, always from the first subscription that has one, and call its callback.
 
-    Returns
-    -------
-    bool
-        Whether there may be more: after `LONGEST_RUN_S` it is somebody else's turn.
+    Gives whether there may be more: after `LONGEST_RUN_S` it is somebody else's turn.
     """
     end = time.monotonic() + LONGEST_RUN_S
     while time.monotonic() < end:

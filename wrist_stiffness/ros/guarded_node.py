@@ -117,11 +117,8 @@ class GuardedNode(LifecycleNode):
     def serve(self, service_type: type, name: str, act: Callable[[Any], Any]) -> None:
         """Offer a service of std_srvs.
 
-        Parameters
-        ----------
-        act : callable
-            Takes the request and returns what to say, or an awaitable of it; what it raises is the
-            answer, too.
+        `act`: takes the request and returns what to say, or an awaitable of it; what it raises is
+        the answer, too.
         """
 
         async def answer(request: Any, response: Any) -> Any:

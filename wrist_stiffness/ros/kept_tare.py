@@ -55,10 +55,7 @@ class KeptTare:
     def keep(self, tare: Tare | None) -> None:
         """Write a tare, or remove the one that is kept.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises `InputError` if the file cannot be written.
         """
         if self.path is None:
             return

@@ -51,11 +51,8 @@ class Loading:
     def result(self) -> ErrorModel:
         """Return the model.
 
-        Raises
-        ------
-        WristError
-            If it cannot be loaded, whatever the reason: a model file may name a law of the user's
-            own, which is code.
+        Raises `WristError` if it cannot be loaded, whatever the reason: a model file may name a law
+        of the user's own, which is code.
         """
         if not self.done:
             raise InputError(f"{self._path}: not loaded within {self.limit_s:g} s; given up")

@@ -49,17 +49,9 @@ def descriptor(entry: ParameterEntry) -> ParameterDescriptor:
 def declare(node: Node, entries: Sequence[ParameterEntry]) -> None:
     """Declare parameters.
 
-    Parameters
-    ----------
-    node : Node
-        Gets them, with the values it was started with.
-
-    Raises
-    ------
-    InputError
-        If the node was started with a parameter that no node of the wrist has: rclpy ignores it.
-    rclpy.exceptions.ParameterException
-        If a value that the node was started with has another type or is out of range.
+    `node`: gets them, with the values it was started with.  Raises `InputError` if the node was
+    started with a parameter that no node of the wrist has: rclpy ignores it; `ParameterException`
+    if a value that the node was started with has another type or is out of range.
     """
     known = {entry.name for entry in (*entries, *EVERY_ENTRY)} | OF_RCLPY
     for name in node._parameter_overrides:

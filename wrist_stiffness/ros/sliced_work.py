@@ -45,10 +45,7 @@ class SlicedWork:
     def add(self, work: Generator[None, None, Any]) -> None:
         """Begin work once what came before is done.
 
-        Raises
-        ------
-        InputError
-            If too much waits already.
+        Raises `InputError` if too much waits already.
         """
         if len(self._waiting) >= MOST_WAITING:
             raise InputError(f"{len(self._waiting)} trajectories wait to be corrected; refused")

@@ -17,12 +17,8 @@ from wrist_stiffness.recording.messages import JointTrajectory
 def read_plan(payload: bytes) -> Generator[None, None, tuple[JointTrajectory, list[PlannedPoint]]]:
     """Return a trajectory as it came, and its points.
 
-    Raises
-    ------
-    RecordingError
-        If the bytes are no such message.
-    InputError
-        If a point cannot be used (see `planned_point`).
+    Raises `RecordingError` if the bytes are no such message; `InputError` if a point cannot be used
+    (see `planned_point`).
     """
     plan = yield from decode_in_steps(JointTrajectory, payload)
     count, points = len(plan.joint_names), []

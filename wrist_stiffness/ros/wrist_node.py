@@ -196,10 +196,7 @@ class WristNode(GuardedNode, ABC):
     def require_ready(self) -> None:
         """Refuse what needs a node at work: active, with a model and with loads that arrive.
 
-        Raises
-        ------
-        InputError
-            With the reason.
+        Raises `InputError` with the reason.
         """
         if self.state != ACTIVE:
             raise InputError(f"refused: the node is {self.state}, not active")

@@ -111,10 +111,7 @@ class SessionModel:
     ) -> list[Array]:
         """Return the same, good enough for differences: the path only where an effect needs it.
 
-        Parameters
-        ----------
-        along : sequence of bool, optional
-            Which of them are evaluated on the path; by default those that remember.
+        `along`: which of them are evaluated on the path; by default those that remember.
         """
         path = [self.remembers(trial) for trial in trials] if along is None else along
         wanted = [self._moments(*each) for each in zip(trials, path, strict=True)]
@@ -137,15 +134,8 @@ class SessionModel:
     def changes(self, trials: Sequence[Effects]) -> list[Array]:
         """Return the change of the units' predicted poses by other effects than the point's.
 
-        Parameters
-        ----------
-        trials : sequence of tuple of Effect
-            Full sets of effects; those with a memory are compared on the path.
-
-        Returns
-        -------
-        list of (u, 6) arrays
-            Predicted with the trial minus predicted at the point, at O in F [m, rad].
+        `trials`: full sets of effects; those with a memory are compared on the path.  Gives list of
+        (u, 6) arrays: predicted with the trial minus predicted at the point, at O in F [m, rad].
         """
         path = [self.remembers(trial) for trial in trials]
         # First of all: the trials take over what they have in common with it.

@@ -18,10 +18,7 @@ from wrist_stiffness.sessions.units import COUNTS, WINDOW_S, Cut, Labels
 def hidden_counts(table: Table, cuts: Sequence[Cut], theta: Array) -> Array:
     """Return what a standard deviation of each motor's hidden part does to units, (u, 6, 2).
 
-    Parameters
-    ----------
-    theta : (u, 2) float
-        Mean angles of all units [rad].
+    `theta` (u, 2): mean angles of all units [rad].
     """
     mechanism, step = table.mechanism, table.geometry.limits.encoder_step
     jacobian = np.zeros((len(theta), 6, 2))

@@ -12,17 +12,8 @@ from wrist_stiffness.sessions.in_pieces import in_pieces
 def beyond_range(table: Table, block: Block) -> list[str]:
     """Say which limits of a table measurements exceed.
 
-    Parameters
-    ----------
-    table : Table
-        Has the domain and the largest load.
-    block : Block
-        Samples [rad, N, N m].
-
-    Returns
-    -------
-    list of str
-        One text for each limit: how many samples, how far, the limit.
+    `table`: has the domain and the largest load; `block`: samples [rad, N, N m].  Gives one text
+    for each limit: how many samples, how far, the limit.
     """
     limits, of = table.geometry.limits, len(block)
     out = []

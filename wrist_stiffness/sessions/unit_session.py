@@ -235,15 +235,8 @@ class UnitSession:
     def residual(self, twist: Array) -> Array:
         """Return log(T_measured T_predicted^-1) at O in F, (..., u, 6) [m, rad].
 
-        Parameters
-        ----------
-        twist : (..., u, 6) float
-            Predicted pose error of each unit [m, rad].
-
-        Returns
-        -------
-        (..., u, m) float
-            Of gauges what they read less what they should.
+        `twist` (..., u, 6): predicted pose error of each unit [m, rad].  Gives (..., u, m): of
+        gauges what they read less what they should.
         """
         if self.readings is not None:
             return self.readings.values - self.readings.predicted(twist, self._theta)
@@ -264,10 +257,7 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
 
     Measurements outside the model's domain or load range belong to no unit.
 
-    Raises
-    ------
-    InputError
-        If none lies in it; the message names the limits.
+    Raises `InputError` if none lies in it; the message names the limits.
     """
     accepted = model.accepts(session.block)
     if not accepted.any():
@@ -386,10 +376,7 @@ def _rounding(steps: Sequence[Array], quantities: Sequence[Quantity]) -> Array:
 def all_units(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> tuple[UnitSession, ...]:
     """Cut sessions into units that are looked at together.
 
-    Raises
-    ------
-    InputError
-        As `as_units`, or if they were not all measured by instruments of one kind.
+    Raises `InputError` as `as_units`, or if they were not all measured by instruments of one kind.
     """
     units = tuple(as_units(model, session) for session in sessions)
     for other in units[1:]:

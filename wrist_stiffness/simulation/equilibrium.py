@@ -114,11 +114,8 @@ class Pose:
     def friction_wrench(self, friction: Array) -> Array:
         """Wrench through each component (n, 8, 6) of friction in joint_2 to joint_4.
 
-        Parameters
-        ----------
-        friction : (n, 3, 2) float
-            Force and torque along each axis, of the joint's outer body on the inner one's hub
-            [N, N m]; they act on slide and turn.
+        `friction` (n, 3, 2): force and torque along each axis, of the joint's outer body on the
+        inner one's hub [N, N m]; they act on slide and turn.
         """
         halves = np.einsum("nkjx,njh->nkhx", self.rows, friction)
         return halves.reshape(*halves.shape[:2], 6)
@@ -126,17 +123,8 @@ class Pose:
     def give(self, state: Equilibrium, bends: Sequence[tuple[int, Bend]]) -> Array:
         """Return what unit friction of each passive joint moves there, (n, 3, 2, 2).
 
-        Parameters
-        ----------
-        state : Equilibrium
-            Whose touching flanges and slopes of the laws count.
-        bends : sequence of (int, Bend)
-            As in `solve`.
-
-        Returns
-        -------
-        (n, 3, 2, 2) float
-            Slide and turn by force and torque along the axis.
+        `state`: whose touching flanges and slopes of the laws count; `bends`: as in `solve`.  Gives
+        (n, 3, 2, 2): slide and turn by force and torque along the axis.
         """
         soft = self.flexibility.copy()
         for k, law in bends:

@@ -193,10 +193,7 @@ def experiment(
 ) -> Program:
     """Return the program of an experiment by its name.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name.
+    Raises `InputError` if there is none of that name.
     """
     if name not in EXPERIMENTS:
         raise InputError(f"experiment {name!r} is not one of {', '.join(EXPERIMENTS)}")

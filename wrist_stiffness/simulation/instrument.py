@@ -86,10 +86,7 @@ INSTRUMENTS = {
 def instrument(name: str) -> PoseInstrument:
     """Return an instrument by its name.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name.
+    Raises `InputError` if there is none of that name.
     """
     if name not in INSTRUMENTS:
         raise InputError(f"instrument {name!r} is not one of {', '.join(INSTRUMENTS)}")

@@ -60,15 +60,7 @@ def departure(rotation: Array, shift: Array, base: BasePose) -> Array:
 def residual(table: Table, sample: CellSample) -> Array:
     """Return log(T_measured T_base^-1) for the readings of angles and load.
 
-    Parameters
-    ----------
-    sample : CellSample
-        n samples with whole poses.
-
-    Returns
-    -------
-    (n, 6) float
-        Twist at O in F [m, rad].
+    `sample`: n samples with whole poses.  Gives (n, 6): twist at O in F [m, rad].
     """
     base = base_pose(table, sample.encoder, sample.wrench)
     return departure(sample.measured_rotation, sample.measured_shift, base)

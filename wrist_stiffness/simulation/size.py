@@ -36,15 +36,7 @@ BLOCK = 2000
 def sample_covariance(table: Table, theta: Array, name: str) -> Array:
     """Return the covariance of one sample of the residual twist.
 
-    Parameters
-    ----------
-    theta : (n, 2) float
-        Motor angles [rad].
-
-    Returns
-    -------
-    (n, 6, 6) float
-        Translation first, fixed axes of F.
+    `theta` (n, 2): motor angles [rad].  Gives (n, 6, 6): translation first, fixed axes of F.
     """
     mechanism = table.mechanism
     jacobian = np.zeros((len(theta), 6, 2))

@@ -361,11 +361,8 @@ class Stopped(WristError):
 def work(folder: Path, wires: Connection, stop: Event) -> None:
     """Do what is asked over a connection until that is closed.
 
-    Parameters
-    ----------
-    wires : Connection
-        Takes (method, arguments); answers ("told", words), ("done", done, total), and at the end
-        ("good", changes) or ("bad", sentence).
+    `wires`: takes (method, arguments); answers ("told", words), ("done", done, total), and at the
+    end ("good", changes) or ("bad", sentence).
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

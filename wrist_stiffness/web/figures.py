@@ -135,10 +135,7 @@ def minutes(table: Observations) -> Array:
 def error_map(shown: Shown, border: Array) -> Figure:
     """Return the error over both motor angles.
 
-    Parameters
-    ----------
-    border : (n, 2) float
-        Border of the operative workspace [rad].
+    `border` (n, 2): border of the operative workspace [rad].
     """
     table = shown.view.left
     left = table.values if shown.after is None else shown.after
@@ -221,10 +218,7 @@ def time_line(shown: Shown) -> Figure:
 def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
     """Return what is left against one condition, with the law that the comparison found.
 
-    Parameters
-    ----------
-    told : Curve, optional
-        Of the comparison, where it is of this condition and version.
+    `told`: of the comparison, where it is of this condition and version.
     """
     table, part, label = shown.view.left, shown.part, shown.part_label
     if told is not None and len(told.measured) == table.n_units:

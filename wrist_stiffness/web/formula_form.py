@@ -42,10 +42,7 @@ class FormulaForm:
     def _effect(self) -> FormulaEffect:
         """Return what is typed; it is read here and in no case run.
 
-        Raises
-        ------
-        InputError
-            If it cannot be an effect.
+        Raises `InputError` if it cannot be an effect.
         """
         way = direction_of(str(self._way.value).split())
         own = str(self._name.value), str(self._place.value), way, str(self._formula.value)

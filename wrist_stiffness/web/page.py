@@ -54,10 +54,7 @@ START = (
 def build_page(workspace: Workspace, largest: int) -> None:
     """Build the page of one tab.
 
-    Parameters
-    ----------
-    largest : int
-        Of an upload [bytes].
+    `largest`: of an upload [bytes].
     """
     tab = Tab(workspace)
     ui.add_css(STYLE)

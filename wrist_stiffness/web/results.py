@@ -23,10 +23,7 @@ from wrist_stiffness.web.workspace import Workspace
 def as_commands(model: Path, recordings: Sequence[Path], added: Sequence[str]) -> list[str]:
     """Return what a terminal would do the same with.
 
-    Parameters
-    ----------
-    added : sequence of str
-        Options of `extend`, in their order.
+    `added`: options of `extend`, in their order.
     """
     days = shlex.join(str(path) for path in recordings)
     lines = [f"wrist-stiffness calibrate {shlex.quote(str(model))} --fit {days} -o step_1.yaml"]

@@ -42,10 +42,8 @@ class Served:
 def serve(served: Served) -> None:
     """Serve until somebody ends it.
 
-    Raises
-    ------
-    InputError
-        If a number is out of range, the folder cannot be made, or the address is not to be had.
+    Raises `InputError` if a number is out of range, the folder cannot be made, or the address is
+    not to be had.
     """
     if not 0 < served.port < 65536:
         raise InputError(f"--port {served.port} is not 1 to 65535")

@@ -124,12 +124,8 @@ class Tab:
 
         At the end it asks on what the error of the version that is then shown depends.
 
-        Parameters
-        ----------
-        calls : tuples
-            Name of a method of `bench.Bench`, and its arguments.
-        then : (str, str), optional
-            Panel and lower picture to go to after the first.
+        `calls`: name of a method of `bench.Bench`, and its arguments; `then` (str, str): panel and
+        lower picture to go to after the first.
         """
         if self.busy:
             ui.notify("Wait for the running task, or cancel it", type="warning")

@@ -41,10 +41,7 @@ class Workspace:
     def path(self, name: str) -> Path:
         """Return the path of a name in the folder.
 
-        Raises
-        ------
-        InputError
-            If it is no plain file name, or leads out of the folder.
+        Raises `InputError` if it is no plain file name, or leads out of the folder.
         """
         path = self.folder / name
         if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
@@ -54,10 +51,8 @@ class Workspace:
     def model(self, name: str) -> Path:
         """Return the path of a model file that refers to nothing beyond the folder.
 
-        Raises
-        ------
-        InputError
-            As for `path`, or if its table or a law lies elsewhere; a table of the package may.
+        Raises `InputError` as for `path`, or if its table or a law lies elsewhere; a table of the
+        package may.
         """
         path = self.path(name)
         told = read_yaml(path, InputError).plain
@@ -82,10 +77,7 @@ class Workspace:
     def save(self, name: str, content: bytes) -> Path:
         """Write an uploaded file; one of that name is replaced.
 
-        Raises
-        ------
-        InputError
-            If the name or its ending is refused, or a folder has the name.
+        Raises `InputError` if the name or its ending is refused, or a folder has the name.
         """
         path = self.path(name)
         if path.suffix.lower() not in TAKEN:

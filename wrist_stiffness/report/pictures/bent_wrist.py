@@ -49,17 +49,9 @@ class Shape:
 def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:
     """Return the bodies of the wrist at a pose with their displacements under a load alone.
 
-    Parameters
-    ----------
-    theta : (2,) float
-        Motor angles [rad].
-    push : Push
-        The load; own weight is left out.
-
-    Raises
-    ------
-    UnreachablePoseError, SingularPoseError, LoadRangeError
-        If the pose or the load is out of range.
+    `theta` (2,): motor angles [rad]; `push`: the load; own weight is left out.  Raises
+    `UnreachablePoseError` or `SingularPoseError` or `LoadRangeError` if the pose or the load is out
+    of range.
     """
     configuration = table.workspace.configuration(theta)
     wrench = push.wrench(configuration.platform)
@@ -72,10 +64,7 @@ def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:
 def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> list[Shape]:
     """Return the bodies of the wrist at a pose with their displacements.
 
-    Parameters
-    ----------
-    screws : (8, 6) float
-        Elastic screw of each component at O in F [m, rad].
+    `screws` (8, 6): elastic screw of each component at O in F [m, rad].
     """
     projectors = influence(configuration)
     frames = [_frame_screws(laws, screws) for laws in projectors.of_frames()]
@@ -87,10 +76,7 @@ def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> l
 def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
     """Draw the wrist at a pose, rigid in grey and bent in colours of its displacement.
 
-    Parameters
-    ----------
-    theta : (2,) float
-        Motor angles [rad].
+    `theta` (2,): motor angles [rad].
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -119,10 +105,7 @@ def draw_mode_shapes(
 ) -> None:
     """Draw the shapes of the four slowest natural modes at a pose, rigid in grey.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        One pose, as a stack of one.
+    `configuration`: one pose, as a stack of one.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

@@ -21,17 +21,8 @@ def new_figure(width_in: float, height_in: float) -> Any:
 def save_figure(figure: Any, path: Path) -> None:
     """Write a picture, complete or not at all.
 
-    Parameters
-    ----------
-    figure : Figure
-        Of `new_figure`.
-    path : Path
-        PNG file; an older one is replaced.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    `figure`: of `new_figure`; `path`: PNG file; an older one is replaced.  Raises `InputError` if
+    the file cannot be written.
     """
     try:
         with replacing(path) as written:

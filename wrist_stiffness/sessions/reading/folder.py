@@ -31,15 +31,8 @@ def is_recording(path: Path) -> bool:
 def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
     """Return the recordings that paths name: a folder of recordings stands for all of them.
 
-    Parameters
-    ----------
-    paths : iterable of path
-        Recordings, or folders in which recordings lie side by side.
-
-    Raises
-    ------
-    RecordingError
-        If a path does not exist, or a folder holds no recording.
+    `paths`: recordings, or folders in which recordings lie side by side.  Raises `RecordingError`
+    if a path does not exist, or a folder holds no recording.
     """
     found: dict[Path, None] = {}
     for path in map(Path, paths):

@@ -64,10 +64,7 @@ class GaugeTrack:
 def gauge_track(samples: GaugeSamples, notes: Mapping[str, Any]) -> GaugeTrack:
     """Return the readings of a recording in the order of their stamps.
 
-    Raises
-    ------
-    InputError
-        If the notes do not say what stands where.
+    Raises `InputError` if the notes do not say what stands where.
     """
     try:
         gauges = tuple(Gauge.of_note(facts) for facts in notes[GAUGES])

@@ -34,17 +34,9 @@ def gauge_of(column: str) -> str:
 
 
 def read_gauges(path: str | Path) -> dict[str, Gauge]:
-    """Read what reads which column.
+    """Read what reads which column: by column, in the file's order.
 
-    Returns
-    -------
-    dict of str to Gauge
-        By column, in the file's order.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a key is missing, unknown, or wrong.
+    Raises `InputError` if the file cannot be read, or a key is missing, unknown, or wrong.
     """
     found: dict[str, Gauge] = {}
     for node in FILE(read_yaml(path, InputError))["gauges"]:

@@ -23,17 +23,9 @@ LEAST_CHANGES = 20
 def without_held(angles: Signal) -> tuple[Signal, float]:
     """Leave out the repetitions of angles that are read less often than they are sent.
 
-    Parameters
-    ----------
-    angles : Signal
-        Motor angles (m, 2) [rad].
-
-    Returns
-    -------
-    kept : Signal
-        Angles at the stamps at which they first appear, and at rest as often as they are read.
-    held_s : float
-        How long an angle in motion is repeated, zero where none is [s].
+    `angles`: motor angles (m, 2) [rad].  Gives `kept`: angles at the stamps at which they first
+    appear, and at rest as often as they are read, and `held_s`: how long an angle in motion is
+    repeated, zero where none is [s].
     """
     change = np.abs(np.diff(angles.values, axis=0))
     changed = 1 + np.flatnonzero((change > 0.0).any(axis=1))

@@ -101,10 +101,8 @@ class MachineSignals:
     def _told_between(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Tell what is known of the way between the joint states around stamps (n,).
 
-        Returns
-        -------
-        way, straight : (n,) bool
-            Where it is no pause, or one without motion; where it is as good as straight.
+        Gives `way`, `straight` (n,) bool: where it is no pause, or one without motion; where it is
+        as good as straight.
         """
         own = self.angles.time_ns
         before = own[np.maximum(self.angles.newest(time_ns), 0)]

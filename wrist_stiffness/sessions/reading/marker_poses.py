@@ -16,19 +16,9 @@ MIRROR_SHARE = 0.5
 def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
     """Return the rigid motions with the least squared misfit (Kabsch), as `fit_markers` does.
 
-    Parameters
-    ----------
-    nominal : (k, 3) float
-        Markers in U [m].
-    measured : (n, k, 3) float
-        In F [m]; a marker with any NaN is lost.
-
-    Returns
-    -------
-    shift : (n, 3) float
-        Position of the platform's point O in F [m].
-    rotation : (n, 3, 3) float
-        U -> F.  NaN where fewer than three markers were seen or these lie near a line.
+    `nominal` (k, 3): markers in U [m]; `measured` (n, k, 3): in F [m]; a marker with any NaN is
+    lost.  Gives `shift` (n, 3): position of the platform's point O in F [m], and `rotation` (n, 3,
+    3): U -> F.  NaN where fewer than three markers were seen or these lie near a line.
     """
     seen = np.isfinite(measured).all(axis=2)
     shift, rotation = np.full((len(measured), 3), np.nan), np.full((len(measured), 3, 3), np.nan)

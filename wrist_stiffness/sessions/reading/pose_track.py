@@ -250,10 +250,8 @@ def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) ->
 def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tuple[Array, Array]:
     """Return rotation and origin that take the frame of all messages to `wrist_base`.
 
-    Raises
-    ------
-    FrameError
-        If it is neither `wrist_base` nor mapped to it, or they come in several frames.
+    Raises `FrameError` if it is neither `wrist_base` nor mapped to it, or they come in several
+    frames.
     """
     names = np.unique(frame_id).tolist()
     found = [frames.in_base(name, what) for name in names]

@@ -44,10 +44,7 @@ class Agreement:
 def agreement(measured: Array, rigid: Array) -> Agreement:
     """Compare measured with rigid rotations.
 
-    Parameters
-    ----------
-    measured, rigid : (n, 3, 3) float
-        U -> F, finite.
+    `measured`, `rigid` (n, 3, 3): U -> F, finite.
     """
     used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
     seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
@@ -126,16 +123,9 @@ def turns_of(measured: Array, rigid: Array) -> tuple[Rotation, Rotation]:
 def turn_left(measured: Array, rigid: Array) -> Array:
     """Return what constant turns of instrument and target leave of measured rotations.
 
-    Parameters
-    ----------
-    measured, rigid : (n, 3, 3) float
-        U -> F; measured ones are NaN where they are not.
-
-    Returns
-    -------
-    (n, 3) float
-        Rotation vectors in F, from rigid to measured with the instrument and the target turned
-        back [rad].
+    `measured`, `rigid` (n, 3, 3): U -> F; measured ones are NaN where they are not.  Gives (n, 3):
+    rotation vectors in F, from rigid to measured with the instrument and the target turned back
+    [rad].
     """
     known = np.flatnonzero(np.isfinite(measured).all(axis=(1, 2)))
     if len(known) == 0:
@@ -152,19 +142,9 @@ def turn_left(measured: Array, rigid: Array) -> Array:
 def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
     """Return what a constant place of the target in U and one in F leave of positions.
 
-    Parameters
-    ----------
-    shift : (n, 3) float
-        Measured positions [m]; NaN = not measured.
-    rigid : (n, 3, 3) float
-        U -> F.
-
-    Returns
-    -------
-    left : (n, 3) float
-        [m].
-    lever : float
-        Distance of the target from its place in U, as far as motion tells it [m].
+    `shift` (n, 3): measured positions [m]; NaN = not measured; `rigid` (n, 3, 3): U -> F.  Gives
+    `left` (n, 3): [m], and `lever`: distance of the target from its place in U, as far as motion
+    tells it [m].
     """
     target, origin = places_of(shift, rigid)
     return shift - rigid @ target - origin, float(np.linalg.norm(target))

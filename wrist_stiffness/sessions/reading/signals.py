@@ -34,15 +34,7 @@ class Signal:
     def interpolated(self, time_ns: Stamps) -> Array:
         """Return the values between their two neighbours, exactly those of equal stamps.
 
-        Parameters
-        ----------
-        time_ns : (m,) int64
-            Inside the signal's range [ns].
-
-        Returns
-        -------
-        (m, ...) float
-            Linear in time.
+        `time_ns` (m,) int64: inside the signal's range [ns].  Gives (m, ...): linear in time.
         """
         # Differences of stamps are exact in double precision, stamps since 1970 are not.
         start = self.time_ns[0]
@@ -69,13 +61,8 @@ class Signal:
 def in_order(time_ns: Stamps, values: Array) -> Signal:
     """Return a signal of samples in any order.
 
-    Parameters
-    ----------
-    time_ns : (n,) int64
-        Stamps [ns].
-    values : (n, ...) float
-        Rows that are not finite are left out; of equal stamps the last one received counts, as in
-        the nodes.
+    `time_ns` (n,) int64: stamps [ns]; `values` (n, ...): rows that are not finite are left out; of
+    equal stamps the last one received counts, as in the nodes.
     """
     finite = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     time_ns, values = time_ns[finite], values[finite]

@@ -22,15 +22,8 @@ ALONE = 4.0
 def without_wild(angles: Signal) -> tuple[Signal, int]:
     """Leave out single angles that are far from those before and after.
 
-    Parameters
-    ----------
-    angles : Signal
-        Motor angles (m, 2) [rad].
-
-    Returns
-    -------
-    kept : Signal
-        The others; all of them where they are too sparse to tell.
+    `angles`: motor angles (m, 2) [rad].  Gives `kept`: the others; all of them where they are too
+    sparse to tell.
     """
     if len(angles) < 5 or np.median(np.diff(angles.time_ns)) > DENSE_S * NANOSECONDS:
         return angles, 0

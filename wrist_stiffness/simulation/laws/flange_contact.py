@@ -27,10 +27,7 @@ class FlangeGap(Law):
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Move the flange.
 
-        Raises
-        ------
-        InputError
-            If the joint has no flange in this table.
+        Raises `InputError` if the joint has no flange in this table.
         """
         if self.joint not in parts.contact:
             raise InputError(f"flange_contact: {self.joint} has no flange in this table")
