@@ -32,10 +32,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 from bench_wrist import Array, wrist
 from cases import Case, one_each
 from observe import as_read, hidden_effects, measured_session, run_cell
+from right_sentences import is_right, right_components
 from score import wilson
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.identification.proposal import Proposal, twins
+from wrist_stiffness.identification.proposal import Proposal
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
@@ -51,9 +52,6 @@ FIRST_SEED = 7001
 """Seeds of wrists and noise from here on are used by nothing else."""
 
 STRETCHES = 12
-
-RIGHT = {"pose_sensor": ("frame", "platform"), "cable_stop": ("load_sensor",)}
-"""Where a law of the instrument shows, as its stand or its target; and a pull at the platform."""
 
 
 def cases(sizes: Sequence[float], sound: int) -> list[Case]:
@@ -91,8 +89,9 @@ def answer(case: Case) -> dict[str, Any]:
     line["components"] = [each.component for each in found.terms]
     if case.effects:
         effect, place, _ = case.effects[0]
-        right = RIGHT.get(effect) or RIGHT.get(place) or (place, *twins(place))
+        right = right_components(effect, place)
         line["right_component"] = any(each.component in right for each in found.terms)
+        line["right_sentence"] = is_right(effect, place, found.terms)
         line["among_components"] = any(name in right for name in found.places)
         both = WristProblem(model, (whole,))
         line |= judged(both, held[whole.measured], added(problem, found.terms))
@@ -147,6 +146,17 @@ def process(fit: WristFit, ground: Background, rows: Array) -> Array:
     return np.asarray(there.columns[:, law] @ found.unnamed[law])
 
 
+COUNTED = ("half of the error removed", "right component", "right sentence", "any law")
+"""Of the visible strangers."""
+
+WHERE = {
+    "right_sentence": "right, and so is the sentence",
+    "right_component": "right",
+    "among_components": "among",
+}
+"""How a line of the table tells the component, the first that is so."""
+
+
 def table(lines: Sequence[dict[str, Any]]) -> str:
     """Return the table of the figures."""
     strange = [each for each in lines if each["truth"] and "nothing" in each]
@@ -158,12 +168,13 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
         visible = gains[1] > 3.0 * np.sqrt(2.0 * each["numbers"])
         share = gains[0] / max(gains[1], 1e-9)
         if visible:
-            kept.append((share >= 0.5, each["right_component"], bool(each["laws"])))
+            right = each["right_component"], each["right_sentence"]
+            kept.append((share >= 0.5, *right, bool(each["laws"])))
         told = f"{100.0 * share:.0f} %" if visible else "not visible"
-        where = "right" if each["right_component"] else "among" if each["among_components"] else "-"
+        where = next((told for key, told in WHERE.items() if each[key]), "-")
         laws = "; ".join(each["laws"]) or "none"
         rows.append(f"| {'@'.join(each['truth'])}, {each['size']:g} | {told} | {where} | {laws} |")
-    for number, what in enumerate(("half of the error removed", "right component", "any law")):
+    for number, what in enumerate(COUNTED):
         hits = sum(each[number] for each in kept)
         rows.append(_rate(f"visible strangers: {what}", hits, len(kept)))
     rows.append(_rate("sound wrists: no law", sum(not x["laws"] for x in sound), len(sound)))
