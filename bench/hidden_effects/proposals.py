@@ -20,7 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -94,7 +94,7 @@ def answer(case: Case) -> dict[str, Any]:
         line["right_sentence"] = is_right(effect, place, found.terms)
         line["among_components"] = any(name in right for name in found.places)
         both = WristProblem(model, (whole,))
-        line |= judged(both, held[whole.measured], added(problem, found.terms))
+        line |= judged(both, held, added(problem, found.terms))
     return line
 
 
@@ -106,31 +106,54 @@ def added(problem: WristProblem, laws: Sequence[Proposal]) -> list[Effect]:
     return list(fit.base.beyond().values())
 
 
-def judged(problem: WristProblem, held: Array, effects: Sequence[Effect]) -> dict[str, float]:
-    """Return the squares left in the held-out units: of nothing, the process and the law."""
+def judged(problem: WristProblem, held: Array, effects: Sequence[Effect]) -> dict[str, Any]:
+    """Return the squares left in the held-out units (u,) of nothing, the process and the law.
+
+    Beside them, what a picture shows of these units.
+    """
     fit = problem.begin()
     table, point = problem.table, fit.point
+    # Outliers are no units of the table.
+    held = held[fit.base.problem.sessions[0].measured]
     rows = held[table.unit]
     trials = [(e.law, e.component, {k: v.value for k, v in e.estimates.items()}) for e in effects]
-    change = problem.about(fit).changes(trials).sum(axis=0) if trials else 0.0 * fit.base.residual
-    left = {
-        "nothing": point.left,
-        "process": point.left + process(fit, problem.background, rows),
-        "law": point.left - table.whiten(change),
+    none = np.zeros_like(fit.base.residual)
+    changes = {
+        "nothing": none,
+        "process": process(fit, problem.background, rows),
+        "law": problem.about(fit).changes(trials).sum(axis=0) if trials else none,
     }
     # Set-up and tolerances may follow on the held-out units, whatever was taken away.
     prior = np.diag(point.weight)
     columns = np.vstack([point.columns[rows], prior])
-    found = {}
-    for name, own in left.items():
-        target = np.concatenate([own[rows], np.zeros(len(prior))])
+    found, left = {}, {}
+    for name, change in changes.items():
+        own = (point.left - table.whiten(change))[rows]
+        target = np.concatenate([own, np.zeros(len(prior))])
         step = np.linalg.lstsq(columns, target, rcond=None)[0]
         found[name] = float(np.sum((target - columns @ step) ** 2))
-    return found | {"numbers": float(rows.sum())}
+        left[name] = (fit.base.residual - change - fit.base.columns @ (fit.ratio * step))[held]
+    shown = telling(left, np.median(table.variance, axis=0), table.table.times[held])
+    return found | {"numbers": float(rows.sum()), "shown": shown}
+
+
+def telling(left: Mapping[str, Array], variance: Array, time_s: Array) -> dict[str, Any]:
+    """Return the most telling part of what is left (u, 6): along its longest axis.
+
+    Of shift and turn the one that is the larger beside its noise, as a variance (6,).
+    """
+    ways = []
+    for unit, at, per_si in (("um", slice(0, 3), 1e6), ("mdeg", slice(3, 6), 180e3 / np.pi)):
+        own = left["nothing"][:, at] - left["nothing"][:, at].mean(axis=0)
+        size, axis = np.linalg.svd(own, full_matrices=False)[1:]
+        ways.append((size[0] ** 2 / variance[at].mean(), unit, at, per_si * axis[0]))
+    _, unit, at, axis = max(ways, key=lambda way: way[0])
+    parts = {name: np.round(own[:, at] @ axis, 3).tolist() for name, own in left.items()}
+    return {"unit": unit, "time_s": np.round(time_s, 2).tolist(), **parts}
 
 
 def process(fit: WristFit, ground: Background, rows: Array) -> Array:
-    """Return what the discrepancy, fitted to the other rows, takes away of each row, (N,)."""
+    """Return what the discrepancy, fitted to the other rows, takes away of each unit, (u, 6)."""
     seen = ~rows
     groups = tuple(replace(each, columns=each.columns[seen]) for each in ground.groups)
     point = replace(
@@ -142,8 +165,10 @@ def process(fit: WristFit, ground: Background, rows: Array) -> Array:
     )
     found = evidence(point, Background(groups, ground.noise_width))
     there = ground.part(found.background.numbers or range(len(groups)))
-    law = there.optional[there.group]
-    return np.asarray(there.columns[:, law] @ found.unnamed[law])
+    parts = np.split(found.unnamed, np.cumsum(there.sizes)[:-1])
+    laws = zip(there.groups, parts, there.optional, strict=True)
+    # The evidence adds its columns to what is left.
+    return -sum((g.change(z) for g, z, law in laws if law), np.zeros_like(fit.base.residual))
 
 
 COUNTED = ("half of the error removed", "right component", "right sentence", "any law")
@@ -202,7 +227,7 @@ def main() -> None:
         if time.monotonic() > end:
             break
         lines.append(answer(case))
-        print(json.dumps(lines[-1]), flush=True)
+        print(json.dumps({k: v for k, v in lines[-1].items() if k != "shown"}), flush=True)
         if arguments.output:
             with arguments.output.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(lines[-1]) + "\n")
