@@ -148,8 +148,9 @@ def telling(left: Mapping[str, Array], variance: Array, time_s: Array) -> dict[s
         size, axis = np.linalg.svd(own, full_matrices=False)[1:]
         ways.append((size[0] ** 2 / variance[at].mean(), unit, at, per_si * axis[0]))
     _, unit, at, axis = max(ways, key=lambda way: way[0])
+    noise = float(np.sqrt(variance[at] @ axis**2))
     parts = {name: np.round(own[:, at] @ axis, 3).tolist() for name, own in left.items()}
-    return {"unit": unit, "time_s": np.round(time_s, 2).tolist(), **parts}
+    return {"unit": unit, "noise": noise, "time_s": np.round(time_s, 2).tolist(), **parts}
 
 
 def process(fit: WristFit, ground: Background, rows: Array) -> Array:
@@ -171,9 +172,6 @@ def process(fit: WristFit, ground: Background, rows: Array) -> Array:
     return -sum((g.change(z) for g, z, law in laws if law), np.zeros_like(fit.base.residual))
 
 
-COUNTED = ("half of the error removed", "right component", "right sentence", "any law")
-"""Of the visible strangers."""
-
 WHERE = {
     "right_sentence": "right, and so is the sentence",
     "right_component": "right",
@@ -187,21 +185,29 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
     strange = [each for each in lines if each["truth"] and "nothing" in each]
     sound = [each for each in lines if not each["truth"]]
     rows = ["| effect, size | removed of what the process removes | component | law |", "|-|-|-|-|"]
-    kept = []
+    seen, predicted = [], []
     for each in strange:
-        gains = [each["nothing"] - each[name] for name in ("law", "process")]
-        visible = gains[1] > 3.0 * np.sqrt(2.0 * each["numbers"])
-        share = gains[0] / max(gains[1], 1e-9)
-        if visible:
-            right = each["right_component"], each["right_sentence"]
-            kept.append((share >= 0.5, *right, bool(each["laws"])))
-        told = f"{100.0 * share:.0f} %" if visible else "not visible"
+        beyond = 3.0 * np.sqrt(2.0 * each["numbers"])
+        gains = {name: each["nothing"] - each[name] for name in ("law", "process")}
+        right = {key: each[key] for key in ("right_component", "right_sentence")}
+        right["a law"] = bool(each["laws"])
+        above = each["nothing"] - each["numbers"]
+        if above > beyond:
+            seen.append(
+                right | {"half of the error above noise removed": gains["law"] >= above / 2}
+            )
+        told = "the process removes nothing"
+        if gains["process"] > beyond:
+            share = gains["law"] / gains["process"]
+            predicted.append(right | {"half of what the process removes": share >= 0.5})
+            told = f"{100.0 * share:.0f} %"
         where = next((told for key, told in WHERE.items() if each[key]), "-")
         laws = "; ".join(each["laws"]) or "none"
         rows.append(f"| {'@'.join(each['truth'])}, {each['size']:g} | {told} | {where} | {laws} |")
-    for number, what in enumerate(COUNTED):
-        hits = sum(each[number] for each in kept)
-        rows.append(_rate(f"visible strangers: {what}", hits, len(kept)))
+    for whose, kept in (("above the noise", seen), ("predicted by the process", predicted)):
+        for what in kept[0] if kept else ():
+            hits = sum(bool(each[what]) for each in kept)
+            rows.append(_rate(f"strangers {whose}: {what.replace('_', ' ')}", hits, len(kept)))
     rows.append(_rate("sound wrists: no law", sum(not x["laws"] for x in sound), len(sound)))
     times = [each["cpu_s"] for each in lines if "cpu_s" in each]
     rows.append(f"processor time of one search: median {np.median(times):.1f} s")
