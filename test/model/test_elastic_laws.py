@@ -9,9 +9,9 @@ from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, LINKS
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.statics import component_shares
 from wrist_stiffness.model.block import Load
+from wrist_stiffness.model.effects.spring import COUPLINGS, KEYS
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.parameters import si_factor
-from wrist_stiffness.model.spring import COUPLINGS, KEYS
 
 POSE = (20.0, -10.0)
 LOAD = (0.4, -0.3, -1.0, 0.01, -0.02, 0.005)

@@ -5,7 +5,7 @@ import numpy as np
 from wrist_stiffness.model.block import Load
 from wrist_stiffness.model.contribution import Contribution
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.effects.load_scale import LoadScale
+from wrist_stiffness.model.effects.load_sensor import LoadScale
 from wrist_stiffness.model.parameters import Estimate
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from wrist_stiffness.errors import InputError, LoadRangeError
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.effects.backlash import Backlash
+from wrist_stiffness.model.effects.motor_turn import Backlash
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import effect_named, find_law
 from wrist_stiffness.planning import plan as planning

@@ -28,10 +28,12 @@ def catalogue() -> dict[str, Law]:
     InputError
         If an entry point cannot be imported, is no law, or takes a name that is in use.
     """
-    laws: dict[str, Law] = {}
-    for module in iter_modules(effects.__path__):
-        for law in laws_in(import_module(f"{effects.__name__}.{module.name}")):
-            laws[law.id] = law
+    own = [
+        law
+        for module in iter_modules(effects.__path__)
+        for law in laws_in(import_module(f"{effects.__name__}.{module.name}"))
+    ]
+    laws = {law.id: law for law in sorted(own, key=lambda law: law.id)}
     for point in metadata.entry_points(group=ENTRY_POINTS):
         try:
             found = point.load()

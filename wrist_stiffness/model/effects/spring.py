@@ -1,4 +1,4 @@
-"""A six-dof spring at a point of a place: shared by three effects of the catalogue."""
+"""Springs in series with the wrist, each at a point of a place."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.at_point import screw_from, wrench_at
+from wrist_stiffness.model.at_point import bushing_centre, screw_from, wrench_at
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
+from wrist_stiffness.model.places import MOTOR_JOINT
 from wrist_stiffness.model.situation import Situation
 
 KEYS = tuple(f"{axis}_um_per_N" for axis in "xyz") + tuple(
@@ -62,3 +63,48 @@ class Spring(Law):
             compliance[i, j] = compliance[j, i] = values.get(key, 0.0)
         local = wrench_at(point, at.at_home(place, at.through_place(place)))
         return at.screw(place, screw_from(point, local @ compliance)), None
+
+
+class MountCompliance(Spring):
+    """Spring between frame and motor, at the centre of the motor's bushing."""
+
+    id = "mount_compliance"
+    places = MOTORS
+    sentence = "the bracket of {place} gives"
+    check = (
+        "tighten the bracket's screws; put a dial gauge on the motor housing and load the wrist; "
+        "where it stands still, look for a crack at the root of the link"
+    )
+    excited_by = "loads of several directions at poses all over the workspace"
+
+    def centre(self, geometry: Geometry, place: str) -> Array:
+        """Return the centre of the motor's bushing."""
+        return bushing_centre(geometry, MOTOR_JOINT[place])
+
+
+class FrameCompliance(Spring):
+    """Spring between F and both motors, through O."""
+
+    id = "frame_compliance"
+    places = ("frame",)
+    sentence = "the frame under both motors gives"
+    check = "tighten the frame's screws; measure a target on the frame while the wrist is loaded"
+    excited_by = "loads of several directions and sizes; moments of both signs"
+
+    def centre(self, geometry: Geometry, place: str) -> Array:
+        """Return O."""
+        return np.zeros(3)
+
+
+class PlatformCompliance(Spring):
+    """Spring between the joints' hubs and the plate with tool and target, at the plate's centre."""
+
+    id = "platform_compliance"
+    places = ("platform",)
+    sentence = "the platform, its screws or the tool's holder give"
+    check = "tighten the tool's and the target's screws; tap the tool and watch the target"
+    excited_by = "loads of several directions at different tilts"
+
+    def centre(self, geometry: Geometry, place: str) -> Array:
+        """Return the plate's centre."""
+        return geometry.platform.centre

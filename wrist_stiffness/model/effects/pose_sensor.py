@@ -1,0 +1,85 @@
+"""Pose sensors and targets that are not where they are believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.situation import Situation
+from wrist_stiffness.model.vector_keys import symmetric_vector, twist, twist_parameters, vector
+
+
+class MeasurementFrame(Law):
+    """Constant screw X at O in F: T_measured = exp(X) T_true."""
+
+    id = "measurement_frame"
+    stage = "sensor"
+    places = ("pose_sensor",)
+    sentence = "the tracker is registered wrongly to the base"
+    check = "register again on the base's datum points"
+    excited_by = "poses all over the workspace"
+    constant = True
+    inexactness = 0.0
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return the screw."""
+        return twist_parameters((1e5, 1000.0), (2e4, 200.0))
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the screw at every sample."""
+        return Contribution(sensor_left=np.tile(twist(values), (len(at.block), 1))), None
+
+
+class TargetMounting(Law):
+    """Constant screw Y at O in U: T_measured = T_true exp(Y)."""
+
+    id = "target_mounting"
+    stage = "sensor"
+    places = ("pose_sensor",)
+    sentence = "the target sits on the platform otherwise than believed"
+    check = "measure the target against the platform's datum; look whether it is loose"
+    excited_by = "poses all over the workspace"
+    constant = True
+    inexactness = 0.0
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return the screw."""
+        return twist_parameters((1e5, 1000.0), (2e4, 200.0))
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the screw, turned with the platform."""
+        return Contribution(sensor_right=at.in_base("platform", twist(values))), None
+
+
+DRIFT_SHIFT, DRIFT_TURN = "shift_{}_um_per_h", "turn_{}_mdeg_per_h"
+
+
+class Drift(Law):
+    """Screw at O in F that grows with the time since the first sample."""
+
+    id = "drift"
+    stage = "sensor"
+    places = ("pose_sensor",)
+    sentence = "the tracker wanders with time"
+    check = "measure a target on the frame before, between and after"
+    excited_by = "the same pose again and again over the whole session, or a target on the frame"
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return the rates."""
+        return (*symmetric_vector(DRIFT_SHIFT, 1e4, 10.0), *symmetric_vector(DRIFT_TURN, 1e4, 5.0))
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the screw; the state is the time of the first sample."""
+        start = at.block.time[0] if state is None else state
+        rate = np.concatenate([vector(values, DRIFT_SHIFT), vector(values, DRIFT_TURN)])
+        return Contribution(sensor_left=np.outer(at.block.time - start, rate)), start
