@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, WristError
 
 
 def require_room(path: str | Path) -> None:
@@ -32,6 +32,16 @@ def require_room(path: str | Path) -> None:
             pass
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+@contextmanager
+def writing(path: str | Path, error: type[WristError] = InputError) -> Iterator[Path]:
+    """Give the path to write to as `replacing` does; what the disk refuses is a line for a user."""
+    try:
+        with replacing(path) as written:
+            yield written
+    except OSError as fault:
+        raise error(f"{path}: cannot be written: {fault.strerror}") from fault
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,10 @@ import pytest
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands import extend as workflow
 from wrist_stiffness.commands.extend import (
-    CatalogueEffect,
-    FileEffect,
     FormulaEffect,
     direction_of,
     extend_model,
+    own_effect,
 )
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
@@ -28,6 +28,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.model.python_laws import python_laws
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.report.fit_lines import extension_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
@@ -136,10 +137,10 @@ def test_a_formula_may_divide_by_its_parameter(model, extend_by):
 
 def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_path):
     (tmp_path / "own.py").write_text(OWN)
-    addition = FileEffect("own.py:Bow@platform")
+    addition = own_effect(f"{tmp_path}/own.py:Bow@platform")
     (tmp_path / "true").mkdir()
     (tmp_path / "true" / "own.py").write_text(OWN)
-    planted = FileEffect(f"{tmp_path}/true/own.py:Bow@platform").effect([])
+    planted = own_effect(f"{tmp_path}/true/own.py:Bow@platform")
     found, output = extend_by(
         addition, session_of(model, planted.with_values({"bow_um_per_N": 20.0}))
     )
@@ -157,9 +158,9 @@ def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_p
 
 
 def test_an_effect_that_is_not_there_is_added_with_a_word(model, extend_by):
-    nothing = CatalogueEffect("load_scale@load_sensor").effect([])
+    nothing = effect_named("load_scale@load_sensor")
     found, output = extend_by(
-        CatalogueEffect("frame_compliance@frame"), session_of(model, nothing, seed=4)
+        effect_named("frame_compliance@frame"), session_of(model, nothing, seed=4)
     )
     words = " ".join(found.extension.warnings)
     # Some of its compliances lie on their lower bound, nothing: that is what they are.
@@ -173,9 +174,9 @@ def test_an_effect_that_is_not_there_is_added_with_a_word(model, extend_by):
 
 def test_what_moved_in_the_base_is_told(model, extend_by):
     """A wave over the angle that an offset alone had to stand for."""
-    wave = CatalogueEffect("encoder_eccentricity@motor_1").effect([])
+    wave = effect_named("encoder_eccentricity@motor_1")
     session = session_of(model, wave.with_values({"cos_1_mdeg": 300.0}))
-    found, _ = extend_by(CatalogueEffect("encoder_eccentricity@motor_1"), session)
+    found, _ = extend_by(effect_named("encoder_eccentricity@motor_1"), session)
     moved = {before.effect for before, _ in found.extension.base_moved}
     assert moved == {"encoder_offset@motor_1"}
     assert "other parameters that changed:" in extension_lines(found)
@@ -184,13 +185,13 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
 @pytest.mark.parametrize(
     ("addition", "message"),
     [
-        (CatalogueEffect("backlash"), "write NAME@COMPONENT"),
-        (CatalogueEffect("backlash@joint_1"), "component 'joint_1' is not one of"),
-        (CatalogueEffect("rust@joint_1"), "unknown effect 'rust'"),
-        (CatalogueEffect("encoder_offset@motor_1"), "'calibrate' fits it"),
-        (CatalogueEffect("thermal_expansion@link_1"), "temperature of ambient is missing"),
-        (FileEffect("nothing.py:Bow@platform"), "no file"),
-        (FileEffect("nothing.py:Bow"), "of your own, laws.py:Twist@platform"),
+        (partial(effect_named, "backlash"), "write NAME@COMPONENT"),
+        (partial(effect_named, "backlash@joint_1"), "component 'joint_1' is not one of"),
+        (partial(effect_named, "rust@joint_1"), "unknown effect 'rust'"),
+        (partial(effect_named, "encoder_offset@motor_1"), "'calibrate' fits it"),
+        (partial(effect_named, "thermal_expansion@link_1"), "temperature of ambient is missing"),
+        (partial(own_effect, "nothing.py:Bow@platform"), "no file"),
+        (partial(own_effect, "nothing.py:Bow"), "of your own, laws.py:Twist@platform"),
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "sin(theta_1)", {}),
             "has no parameter to fit",
@@ -215,9 +216,9 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
     ],
 )
 def test_what_cannot_be_added_is_one_clear_line(model, extend_by, addition, message, tmp_path):
-    session = session_of(model, CatalogueEffect("load_scale@load_sensor").effect([]))
+    session = session_of(model, effect_named("load_scale@load_sensor"))
     with pytest.raises(InputError, match=message):
-        extend_by(addition, session)
+        extend_by(addition() if callable(addition) else addition, session)
     assert not (tmp_path / "model2.yaml").exists()
 
 
@@ -246,8 +247,8 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
 
 
 def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_by):
-    backlash = CatalogueEffect("backlash@motor_1")
-    session = session_of(model, backlash.effect([]).with_values({"width_mdeg": 60.0}))
+    backlash = effect_named("backlash@motor_1")
+    session = session_of(model, backlash.with_values({"width_mdeg": 60.0}))
     notes = {"calibrated": [*SET_UP, *BUILT, "encoder_offset"]}
     found, output = extend_by(backlash, replace(session, notes=notes))
     (width,) = found.extension.parameters

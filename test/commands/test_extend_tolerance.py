@@ -9,7 +9,7 @@ import pytest
 from wrist_stiffness.commands import calibrate as calibrating
 from wrist_stiffness.commands import extend as extending
 from wrist_stiffness.commands.calibrate import calibrate_model
-from wrist_stiffness.commands.extend import CatalogueEffect, extend_model
+from wrist_stiffness.commands.extend import extend_model
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import InputError
@@ -22,7 +22,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
-from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.model.registry import effect_named, find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 
@@ -64,7 +64,7 @@ def effect(name):
 
 
 def extended(model, name, path, output):
-    return extend_model(model, CatalogueEffect(name), Recordings([path], {}), output, RUN).extension
+    return extend_model(model, effect_named(name), Recordings([path], {}), output, RUN).extension
 
 
 @pytest.mark.slow

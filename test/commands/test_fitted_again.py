@@ -7,7 +7,7 @@ import pytest
 
 from wrist_stiffness.commands import calibrate, extend
 from wrist_stiffness.commands.calibrate import calibrate_model
-from wrist_stiffness.commands.extend import CatalogueEffect, extend_model
+from wrist_stiffness.commands.extend import extend_model
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import InputError
@@ -15,7 +15,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.model.registry import effect_named, find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 
@@ -92,7 +92,7 @@ def test_what_stood_in_for_an_effect_gives_way_to_it(tmp_path, recorded):
     day = Recordings([recorded(1)], {})
     once = tmp_path / "once.yaml"
     calibrate_model(SHIPPED, day, once, RUN)
-    addition = CatalogueEffect("gravity@platform")
+    addition = effect_named("gravity@platform")
     found = {
         name: extend_model(parent, addition, day, tmp_path / f"{name}.yaml", RUN).extension
         for name, parent in (("calibrated", once), ("bare", SHIPPED))

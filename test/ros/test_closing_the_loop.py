@@ -19,13 +19,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from wrist_stiffness.commands.extend import CatalogueEffect, extend_model
+from wrist_stiffness.commands.extend import extend_model
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, pose_message_stamped
 from wrist_stiffness.ros.qos import NOTES_QOS
@@ -163,7 +164,7 @@ def test_record_diagnose_extend_reload_and_the_true_error_falls(graph, model, tm
     session = read_session(recording, model.table)
     answer = diagnose_sessions(load_model(path), [session])
     assert [finding.name for finding in answer.diagnosis.findings] == ["backlash@motor_1"]
-    found = CatalogueEffect(answer.diagnosis.findings[0].name)
+    found = effect_named(answer.diagnosis.findings[0].name)
     extend_model(path, found, Recordings([recording], {}), extended, Run("test", "2026-01-01"))
 
     def is_enabled():

@@ -16,7 +16,8 @@ from wrist_stiffness.cli.parser import Commands, add_command, named_numbers
 from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:
-    from wrist_stiffness.commands.extend import Addition
+    from wrist_stiffness.commands.extend import FormulaEffect
+    from wrist_stiffness.model.effect import Effect
 
 DESCRIPTION = """\
 Add one effect to a model, fit it to recordings together with everything that is there, and write
@@ -81,20 +82,16 @@ def _run(arguments: argparse.Namespace) -> int:
     return say(arguments, lines, found.as_values())
 
 
-def _addition(arguments: argparse.Namespace) -> Addition:
-    from wrist_stiffness.commands.extend import (
-        CatalogueEffect,
-        FileEffect,
-        FormulaEffect,
-        direction_of,
-    )
+def _addition(arguments: argparse.Namespace) -> Effect | FormulaEffect:
+    from wrist_stiffness.commands.extend import FormulaEffect, direction_of, own_effect
+    from wrist_stiffness.model.registry import effect_named
 
     if arguments.formula is None:
         if arguments.component or arguments.direction or arguments.start:
             raise InputError("--component, --direction and --start belong to --formula")
         if arguments.effect is not None:
-            return CatalogueEffect(arguments.effect)
-        return FileEffect(arguments.effect_file)
+            return effect_named(arguments.effect)
+        return own_effect(arguments.effect_file)
     if arguments.component is None or arguments.direction is None:
         raise InputError("--formula needs --component and --direction")
     start = named_numbers(arguments.start, "--start")

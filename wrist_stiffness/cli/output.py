@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.cli.parser import EXIT_DONE, PROG
 
 if TYPE_CHECKING:
@@ -22,10 +25,17 @@ def say(arguments: argparse.Namespace, lines: Iterable[str], values: Any) -> int
     """
     print("\n".join(lines))
     if arguments.json:
-        from wrist_stiffness.commands.json_file import write_json
-
         write_json(arguments.json, values)
     return EXIT_DONE
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Write a result for programs, complete or not at all; a device or pipe is written to.
+
+    Raises `InputError` if the file cannot be written.
+    """
+    with writing(path) as written:
+        written.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 def this_run() -> Run:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError
@@ -238,18 +238,15 @@ def _write(
     names = columns.names[1:]
     writers = [writer_of(name) for name in names]
     table = np.stack([values[name] for name in names], axis=1)
-    try:
-        with replacing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:
-            lines = csv.writer(stream, lineterminator="\n")
-            lines.writerow((TIME, *names))
-            for done, (stamp, row) in enumerate(zip(time_ns.tolist(), table, strict=True)):
-                cells = [
-                    "" if value != value else write(value)
-                    for write, value in zip(writers, row.tolist(), strict=True)
-                ]
-                lines.writerow((seconds(stamp), *cells))
-                if done % ROWS_A_REPORT == 0:
-                    progress(done, len(table))
-    except OSError as error:
-        raise InputError(f"{output}: cannot be written: {error.strerror}") from error
+    with writing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:
+        lines = csv.writer(stream, lineterminator="\n")
+        lines.writerow((TIME, *names))
+        for done, (stamp, row) in enumerate(zip(time_ns.tolist(), table, strict=True)):
+            cells = [
+                "" if value != value else write(value)
+                for write, value in zip(writers, row.tolist(), strict=True)
+            ]
+            lines.writerow((seconds(stamp), *cells))
+            if done % ROWS_A_REPORT == 0:
+                progress(done, len(table))
     progress(len(table), len(table))

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -23,43 +23,13 @@ from wrist_stiffness.model.formula import names_in
 from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate, has_unit
-from wrist_stiffness.model.registry import at_component, effect_named, law_from_file
+from wrist_stiffness.model.registry import at_component, law_from_file
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 KINDS = ("along", "about")
 AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
 """How `compare` names directions."""
-
-
-class Addition(Protocol):
-    """What to add."""
-
-    def effect(self, covariates: Sequence[str]) -> Effect:
-        """Return the effect; `covariates` are those that all recordings have."""
-
-
-@dataclass(frozen=True)
-class CatalogueEffect:
-    """A law of the catalogue or of another package, `NAME@COMPONENT`."""
-
-    name: str
-
-    def effect(self, covariates: Sequence[str]) -> Effect:
-        """Return the effect at its component."""
-        return effect_named(self.name)
-
-
-@dataclass(frozen=True)
-class FileEffect:
-    """A user's own law, `FILE.py:CLASS@COMPONENT`; the file is run."""
-
-    name: str
-
-    def effect(self, covariates: Sequence[str]) -> Effect:
-        """Return the effect at its component."""
-        reference, component = at_component(self.name)
-        return Effect(law_from_file(reference, Path.cwd()), component)
 
 
 @dataclass(frozen=True)
@@ -107,6 +77,12 @@ class FormulaEffect:
         law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
         estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
         return Effect(law, self.component, estimates)
+
+
+def own_effect(name: str) -> Effect:
+    """Return the effect of a user's own law, `FILE.py:CLASS@COMPONENT`; the file is run."""
+    reference, component = at_component(name)
+    return Effect(law_from_file(reference, Path.cwd()), component)
 
 
 def direction_of(words: Sequence[str]) -> list[float]:
@@ -202,7 +178,7 @@ class Extended:
 
 def extend_model(
     model: str | Path,
-    addition: Addition,
+    addition: Effect | FormulaEffect,
     recordings: Recordings,
     output: str | Path,
     run: Run,
@@ -217,8 +193,10 @@ def extend_model(
     parent = load_model(model)
     sessions = read_sessions(recordings, [parent], progress)
     measured = tuple(sessions.values())
-    covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
-    effect = addition.effect(sorted(covariates))
+    effect = addition
+    if isinstance(effect, FormulaEffect):
+        covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
+        effect = effect.effect(sorted(covariates))
     step = replace(run.step(model, sessions), added=effect.name)
     known = unfitted(parent) if was_fitted_to(parent, sessions) else parent
     found = extend(known, effect, measured, progress)

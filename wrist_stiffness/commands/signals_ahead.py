@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.compensation.static_transforms import static_transform
+from wrist_stiffness.compensation.static_transforms import transform_of
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.recording.batch import decode_batches
@@ -233,14 +233,7 @@ def _part(run: _Run, part: slice) -> _Run:
 def _hear(stream: Stream, standard: str, log_time_ns: int, message: Message) -> None:
     if isinstance(message, TFMessage):
         for step in message.transforms:
-            place, turn = step.transform.translation, step.transform.rotation
-            found = static_transform(
-                step.header.frame_id,
-                step.child_frame_id,
-                (place.x, place.y, place.z),
-                (turn.x, turn.y, turn.z, turn.w),
-            )
-            stream.on_static_transforms([found])
+            stream.on_static_transforms([transform_of(step)])
     elif isinstance(message, Temperature):
         stream.temperatures.add(
             message.header.frame_id, message.header.stamp_ns, message.temperature

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -50,6 +51,17 @@ def static_transform(
         raise InputError(f"static transform {parent} -> {child}: {numbers.tolist()} is none")
     names = frame_name(parent), frame_name(child)
     return StaticTransform(*names, Rotation.from_quat(numbers[3:]).as_matrix(), numbers[:3])
+
+
+def transform_of(message: Any) -> StaticTransform:
+    """Return a geometry_msgs/TransformStamped, of ROS or of a recording, as `static_transform`."""
+    place, turn = message.transform.translation, message.transform.rotation
+    return static_transform(
+        message.header.frame_id,
+        message.child_frame_id,
+        (place.x, place.y, place.z),
+        (turn.x, turn.y, turn.z, turn.w),
+    )
 
 
 def sensor_frames(transforms: Iterable[StaticTransform]) -> dict[str, SensorFrame]:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.errors import TableError, WristError
 from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.lookup.biharmonic import KERNEL, TREND
@@ -72,12 +72,9 @@ def save_table(table: Table, path: str | Path) -> Table:
             "scale_rad": table.map_spline.scale.tolist(),
         },
     }
-    try:
-        # A stream, because numpy adds .npz to a name without it.
-        with replacing(path) as written, written.open("wb") as stream:
-            np.savez_compressed(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
-    except OSError as error:
-        raise TableError(f"{path}: cannot be written: {error.strerror}") from error
+    # A stream, because numpy adds .npz to a name without it.
+    with writing(path, TableError) as written, written.open("wb") as stream:
+        np.savez_compressed(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
     return replace(table, checksum=checksum)
 
 

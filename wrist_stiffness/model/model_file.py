@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inputs.document import Node, read_yaml
 from wrist_stiffness.inputs.opening import open_input
@@ -173,11 +173,8 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
     text = yaml.safe_dump(
         content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
     )
-    try:
-        with replacing(path) as written:
-            written.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    with writing(path) as written:
+        written.write_text(text, encoding="utf-8")
 
 
 def file_sha256(path: str | Path) -> str:

@@ -10,8 +10,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.atomic_file import writing
 
 STYLE = """
 :root { color-scheme: light; }
@@ -140,12 +139,9 @@ def write_page(path: str | Path, page: Page) -> None:
 
     Raises `InputError` if the file cannot be written.
     """
-    try:
-        with replacing(path) as written:
-            # A file's name may be no text: its bytes are shown by their numbers.
-            written.write_text(html_of(page), encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    with writing(path) as written:
+        # A file's name may be no text: its bytes are shown by their numbers.
+        written.write_text(html_of(page), encoding="utf-8", errors="backslashreplace")
 
 
 def _part(part: Part) -> str:

@@ -20,6 +20,7 @@ from std_srvs.srv import SetBool, Trigger
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import COMMON, ParameterEntry, stream_settings
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.compensation.static_transforms import transform_of
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel
@@ -177,7 +178,7 @@ class WristNode(GuardedNode, ABC):
         """Learn sensor frames from static transforms; one that is none is left out."""
         for message in messages:
             try:
-                self.stream.on_static_transforms([static_transforms.converted(message)])
+                self.stream.on_static_transforms([transform_of(message)])
             except WristError as error:
                 self.on_fault(error)
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from wrist_stiffness.atomic_file import replacing
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.atomic_file import writing
 
 DPI = 130
 
@@ -24,8 +23,5 @@ def save_figure(figure: Any, path: Path) -> None:
     `figure`: of `new_figure`; `path`: PNG file; an older one is replaced.  Raises `InputError` if
     the file cannot be written.
     """
-    try:
-        with replacing(path) as written:
-            figure.savefig(written, dpi=DPI, format="png")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    with writing(path) as written:
+        figure.savefig(written, dpi=DPI, format="png")

@@ -11,10 +11,10 @@ from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.static_transforms import (
     StaticTransform,
     sensor_frames,
-    static_transform,
+    transform_of,
 )
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.recording.messages import TFMessage, TransformStamped
+from wrist_stiffness.recording.messages import TFMessage
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME, TF_STATIC
 
@@ -78,7 +78,7 @@ def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -
     for _, _, message in recording.messages([topic]):
         for stamped in message.transforms if isinstance(message, TFMessage) else ():
             try:
-                step = _transform(stamped)
+                step = transform_of(stamped)
             except InputError as error:
                 remarks[f"{topic}: {error}: not used"] = None
                 continue
@@ -101,14 +101,4 @@ def _same(one: StaticTransform, other: StaticTransform) -> bool:
         one.parent == other.parent
         and np.allclose(one.rotation, other.rotation, atol=SAME)
         and np.allclose(one.position, other.position, atol=SAME)
-    )
-
-
-def _transform(stamped: TransformStamped) -> StaticTransform:
-    place, turn = stamped.transform.translation, stamped.transform.rotation
-    return static_transform(
-        stamped.header.frame_id,
-        stamped.child_frame_id,
-        (place.x, place.y, place.z),
-        (turn.x, turn.y, turn.z, turn.w),
     )

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from wrist_stiffness.commands.json_file import write_json
+from wrist_stiffness.cli.output import write_json
 from wrist_stiffness.errors import InputError
 
 
