@@ -7,6 +7,7 @@ relative to their own namespace (`relative`), so that two wrists live side by si
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import pi
 
 from wrist_stiffness.errors import InputError
 
@@ -17,6 +18,9 @@ INSTRUMENT_FRAME = "instrument"
 
 CORRECTED_FRAME = "wrist_corrected"
 """No frame: marks a command that was corrected, so that no second corrector does it again."""
+
+MICROMETRES, MILLIDEGREES = 1e6, 180e3 / pi
+"""By which numbers in m and rad are told larger to people, and on topics named _um and _mdeg."""
 
 JOINT_STATES = "/joint_states"
 LOAD_ESTIMATE = "/load_estimate"

@@ -28,8 +28,7 @@ from wrist_stiffness.recording.messages import (
 )
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
 from wrist_stiffness.simulation.cell import SENSED, CellSample
-
-BASE_FRAME = "wrist_base"
+from wrist_stiffness.topics import BASE_FRAME
 
 NOT_MEASURED = 1e6
 """Variance of a part of the pose that the sensor does not see [m^2, rad^2]."""

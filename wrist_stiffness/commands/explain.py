@@ -19,6 +19,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.places import THERMOMETERS
 from wrist_stiffness.sessions.reading.refusals import OTHER_GEOMETRY
+from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 QUATERNION_TOLERANCE = 1e-3
 """A typed quaternion is made unit if its length is this close to 1."""
@@ -28,8 +29,6 @@ FARTHEST_MM = 100.0
 
 WITHIN = 2.0
 """A rest up to so many standard uncertainties of the prediction is explained."""
-
-UM, MDEG = 1e6, 180e3 / np.pi
 
 
 @dataclass(frozen=True)
@@ -65,12 +64,12 @@ class Row:
         return {
             "name": self.name,
             "kind": self.kind,
-            "s_um": UM * float(self.along[0]),
-            "s_sigma_um": UM * float(self.sigma[0]),
-            "phi_mdeg": MDEG * float(self.along[1]),
-            "phi_sigma_mdeg": MDEG * float(self.sigma[1]),
-            "shift_um": (UM * self.twist[:3]).tolist(),
-            "rotation_mdeg": (MDEG * self.twist[3:]).tolist(),
+            "s_um": MICROMETRES * float(self.along[0]),
+            "s_sigma_um": MICROMETRES * float(self.sigma[0]),
+            "phi_mdeg": MILLIDEGREES * float(self.along[1]),
+            "phi_sigma_mdeg": MILLIDEGREES * float(self.sigma[1]),
+            "shift_um": (MICROMETRES * self.twist[:3]).tolist(),
+            "rotation_mdeg": (MILLIDEGREES * self.twist[3:]).tolist(),
             "meaning": self.meaning,
         }
 
@@ -104,11 +103,11 @@ class Explanation:
         """Return what people and programs read, with units in the names."""
         return {
             "verdict": self.verdict,
-            "s_um": UM * float(np.linalg.norm(self.total[:3])),
-            "phi_mdeg": MDEG * float(np.linalg.norm(self.total[3:])),
+            "s_um": MICROMETRES * float(np.linalg.norm(self.total[:3])),
+            "phi_mdeg": MILLIDEGREES * float(np.linalg.norm(self.total[3:])),
             "measured": self.measured,
-            "prediction_sigma_um": UM * float(self.sigma[0]),
-            "prediction_sigma_mdeg": MDEG * float(self.sigma[1]),
+            "prediction_sigma_um": MICROMETRES * float(self.sigma[0]),
+            "prediction_sigma_mdeg": MILLIDEGREES * float(self.sigma[1]),
             "rows": [row.as_values() for row in self.rows],
             "warnings": list(self.warnings),
         }
@@ -286,8 +285,8 @@ def _verdict(rest: Array, covariance: Array) -> str:
     ratio = np.divide(sizes, sigma, out=np.where(sizes > 0.0, np.inf, 0.0), where=sigma > 0.0)
     # Whole lengths: the rows count along what was measured, and a rest may stand across it.
     left = (
-        f"in all, whatever the direction, {UM * sizes[0]:.3g} um and {MDEG * sizes[1]:.3g} mdeg "
-        "are not explained"
+        f"in all, whatever the direction, {MICROMETRES * sizes[0]:.3g} um and "
+        f"{MILLIDEGREES * sizes[1]:.3g} mdeg are not explained"
     )
     if ratio.max() <= WITHIN:
         return f"{left}: no more than the uncertainty of the prediction"

@@ -26,6 +26,7 @@ from wrist_stiffness.recording.messages import (
     PoseWithCovarianceStamped,
 )
 from wrist_stiffness.recording.reader import RawMessage, Recording, open_recording
+from wrist_stiffness.topics import MILLIDEGREES
 
 SHIFT, TURN, COVARIANCE = "s [um]", "rotation [mdeg]", "covariance [%]"
 ANGLE, SPEED, ACCELERATION = "angle [mdeg]", "speed [mdeg/s]", "acceleration [mdeg/s^2]"
@@ -42,7 +43,6 @@ TOLERANCES = {
 search for corrected angles ends within 1e-10 rad, 6e-6 mdeg; at 1 rad/s a speed is the difference
 of two such angles over 10 ms, an acceleration of three over 5 ms each."""
 
-MILLIDEGREES = 1e3 * float(np.degrees(1.0))
 
 Key = tuple[int, int]
 """Stamp [ns] and how many messages of that stamp came before."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.commands.parameter_file import node_settings
 from wrist_stiffness.commands.replay_block import BlockReplay
-from wrist_stiffness.commands.replay_summary import MICROMETRES, MILLIDEGREES, ReplaySummary
+from wrist_stiffness.commands.replay_summary import ReplaySummary
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
@@ -52,6 +52,8 @@ from wrist_stiffness.topics import (
     COVARIATES,
     JOINT_STATES,
     LOAD_ESTIMATE,
+    MICROMETRES,
+    MILLIDEGREES,
     MOTOR_COMMANDS,
     MOTOR_COMMANDS_CORRECTED,
     MOTOR_POSITIONS_CORRECTED,

@@ -13,11 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.commands.replay_summary import (
-    MICROMETRES,
-    MILLIDEGREES,
-    ReplaySummary,
-)
+from wrist_stiffness.commands.replay_summary import ReplaySummary
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
@@ -46,6 +42,8 @@ from wrist_stiffness.topics import (
     BASE_FRAME,
     CORRECTED_FRAME,
     JOINT_STATES,
+    MICROMETRES,
+    MILLIDEGREES,
     MOTOR_COMMANDS,
     MOTOR_COMMANDS_CORRECTED,
     MOTOR_POSITIONS_CORRECTED,

@@ -7,12 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from wrist_stiffness.mechanism.components import Array
-
-MICROMETRES = 1e6
-MILLIDEGREES = 1e3 * float(np.degrees(1.0))
 
 NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
 """A value in a message; not the digits of a name such as motor_1_joint."""

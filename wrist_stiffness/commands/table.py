@@ -17,6 +17,7 @@ from wrist_stiffness.mechanism.fits import check_fits
 from wrist_stiffness.mechanism.geometry_file import geometry_of, load_geometry
 from wrist_stiffness.mechanism.own_stiffness import in_millimetres
 from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 if TYPE_CHECKING:
     from wrist_stiffness.fem.step_part import StepPart
@@ -26,9 +27,6 @@ MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
 
 FINE = 161
 """Points along each motor angle where the rated load's map is summarised and drawn."""
-
-MICRO = 1e6
-MDEG = 1e3 * 180.0 / np.pi
 
 
 def build(
@@ -157,7 +155,7 @@ def summarise(table: Table) -> MapSummary:
     """
     workspace = table.workspace
     poses = workspace.grid(FINE)
-    values = table.map_spline(poses) * np.array([MICRO] * 4 + [MDEG])
+    values = table.map_spline(poses) * np.array([MICROMETRES] * 4 + [MILLIDEGREES])
     inside = values[workspace.operative(poses)]
     names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_mdeg"]
     operative = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain, repeat
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,10 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.evaluation import Evaluated, evaluate, evaluate_beside, seen_by
 from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
-from wrist_stiffness.model.stages import NO_GUESSES, Evaluable, Guesses, Memory
+from wrist_stiffness.model.stages import NO_GUESSES, Guesses, Memory
+
+if TYPE_CHECKING:
+    from wrist_stiffness.model.error_model import ErrorModel
 
 CHUNK = 2048
 """Samples evaluated at a time: about 150 MB of operators with 24 flange sectors."""
@@ -30,10 +34,10 @@ class Recent:
     """What the first of the last models did at a block: the next ones often begin with it again."""
 
     def __init__(self) -> None:
-        self._model: Evaluable | None = None
+        self._model: ErrorModel | None = None
         self._chunks: list[Evaluated] = []
 
-    def like(self, model: Evaluable) -> Evaluable:
+    def like(self, model: ErrorModel) -> ErrorModel:
         """Return the known model if it is the same as one; else this one, from now on known."""
         if self._model is None or not _same(self._model, model):
             self._model, self._chunks = model, []
@@ -49,7 +53,7 @@ class Recent:
         return found
 
 
-def _same(one: Evaluable, other: Evaluable) -> bool:
+def _same(one: ErrorModel, other: ErrorModel) -> bool:
     """Tell whether two models have the very same effects on the same table."""
     return (
         one.table is other.table
@@ -64,7 +68,7 @@ def _same(one: Evaluable, other: Evaluable) -> bool:
 
 
 def predicted(
-    models: Sequence[Evaluable],
+    models: Sequence[ErrorModel],
     block: Block,
     accepted: NDArray[np.bool_],
     near: Sequence[Guesses] = (),
@@ -74,7 +78,7 @@ def predicted(
 
     Parameters
     ----------
-    models : sequence of Evaluable
+    models : sequence of ErrorModel
         What they have in common with the first one is computed once.
     block : Block
         n samples.
@@ -98,7 +102,7 @@ def predicted(
 
 
 def _predicted(
-    models: Sequence[Evaluable],
+    models: Sequence[ErrorModel],
     block: Block,
     accepted: NDArray[np.bool_],
     near: Sequence[Guesses],

@@ -32,7 +32,7 @@ from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.session import Session
 from wrist_stiffness.model.situation import lengths
-from wrist_stiffness.model.stages import AtHome, Evaluable, constants_of, share
+from wrist_stiffness.model.stages import AtHome, constants_of, share
 
 IN_F, IN_U = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
 
@@ -327,7 +327,7 @@ class ErrorModel:
         list of BlockPrediction
             One for each addition.
         """
-        models: list[Evaluable] = [self.with_effects(*self.effects, *e) for e in additions]
+        models = [self.with_effects(*self.effects, *e) for e in additions]
         if recent is not None:
             models[0] = recent.like(models[0])
         share(models)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +18,22 @@ from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contacts import solve_contacts
-from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contribution import NOTHING, Contribution
+from wrist_stiffness.model.prediction import seen
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.stages import (
     NO_GUESSES,
-    Evaluable,
     Guesses,
     Memory,
     Staged,
     staged,
     with_speeds,
 )
+
+if TYPE_CHECKING:
+    from wrist_stiffness.model.error_model import ErrorModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +84,7 @@ class Evaluated:
 
 
 def evaluate(
-    model: Evaluable,
+    model: ErrorModel,
     block: Block,
     memory: Memory | None,
     pose: Configuration | None = None,
@@ -112,7 +115,7 @@ def evaluate(
 
 
 def evaluate_beside(
-    models: Sequence[Evaluable], memories: Sequence[Memory | None], like: Evaluated
+    models: Sequence[ErrorModel], memories: Sequence[Memory | None], like: Evaluated
 ) -> list[Evaluated]:
     """Evaluate further models over the block of one that was evaluated.
 
@@ -121,7 +124,7 @@ def evaluate_beside(
 
     Parameters
     ----------
-    models : sequence of Evaluable
+    models : sequence of ErrorModel
         With the same table.
     memories : sequence of Memory or None
         What the block before left of each.
@@ -143,7 +146,7 @@ def evaluate_beside(
     ]
 
 
-def _start(model: Evaluable, like: Evaluated) -> Situation:
+def _start(model: ErrorModel, like: Evaluated) -> Situation:
     """Return the situation in which a model begins beside another one."""
     start = like.staged.situations[0]
     wrist = None if start.wrist is None else _wrist(model, start.wrist[1])
@@ -156,7 +159,7 @@ def _start(model: Evaluable, like: Evaluated) -> Situation:
 
 
 def situation_of(
-    model: Evaluable,
+    model: ErrorModel,
     block: Block,
     guess: NDArray[np.bool_] | None,
     pose: Configuration | None = None,
@@ -172,7 +175,7 @@ def situation_of(
     return Situation(statics, model.constants, guess=guess, wrist=wrist)
 
 
-def _wrist(model: Evaluable, pose: Configuration) -> tuple[CompiledWrist, Configuration] | None:
+def _wrist(model: ErrorModel, pose: Configuration) -> tuple[CompiledWrist, Configuration] | None:
     return None if model.compiled is None else (model.compiled, pose)
 
 
@@ -186,25 +189,6 @@ def _settled_alike(
     force, active = solve_contacts(operators.approach, gaps, like.active[:, None])
     pushed = force @ np.swapaxes(operators.force_twist, -1, -2)
     return [(twist + pushed[:, t], force[:, t], active[:, t]) for t, (twist, _) in enumerate(free)]
-
-
-def seen(twist: Array, left: Array | None, right: Array | None) -> Array:
-    """Return the twist that the pose sensor reports, log(exp(X) exp(xi) exp(Y)).
-
-    `twist` (..., 6): xi [m, rad]; `left`, `right` (..., 6): X and Y of the sensor [m, rad].
-    """
-    if left is None and right is None:
-        return twist
-    rotation, shift = exp_twist(twist)
-    if right is not None:
-        turned, moved = exp_twist(right)
-        shift = shift + (rotation @ moved[..., None])[..., 0]
-        rotation = rotation @ turned
-    if left is not None:
-        turned, moved = exp_twist(left)
-        shift = moved + (turned @ shift[..., None])[..., 0]
-        rotation = turned @ rotation
-    return log_motion(rotation, shift)
 
 
 def seen_by(results: Sequence[Evaluated]) -> Array:

@@ -60,17 +60,7 @@ class Prediction:
     @cached_property
     def measured(self) -> Array:
         """What the pose sensor would say of the twist, (6,) [m, rad]."""
-        left, right = self.sensor
-        if left is None and right is None:
-            return self.twist
-        rotation, shift = exp_twist(self.twist)
-        if right is not None:
-            turned, moved = exp_twist(right)
-            rotation, shift = rotation @ turned, shift + rotation @ moved
-        if left is not None:
-            turned, moved = exp_twist(left)
-            rotation, shift = turned @ rotation, moved + turned @ shift
-        return log_motion(rotation, shift)
+        return seen(self.twist, *self.sensor)
 
     @property
     def motion(self) -> tuple[Array, Array]:
@@ -120,3 +110,22 @@ class BlockPrediction:
             if warning.startswith(f"{effect}: ") and warning.endswith(LEFT_OUT):
                 return warning.removeprefix(f"{effect}: ").removesuffix(LEFT_OUT)
         return ""
+
+
+def seen(twist: Array, left: Array | None, right: Array | None) -> Array:
+    """Return the twist that the pose sensor reports, log(exp(X) exp(xi) exp(Y)).
+
+    `twist` (..., 6): xi [m, rad]; `left`, `right` (..., 6): X and Y of the sensor [m, rad].
+    """
+    if left is None and right is None:
+        return twist
+    rotation, shift = exp_twist(twist)
+    if right is not None:
+        turned, moved = exp_twist(right)
+        shift = shift + (rotation @ moved[..., None])[..., 0]
+        rotation = rotation @ turned
+    if left is not None:
+        turned, moved = exp_twist(left)
+        shift = moved + (turned @ shift[..., None])[..., 0]
+        rotation = turned @ rotation
+    return log_motion(rotation, shift)

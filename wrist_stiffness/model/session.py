@@ -2,46 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.model.block import Load, Sample
+from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.prediction import Prediction
-from wrist_stiffness.model.stages import Evaluable, Memory
+from wrist_stiffness.model.stages import Memory
+
+if TYPE_CHECKING:
+    from wrist_stiffness.model.error_model import ErrorModel
 
 LARGEST_TURN = 1.0
 """Turn of the platform that no error makes, but a signal that is no temperature [rad]."""
-
-
-class Streamable(Evaluable, Protocol):
-    """What a session must know of a model."""
-
-    @property
-    def stateless(self) -> bool:
-        """Whether no sample depends on another, nor an effect on what others do."""
-
-    @property
-    def variations(self) -> Sequence[Evaluable]:
-        """The model with each uncertain parameter moved by its standard uncertainty."""
-
-    def predict(
-        self, theta: Array, load: Load, active: NDArray[np.bool_] | None = None
-    ) -> Prediction:
-        """Predict one sample, at rest and with nothing before it."""
-
-    def table_covariance(self, configuration: Configuration, twist: Array) -> Array:
-        """Covariance (6, 6) of what the table says."""
-
-    def parameter_covariance(self, twist: Array, moved: Sequence[Array]) -> Array:
-        """Covariance (6, 6) from the parameters, with the twists (6,) of the variations."""
 
 
 class Session:
@@ -49,14 +27,9 @@ class Session:
 
     Each uncertain parameter has a memory of its own, moved by one standard uncertainty: so the
     covariance knows the history.  Models without uncertainties cost one evaluation a sample.
-
-    Parameters
-    ----------
-    model : Streamable
-        Predicts.
     """
 
-    def __init__(self, model: Streamable) -> None:
+    def __init__(self, model: ErrorModel) -> None:
         self.model = model
         self._memory: Memory | None = None
         self._others: list[Memory] | None = None

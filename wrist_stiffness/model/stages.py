@@ -12,14 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from traceback import extract_tb
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.lookup.table import Evaluation, Table
-from wrist_stiffness.mechanism.compiled import CompiledWrist
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
@@ -34,6 +33,9 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import STAGES
 from wrist_stiffness.model.situation import Situation, lengths
 
+if TYPE_CHECKING:
+    from wrist_stiffness.model.error_model import ErrorModel
+
 FIRST_ORDER_LIMIT = 2e-3
 """A screw that turns by more than this has left first order [rad]."""
 
@@ -41,34 +43,6 @@ SAMPLE_STAGES = STAGES[1:]
 
 Guesses = Mapping[str, Any]
 NO_GUESSES: Guesses = MappingProxyType({})
-
-
-class Evaluable(Protocol):
-    """What an evaluation must know of a model."""
-
-    @property
-    def table(self) -> Table:
-        """Elastic lookup of the wrist."""
-
-    @property
-    def evaluation(self) -> Evaluation:
-        """`closed_form` or `spline`."""
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """In the order in which they entered."""
-
-    @property
-    def parts(self) -> ElasticComponents:
-        """Elastic parts with the effects that change them."""
-
-    @property
-    def constants(self) -> Constants:
-        """What the constant effects add together."""
-
-    @property
-    def compiled(self) -> CompiledWrist | None:
-        """The closed form with all that is constant, compiled; None where that cannot be had."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +145,7 @@ class Staged:
 
 
 def staged(
-    model: Evaluable,
+    model: ErrorModel,
     start: Situation,
     memory: Memory | None,
     like: Staged | None = None,
@@ -181,7 +155,7 @@ def staged(
 
     Parameters
     ----------
-    model : Evaluable
+    model : ErrorModel
         Effects, and what the constant ones add together.
     start : Situation
         The block with what the constant effects add.
@@ -281,7 +255,7 @@ def constants_of(effects: Sequence[Effect], parts: ElasticComponents, at_home: A
     return sum(found, Constants())
 
 
-def share(models: Sequence[Evaluable]) -> None:
+def share(models: Sequence[ErrorModel]) -> None:
     """Let models of one table share what follows from effects that they share with the first."""
     at_home = AtHome(models[0].table)
     wanted = {"parts": _of_parts(models[0]), "constants": _of_constants(models[0])}
@@ -293,11 +267,11 @@ def share(models: Sequence[Evaluable]) -> None:
             model.__dict__["constants"] = constants_of(model.effects, model.parts, at_home)
 
 
-def _of_parts(model: Evaluable) -> list[Effect]:
+def _of_parts(model: ErrorModel) -> list[Effect]:
     return [effect for effect in model.effects if effect.stage == "parts"]
 
 
-def _of_constants(model: Evaluable) -> list[Effect]:
+def _of_constants(model: ErrorModel) -> list[Effect]:
     """Return the effects that decide what the constant ones add together."""
     constant = [effect for effect in model.effects if effect.law.constant]
     return constant + _of_parts(model) if any(e.law.foreign for e in constant) else constant

@@ -19,6 +19,7 @@ from wrist_stiffness.recording.bag_folder import METADATA_FILE
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.channel import Channel, channel_of
 from wrist_stiffness.recording.chunk_writer import ChunkWriter, Messages
+from wrist_stiffness.recording.mcap_chunk import LAST_TIME_NS
 from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.reader import open_recording
 
@@ -26,7 +27,6 @@ METADATA_VERSION = 9
 CHUNK_BYTES = 128 * 1024
 """Of messages before compression.  A cut file keeps its whole chunks: MCAP's usual 1 MiB is minutes
 of a slow sensor, and the file is 1 % smaller for it."""
-_LAST_TIME_NS = 2**63 - 1
 _UNLIMITED = {"sec": 9223372036, "nsec": 854775807}
 # rclpy's default profile; "unlimited" is the largest duration that rmw knows.
 _QOS_PROFILE = {
@@ -145,9 +145,9 @@ class RecordingWriter:
         message before.
         """
         self._check_open()
-        if not 0 <= log_time_ns <= _LAST_TIME_NS:
+        if not 0 <= log_time_ns <= LAST_TIME_NS:
             raise RecordingError(
-                f"{channel.topic}: log time {log_time_ns} ns is outside 0 … {_LAST_TIME_NS}"
+                f"{channel.topic}: log time {log_time_ns} ns is outside 0 … {LAST_TIME_NS}"
             )
         try:
             channel_id = self._register(channel)

@@ -8,7 +8,7 @@ import numpy as np
 
 from wrist_stiffness.commands.budget import PER_AXIS, Push, budget
 from wrist_stiffness.commands.modes import ModeMap, modes_at
-from wrist_stiffness.commands.table import FINE, MDEG, MICRO
+from wrist_stiffness.commands.table import FINE
 from wrist_stiffness.commands.uncertainty import contributions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
@@ -17,6 +17,7 @@ from wrist_stiffness.report.pictures.bent_wrist import draw_bent_wrist, draw_mod
 from wrist_stiffness.report.pictures.budget import draw_budget
 from wrist_stiffness.report.pictures.joint_map import draw_map
 from wrist_stiffness.report.pictures.uncertainty import draw_uncertainty
+from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 PICTURED_POSE = np.radians([25.0, -20.0])
 
@@ -67,7 +68,7 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
         values[inside] = np.linalg.norm(halves, axis=-1)
     names = ("map_s.png", "map_phi.png", "budget.png", "bent.png", "uncertainty.png")
     pictures = [folder / name for name in names]
-    s, phi = MICRO * values[..., 0], MDEG * values[..., 1]
+    s, phi = MICROMETRES * values[..., 0], MILLIDEGREES * values[..., 1]
     label = "shift s of the platform at O [µm]"
     draw_map(table, poses, s, label, load.text, pictures[0])
     label = "rotation phi of the platform [mdeg]"

@@ -7,7 +7,6 @@ from collections.abc import Callable, Generator, Mapping
 from functools import partial
 from typing import Any, NoReturn
 
-import numpy as np
 from geometry_msgs.msg import InertiaStamped, PoseWithCovarianceStamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
@@ -39,6 +38,7 @@ from wrist_stiffness.ros.stream_messages import (
 from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan
 from wrist_stiffness.ros.wrist_node import WristNode
 from wrist_stiffness.topics import (
+    MILLIDEGREES,
     MOTOR_COMMANDS,
     MOTOR_COMMANDS_CORRECTED,
     MOTOR_POSITIONS_CORRECTED,
@@ -48,8 +48,6 @@ from wrist_stiffness.topics import (
     POSE_ERROR_RESIDUAL,
     POSE_ERROR_RESIDUAL_TASK,
 )
-
-MILLIDEGREES = 1e3 * float(np.degrees(1.0))
 
 
 class AngleCorrector(WristNode):

@@ -34,6 +34,8 @@ from wrist_stiffness.ros.stream_messages import (
 from wrist_stiffness.ros.wrist_node import WristNode
 from wrist_stiffness.topics import (
     JOINT_STATES,
+    MICROMETRES,
+    MILLIDEGREES,
     POSE_ERROR_PHI_MDEG,
     POSE_ERROR_PREDICTED,
     POSE_ERROR_S_UM,
@@ -41,9 +43,6 @@ from wrist_stiffness.topics import (
     TF,
     WRIST_MARKERS,
 )
-
-MICROMETRES = 1e6
-MILLIDEGREES = 1e3 * float(np.degrees(1.0))
 
 CHECKS_PER_WAIT = 4
 """How often, within the longest wait, overdue joint states are looked for."""
