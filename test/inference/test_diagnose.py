@@ -202,19 +202,6 @@ def test_what_makes_another_session_worse_is_not_handed_over(rng):
     assert kept.after["value_si"] == pytest.approx(np.sqrt(2.0), rel=0.3)
 
 
-@pytest.mark.parametrize(("size", "told"), [(3.0, True), (30.0, False)])
-def test_what_leaves_most_of_another_session_is_not_handed_over(rng, size, told):
-    """A finding beside something larger, on no list, may imitate it."""
-    units = table(rng, 120, session=np.repeat([0, 1], 60))
-    values = planted(units, (CROSS, 4.0)).values
-    values[60:, 1] += size * np.cos(7.0 * units.covariates["z"][60:])
-    found = diagnose(units.with_values(values), LAWS, (ZERO,))
-    (cross,) = [each for each in found.standings if each.name == "cross@part"]
-    assert named(found) == ({"cross@part"} if told else set())
-    assert cross.why_not == ("" if told else "leaves most of the held-out error")
-    assert found.verdict == ("effect" if told else "unknown")
-
-
 def test_another_session_is_set_up_anew_before_it_judges(rng):
     units = planted(table(rng, 120, session=np.repeat([0, 1], 60)), (CROSS, 4.0))
     moved = units.with_values(units.values + 50.0 * (units.sessions == 1)[:, None])

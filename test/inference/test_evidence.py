@@ -128,16 +128,38 @@ def test_what_cannot_be_explains_nothing(rng):
 def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
     point, ground = linear(rng, {"a": np.arange(1)}, columns=1, z=[9.0])
     varied = 9.0 * point.columns * rng.normal(size=(ROWS, 2))
-    point = replace(point, left=point.left + 3.0 * varied[:, 0])
-    rests = [
-        Evidence(replace(point, varied={"a": (share, varied)}), ground, np.full(2, 0.5), 0.1).rest(
-            "a"
+    point = replace(point, left=point.left + 3.0 * varied[:, 0], varied={"a": varied})
+    exact, nearly, hardly = (
+        Evidence(
+            replace(point, inexact=share * varied, _beside={}), ground, np.full(2, 0.5), 0.1
+        ).rest("a")
+        for share in (0.0, 1.0, 100.0)
+    )
+    assert exact > 2.0 * nearly > 0.0
+    assert hardly < 1e-2 * exact
+
+
+def test_an_effect_that_the_set_up_nearly_takes_up_counts_by_what_is_seen_of_it(rng):
+    """What it leaves in its shape is compared with what it does beyond the set-up."""
+    base, own, shape = rng.normal(size=(3, ROWS))
+    columns = np.stack([9.0 * (base + 0.01 * own), base], axis=1)
+    for count in (1, 2):
+        point = Point(
+            0.1 * shape,
+            columns[:, :count],
+            np.array([1.0, -9.0])[:count],
+            np.full(count, 1e-3),
+            {"a": np.arange(1)},
+            np.zeros((ROWS, 0)),
+            {"a": shape[:, None]},
         )
-        for share in (0.0, 0.05, 10.0)
-    ]
-    assert rests[0] > 0.05**2
-    assert rests[1] == pytest.approx(rests[0] - 0.05**2)
-    assert rests[2] == 0.0
+        at = Evidence(point, Background((), 0.2), np.zeros(0), 1e-9)
+        left = point.left + point.columns @ at.step
+        if count == 2:
+            beyond = np.eye(ROWS) - np.outer(base, base) / (base @ base)
+            left, shape, columns = beyond @ left, beyond @ shape, beyond @ columns
+        expected = (left @ shape) ** 2 / (shape @ shape) / (columns[:, 0] @ columns[:, 0])
+        assert at.rest("a") == pytest.approx(expected, rel=1e-2)
 
 
 def test_what_is_attainable_is_the_evidence_of_noise_alone(rng):

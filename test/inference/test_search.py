@@ -52,7 +52,7 @@ class Disappointing:
         columns = np.concatenate([empty, *(self.whole[name] for name in names)], axis=1)
         z = np.linalg.lstsq(columns, self.left, rcond=None)[0]
         effects = {name: np.array([number]) for number, name in enumerate(names)}
-        varied = {name: (0.0, columns[:, [number]]) for number, name in enumerate(names)}
+        varied = {name: columns[:, [number]] for number, name in enumerate(names)}
         left = self.left - columns @ z
         return Fit(tuple(names), Point(left, -columns, z, np.ones(len(z)), effects, empty, varied))
 

@@ -5,7 +5,7 @@ from wrist_stiffness.errors import InputError, UnreachablePoseError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell, true_laws
 from wrist_stiffness.simulation.pose_view import WILD_SHIFT
 
 RATE = 50.0
@@ -215,3 +215,19 @@ def test_lost_beams_are_missing_or_wild_and_the_rest_untouched(ran):
     off = (lost.measured_shift - clean.measured_shift)[wild]
     assert off.std() == pytest.approx(WILD_SHIFT, rel=0.1)
     assert np.array_equal(np.isnan(lost.measured_rotation).all(axis=(1, 2)), gone)
+
+
+def test_a_drive_is_no_softer_for_a_soft_bushing_beside_it(wrist):
+    """What hides is as large on every base: tolerances are of the wrist as it was built."""
+    table = wrist()
+    hidden = HiddenEffect("drive_compliance", "motor_1", "linear", 0.05, 1)
+    added = []
+    for base in ("exact", "wrong"):
+        with_it, without = table.components, table.components
+        for law in true_laws(table, CellSettings(base=base, base_seed=5, hidden=(hidden,))):
+            with_it = law.parts(with_it)
+        for law in true_laws(table, CellSettings(base=base, base_seed=5)):
+            without = law.parts(without)
+        added.append(with_it.flexibility - without.flexibility)
+    assert added[0].any()
+    np.testing.assert_allclose(added[1], added[0], atol=1e-15)

@@ -30,7 +30,7 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.giving import told
-from wrist_stiffness.inference.held_out import HeldOut, against, bought
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.search import Search, State
 from wrist_stiffness.mechanism.components import Array
@@ -240,11 +240,10 @@ class _Judged:
 
     def kept(self, search: Search, reading: Reading) -> Reading:
         """Return a reading without what the held-out part speaks against: it is not handed over."""
-        why = against(self.stages[0], self.stages[-1]) if reading.named else ""
-        if not why:
+        if not reading.named or not refuted(self.stages[0], self.stages[-1]):
             return reading
         self.stages = self.stages[:1]
-        return reading.refute(search.base, why)
+        return reading.refute(search.base)
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
         """Return what is left without one of the effects."""

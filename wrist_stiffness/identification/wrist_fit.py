@@ -136,8 +136,8 @@ class WristFit:
         varied = {}
         for name, places in self.places.items():
             effect = base.problem.free[base.problem.unknowns[places[0]].free].effect
-            varied[name] = effect.law.inexactness, table.varied(self.change(name))
-            inexact.append(np.multiply(*varied[name]))
+            varied[name] = table.varied(self.change(name))
+            inexact.append(effect.law.inexactness * varied[name])
         for place, own in self.sized.items():
             unknown = base.problem.unknowns[place]
             z[place] = (unknown.mean + base.z[place] * unknown.step - own.mean) / own.scale

@@ -120,9 +120,7 @@ class Reading:
     unexplained : float
         Share of what the nominal model left above the noise that is left, in [0, 1].
     refuted : tuple of Class
-        What would be named, if held-out units did not speak against it.
-    against : str
-        Why they do.
+        What would be named, if it did not make the held-out error grow.
     """
 
     state: State
@@ -133,10 +131,9 @@ class Reading:
     depends_on: Mapping[str, float]
     unexplained: float
     refuted: tuple[Class, ...] = ()
-    against: str = ""
 
-    def refute(self, nominal: State, why: str) -> Reading:
-        """Return the same without what is named, and why held-out units speak against it."""
+    def refute(self, nominal: State) -> Reading:
+        """Return the same without what is named: held-out units speak against it."""
         unknown = replace(self, state=nominal, named=(), verdict="unknown", unexplained=1.0)
         doubt = 1.0 - stands_in(1.0)
         doubted = {
@@ -146,7 +143,7 @@ class Reading:
             for each in self.named
         }
         classes = tuple(doubted.get(each.name, each) for each in self.classes)
-        return replace(unknown, classes=classes, refuted=tuple(doubted.values()), against=why)
+        return replace(unknown, classes=classes, refuted=tuple(doubted.values()))
 
 
 def probabilities(search: Search) -> dict[Names, float]:
@@ -286,7 +283,7 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         probability = chance.get(name, 0.0) * itself.get(name, 1.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
         if name in refuted:
-            why = reading.against
+            why = "makes the held-out error grow"
         if name not in fitted and gain >= CHANCE and not search.in_time:
             why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))

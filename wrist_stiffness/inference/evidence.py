@@ -25,6 +25,7 @@ from scipy.special import gammaln
 
 from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
+from wrist_stiffness.inference.projection import NEGLIGIBLE
 
 Array = NDArray[np.float64]
 
@@ -317,7 +318,8 @@ class Evidence:
         """Return how much of an effect is left in its own shape, 0 where its law is right.
 
         Sum of squares above the noise that the same effect, its size changing with the conditions,
-        would still explain, over that of the effect itself; less what its law may be wrong by.
+        would still explain where the laws are as wrong as they may be, over that of the effect
+        itself; both beyond what everything else with a name could take up.
 
         Parameters
         ----------
@@ -325,16 +327,20 @@ class Evidence:
             Of an effect of the set.
         """
         point, places = self.point, self.point.effects[name]
+        wrong = self._solved[2][len(point.z) : len(self._priors[0])]
+        left = point.left + point.columns @ self.step + point.inexact @ wrong
         own = point.columns[:, places] @ point.z[places]
-        count = len(point.z) + len(point.gives)
-        named = point.left + point.columns @ self.step
-        named += point.inexact[:, : len(point.gives)] @ self._solved[2][len(point.z) : count]
-        share, varied = point.varied[name]
-        basis, sizes, _ = np.linalg.svd(varied, full_matrices=False)
-        basis = basis[:, sizes > 1e-6 * sizes[0]] if len(sizes) else basis
-        noise = self.excess * basis.shape[1]
-        left = max(float(np.sum((basis.T @ named) ** 2)) - noise, 0.0)
-        return max(left / max(float(own @ own), 1e-300) - share**2, 0.0)
+        asked = np.column_stack([own, left, point.varied[name]])
+        others = np.delete(np.arange(len(point.z)), places)
+        beside = point.columns[:, others]
+        known = beside.T @ beside + np.diag(point.weight[others] ** 2)
+        mixed = beside.T @ asked
+        products = asked.T @ asked - mixed.T @ np.linalg.solve(known, mixed)
+        sizes, vectors = np.linalg.eigh(products[2:, 2:])
+        shapes = sizes > NEGLIGIBLE * sizes.max(initial=0.0)
+        along = (vectors.T @ products[2:, 1])[shapes]
+        found = float(np.sum(along**2 / sizes[shapes])) - self.excess * np.count_nonzero(shapes)
+        return float(max(found, 0.0) / max(products[0, 0], 1e-300))
 
     def without_discrepancy(self) -> Evidence:
         """Return the set as if all that it leaves were noise."""

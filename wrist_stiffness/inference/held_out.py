@@ -65,26 +65,6 @@ class HeldOut:
         return np.where(measured.any(axis=1), total, np.nan)
 
 
-MUCH = 10.0
-"""Mean square of held-out units, in units of the noise, beyond which something large is missing.
-Calibrated by `bench/hidden_effects/told.py`: of 37 right answers 34 leave at most 5.2 and one 8.7;
-the other two leave up to 46, and explain more than that."""
-
-
-def against(before: HeldOut, after: HeldOut) -> str:
-    """Return why held-out units speak against a set of effects; empty where they do not.
-
-    A right set makes the error grow by chance at most.  One that leaves more than it explains, and
-    much, may imitate a part of whatever is larger.
-    """
-    if refuted(before, after):
-        return "makes the held-out error grow"
-    measured = int(np.count_nonzero(after.white))
-    if after.energy > MUCH * measured and after.energy > before.energy - after.energy:
-        return "leaves most of the held-out error"
-    return ""
-
-
 def refuted(before: HeldOut, after: HeldOut) -> bool:
     """Whether an effect makes sealed units worse by more than chance explains.
 

@@ -90,14 +90,9 @@ class LinearFit:
         """Where the fit ended, whitened."""
         problem, table = self.problem, self.problem.table
         columns = problem.columns(tuple(self.terms.values()))
-        inexact = [
-            table.inexact(self.change(name), term.candidate.inexactness)
-            for name, term in self.terms.items()
-        ]
-        varied = {
-            name: (term.candidate.inexactness, table.inexact(self.change(name), 1.0))
-            for name, term in self.terms.items()
-        }
+        varied = {name: table.varied(self.change(name)) for name in self.terms}
+        shares = {name: term.candidate.inexactness for name, term in self.terms.items()}
+        inexact = [share * varied[name] for name, share in shares.items() if share]
         bent = [problem.tangents(self, name) for name in self.terms]
         free = np.concatenate([np.zeros((len(columns), 0)), *bent], axis=1)
         p = columns.shape[1]

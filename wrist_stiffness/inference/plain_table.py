@@ -115,11 +115,9 @@ class Table:
         )
         return white[self._rows] if values.ndim == 3 else white[self._rows, 0]
 
-    def inexact(self, change: Array, share: float) -> Array:
-        """Return columns for an error that is a share of a change (n, m), (N, l)."""
-        if share == 0.0:
-            return np.zeros((len(self._rows), 0))
-        return self.whiten(share * change[:, :, None] * self.alike[:, None, :])
+    def varied(self, change: Array) -> Array:
+        """Return what a change (n, m) adds where its size changes with the conditions, (N, l)."""
+        return self.whiten(change[:, :, None] * self.alike[:, None, :])
 
     def _estimated(self, base: Array, named: Array) -> tuple[Array, float]:
         """Return the variance (m,) by repeated conditions, or by what everything leaves."""

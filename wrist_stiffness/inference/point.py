@@ -170,9 +170,8 @@ class Point:
         Places of the unknowns of each effect, which have the prior of effects.
     inexact : (N, l) float
         What the laws of the effects may leave because no law is exact; first those that give.
-    varied : dict of str to (float, (N, l) float)
-        By how much the law of each effect may be wrong, and what the effect would add if its size
-        changed with the conditions by its own size.
+    varied : dict of str to (N, l) float
+        What each effect would add if its size changed with the conditions by its own size.
     gives : tuple of Give
         In which ways laws give, a column of `inexact` each.
     linear : bool
@@ -187,7 +186,7 @@ class Point:
     weight: Array
     effects: Mapping[str, NDArray[np.intp]]
     inexact: Array
-    varied: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
+    varied: Mapping[str, Array] = field(default_factory=dict)
     gives: tuple[Give, ...] = ()
     linear: bool = False
     numbers: int = 0
@@ -231,7 +230,7 @@ class Point:
             weight=np.concatenate([self.weight, np.ones(len(z))]),
             effects={**self.effects, name: places},
             inexact=np.hstack([self.inexact, inexactness * varied]),
-            varied={**self.varied, name: (inexactness, varied)},
+            varied={**self.varied, name: varied},
             linear=True,
             _beside={},
         )

@@ -22,7 +22,7 @@ from wrist_stiffness.inference.answer import (
 )
 from wrist_stiffness.inference.candidates import Candidate
 from wrist_stiffness.inference.evidence import evidence
-from wrist_stiffness.inference.held_out import HeldOut, against, bought
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem, linear_problem
 from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Mask, Observations
@@ -132,10 +132,10 @@ def diagnose(
     tell("judging by what was held out")
     judge = _Judge(problem, whole, aside, nuisances, _noise(reading.state, problem.table))
     before, after = judge.left(search.base), judge.left(reading.state)
-    refused = against(before, after) if reading.named else ""
+    refused = bool(reading.named) and refuted(before, after)
     if refused:
         after = before
-        reading = reading.refute(search.base, refused)
+        reading = reading.refute(search.base)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
     answer = Diagnosis(
@@ -159,7 +159,7 @@ def diagnose(
     )
     return TableDiagnosis(
         **{each.name: getattr(answer, each.name) for each in fields(answer)},
-        predictor=Predictor(_sets(search, bool(refused)), candidates, nuisances),
+        predictor=Predictor(_sets(search, refused), candidates, nuisances),
         search=search,
         lost=tuple(np.flatnonzero(away).tolist()),
     )

@@ -148,10 +148,13 @@ class CellSample:
 
 
 def true_laws(table: Table, settings: CellSettings) -> list[Law]:
-    """Return all laws by which the true wrist departs from its table."""
+    """Return all laws by which the true wrist departs from its table.
+
+    The base first: a soft drive beside a soft bushing is no softer for it.
+    """
     return [
-        *(build(hidden, table) for hidden in settings.hidden),
         *base_laws(settings.base, table, settings.base_seed, settings.session),
+        *(build(hidden, table) for hidden in settings.hidden),
     ]
 
 
