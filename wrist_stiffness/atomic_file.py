@@ -14,15 +14,9 @@ from wrist_stiffness.errors import InputError, WristError
 def require_room(path: str | Path) -> None:
     """Refuse a path beside which no file can be written, before the work for it.
 
-    Parameters
-    ----------
-    path : path
-        File that `replacing` will write later; a device or a pipe needs no room.
-
-    Raises
-    ------
-    InputError
-        If its folder takes no file: permissions alone do not tell, of a disk that is read-only.
+    `path`: file that `replacing` will write later; a device or a pipe needs no room.  Raises
+    `InputError` if its folder takes no file: permissions alone do not tell, of a disk that is
+    read-only.
     """
     target = Path(path)
     if target.exists() and not target.is_file():

@@ -3,10 +3,13 @@
 import argparse
 import errno
 import os
+import signal
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
+from types import FrameType
 from typing import Protocol
 
 from wrist_stiffness import __version__
@@ -37,9 +40,10 @@ from wrist_stiffness.cli.parser import (
     OneLineParser,
 )
 from wrist_stiffness.cli.progress import bars_ended
-from wrist_stiffness.cli.termination import cleaned_up_on_sigterm
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.python_laws import python_laws
+
+EXIT_TERMINATED = 128 + signal.SIGTERM
 
 DESCRIPTION = """\
 Predict, correct and explain the pose error of a flexible two-degree-of-freedom wrist."""
@@ -259,3 +263,17 @@ def _refuse(reason: str) -> int:
 def _discard_output() -> None:
     # Python flushes stdout once more at exit, which would print a traceback.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def cleaned_up_on_sigterm() -> Iterator[None]:
+    """Turn SIGTERM into SystemExit inside the `with` block: temporary files are removed."""
+    before = signal.signal(signal.SIGTERM, _leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(EXIT_TERMINATED)

@@ -14,9 +14,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.modes import RigidBody
 from wrist_stiffness.report.pictures.bent_wrist import draw_bent_wrist, draw_mode_shapes
-from wrist_stiffness.report.pictures.budget import draw_budget
-from wrist_stiffness.report.pictures.joint_map import draw_map
-from wrist_stiffness.report.pictures.uncertainty import draw_uncertainty
+from wrist_stiffness.report.pictures.table import draw_budget, draw_map, draw_uncertainty
 from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 PICTURED_POSE = np.radians([25.0, -20.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
 import gc
 import os
@@ -16,9 +17,12 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
+from wrist_stiffness.commands.node_list import PARENT_PID
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.ros.executor import StreamExecutor
-from wrist_stiffness.ros.parent import end_with_parent
+
+PR_SET_PDEATHSIG = 1
+"""From linux/prctl.h; ctypes is the standard library's way to it."""
 
 EXIT_BAD_INPUT = 2
 
@@ -128,3 +132,17 @@ def _listen_to_signals() -> list[int]:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
     return told_to_end
+
+
+def end_with_parent() -> None:
+    """Ask the kernel for a SIGTERM when the parent ends, where the environment names one.
+
+    Only on Linux; elsewhere a killed `cell` leaves its nodes running.
+    """
+    parent = os.environ.get(PARENT_PID)
+    if parent is None or sys.platform != "linux":
+        return
+    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if str(os.getppid()) != parent:
+        # It had ended before the kernel was asked.
+        raise SystemExit(0)
