@@ -1,9 +1,10 @@
-"""Make the recordings of docs/find-the-missing-effect.md again: one wrist on four days.
+"""Make the recordings of docs/find-the-missing-effect.md again: one wrist on six days.
 
     python test/data/make_tutorial.py
 
-The days have the names of days on purpose: `HIDDEN` and `Plate` below are the key.  The same table
-gives the same bytes.
+The days have the names of days on purpose: `HIDDEN`, `Plate` and `DENT` below are the key.  The
+same table and program give the same bytes; the first four days are kept as an earlier one wrote
+them, and the outputs that the page shows are of those.
 """
 
 from __future__ import annotations
@@ -31,18 +32,22 @@ from wrist_stiffness.simulation.program import Track
 
 FOLDER = Path(__file__).parent / "tutorial"
 RATE_HZ, SEED = 10.0, 21
-DAY_NS = 24 * 3600 * 10**9
 
 HIDDEN, SIZE = "backlash@motor_2:single", 4.0
 """Of all days; size in units of one sample's noise on the first."""
 
+DENT, DENT_SIZE = "dent@joint_3", 8.0
+"""From Friday on, of which its size is; at -6.05 deg of the joint's turn, 3.44 deg wide."""
+
 DAYS = {
-    "monday": (180.0, False),
-    "tuesday": (180.0, False),
-    "wednesday": (120.0, True),
-    "thursday": (120.0, True),
+    "monday": (180.0, ""),
+    "tuesday": (180.0, ""),
+    "wednesday": (120.0, "clamp"),
+    "thursday": (120.0, "clamp"),
+    "friday": (180.0, "dent"),
+    "saturday": (180.0, "dent"),
 }
-"""How long each lasts [s], and whether the clamp is at work."""
+"""How long each lasts [s], and what is there beside `HIDDEN`."""
 
 
 @dataclass(frozen=True)
@@ -91,31 +96,29 @@ def pressures(rng: np.random.Generator, seconds: float) -> Track:
     return Track(np.array(knots), np.array(levels)[:, None])
 
 
-def of_the_day(path: Path, day: int, plate: Plate | None) -> Iterator[tuple[str, Message, int]]:
-    """Return the messages of a recording, on another day and with the clamp."""
+def with_plate(path: Path, plate: Plate | None) -> Iterator[tuple[str, Message, int]]:
+    """Return the messages of a recording, with the clamp."""
     recording = open_recording(path)
     start_ns = None
     for topic, log_ns, message in recording.messages():
         start_ns = log_ns if start_ns is None else start_ns
-        stamp_ns = log_ns + day * DAY_NS
         bar = 0.0
         if plate is not None:
             bar = float(plate.pressure((log_ns - start_ns) * 1e-9)[0])
-        if hasattr(message, "header"):
-            message = replace(message, header=replace(message.header, stamp_ns=stamp_ns))
         if topic == topics.PLATFORM_POSE and plate is not None:
             message = replace(message, pose=plate.lifted(message.pose, bar))
         if topic == topics.JOINT_STATES and plate is not None:
-            yield f"{topics.COVARIATES}clamp_bar", Float64(round(bar, 2)), stamp_ns
-        yield topic, message, stamp_ns
+            yield f"{topics.COVARIATES}clamp_bar", Float64(round(bar, 2)), log_ns
+        yield topic, message, log_ns
 
 
 def main() -> None:
     """Write all days."""
     table = load_table(shipped_file("precomputed/palmieri2015.npz"))
     hidden: tuple[HiddenEffect, ...] = ()
+    dented = False
     FOLDER.mkdir(exist_ok=True)
-    for day, (name, (seconds, clamped)) in enumerate(DAYS.items()):
+    for day, (name, (seconds, beside)) in enumerate(DAYS.items()):
         settings = CellSettings(
             rate_hz=RATE_HZ,
             program_seconds=seconds,
@@ -127,16 +130,18 @@ def main() -> None:
         )
         if not hidden:
             settings = hide(HIDDEN, SIZE, table, settings, seconds)
-            hidden = settings.hidden
+        if beside == "dent" and not dented:
+            settings, dented = hide(DENT, DENT_SIZE, table, settings, seconds), True
+        hidden = settings.hidden
         rng = np.random.default_rng([SEED, day])
-        plate = Plate(pressures(rng, seconds)) if clamped else None
+        plate = Plate(pressures(rng, seconds)) if beside == "clamp" else None
         with TemporaryDirectory() as scratch:
             as_it_was = Path(scratch) / "wrist.mcap"
             simulate_recording(as_it_was, table, settings, seconds, SEED + day)
             with RecordingWriter(FOLDER / f"{name}.mcap", overwrite=True) as writer:
-                for topic, message, stamp_ns in of_the_day(as_it_was, day, plate):
-                    writer.write(topic, message, stamp_ns)
-        print(f"{name}: {HIDDEN}{', clamp' if clamped else ''}", file=sys.stderr)
+                for topic, message, log_ns in with_plate(as_it_was, plate):
+                    writer.write(topic, message, log_ns)
+        print(f"{name}: {', '.join(filter(None, (HIDDEN, beside)))}", file=sys.stderr)
 
 
 if __name__ == "__main__":
