@@ -35,6 +35,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.columns import SMALL
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 LEAVES_MUCH, HELPS = 1.5, 0.8
@@ -120,34 +121,15 @@ class WristProblem:
             return None
         if candidate.law.smooth:
             z, columns = ranked.z, candidate.at(ranked.shape) * candidate.usual
-            change, bounds = columns @ z, candidate.bounds
+            change, (lower, upper) = columns @ z, candidate.bounds
         else:
-            values = {key: each.value for key, each in start.estimates.items()}
-            asked = [
-                p
-                for p in start.parameters
-                if p.key not in candidate.recipe.idle and np.isfinite(p.scale)
-            ]
-            trials = [values]
-            for p in asked:
-                step = SMALL * p.scale
-                trials.append(
-                    values
-                    | {p.key: values[p.key] + (step if values[p.key] + step <= p.upper else -step)}
-                )
-            found = at.changes([(candidate.law, candidate.place, each) for each in trials])
-            change = found[0]
-            steps = np.array(
-                [
-                    (t[p.key] - values[p.key]) / p.scale
-                    for t, p in zip(trials[1:], asked, strict=True)
-                ]
-            )
-            columns = np.moveaxis((found[1:] - change) / steps[:, None, None], 0, -1)
-            z = np.array([(values[p.key] - p.mean) / p.scale for p in asked])
-            lower = np.array([(p.lower - p.mean) / p.scale for p in asked])
-            bounds = lower, np.array([(p.upper - p.mean) / p.scale for p in asked])
-        held = (z < bounds[0] + NOTHING) | (z > bounds[1] - NOTHING)
+            idle = candidate.recipe.idle
+            asked = [p for p in start.parameters if p.key not in idle and np.isfinite(p.scale)]
+            change, columns = _tangents(at, start, asked)
+            known = [(start.estimates[p.key].value, p.lower, p.upper) for p in asked]
+            mean, scale = np.array([(p.mean, p.scale) for p in asked]).T
+            z, lower, upper = (np.array(known).T - mean) / scale
+        held = (z < lower + NOTHING) | (z > upper - NOTHING)
         left = fit.point.left - self.table.whiten(change)
         own = -self.table.whiten(columns) * ~held
         varied = self.table.varied(change)
@@ -263,3 +245,16 @@ class WristProblem:
 
 def _cost(fitted: BaseFit) -> float:
     return fitted.cost
+
+
+def _tangents(at: WristPoint, effect: Effect, asked: Sequence[Parameter]) -> tuple[Array, Array]:
+    """Return what an effect changes (u, 6), and that by a typical step of each parameter."""
+    values = {key: each.value for key, each in effect.estimates.items()}
+    trials, steps = [values], []
+    for p in asked:
+        step = SMALL * p.scale if values[p.key] + SMALL * p.scale <= p.upper else -SMALL * p.scale
+        trials.append(values | {p.key: values[p.key] + step})
+        steps.append(step / p.scale)
+    found = at.changes([(effect.law, effect.component, each) for each in trials])
+    slopes = (found[1:] - found[0]) / np.array(steps)[:, None, None]
+    return found[0], np.moveaxis(slopes, 0, -1)
