@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from whole_wrist.model import SCREWS, PlacedBody, WristAtPose, platform_weight
-from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
+from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.modes import RigidBody
 from wrist_stiffness.mechanism.vectors import block_diagonal
@@ -185,6 +185,7 @@ def _nodal_loads(part: PlacedBody, disturbance: Disturbance) -> Array:
     in_part = part.turn[:3, :3].T @ disturbance.gravity
     load = part.body.weight @ in_part
     if part.name in disturbance.warming:
-        rise = disturbance.warming[part.name]
-        load = load + rise * thermal_load(part.body.mesh, part.body.solid.material)
+        # A free growth about any point is what its nodal forces leave.
+        strain = disturbance.warming[part.name] * part.body.solid.material.expansion
+        load = load + part.body.stiffness @ (strain * part.body.mesh.nodes.ravel())
     return np.asarray(part.turn @ load)

@@ -8,7 +8,7 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from wrist_stiffness.fem.elasticity import rigid_motion, thermal_load
+from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.fem.revolve import SECTORS
 from wrist_stiffness.fem.solids import link_shape
 from wrist_stiffness.fem.superelement import condense, frame_stiffness
@@ -181,11 +181,3 @@ def test_flange_modes_are_positive_definite(flanged_bushing):
     approach = element.sector_approach
     np.testing.assert_array_equal(approach, approach.T)
     assert np.linalg.eigvalsh(approach)[0] > 0
-
-
-def test_free_heating_turns_nothing_and_grows_everything(link_body):
-    """One kelvin's nodal forces are the stiffness times the free growth about any point."""
-    expansion = link_body.solid.material.expansion
-    growth = expansion * link_body.mesh.nodes.ravel()
-    load = thermal_load(link_body.mesh, link_body.solid.material)
-    np.testing.assert_allclose(link_body.stiffness @ growth, load, atol=1e-9 * np.abs(load).max())

@@ -95,20 +95,9 @@ class SignalsAhead:
     def rises_until(self, log_time_ns: int, first_ns: int, slow: bool) -> bool:
         """Tell whether `read_for` can be called once for many samples.
 
-        Parameters
-        ----------
-        log_time_ns : int
-            Of the last one [ns].
-        first_ns : int
-            The least of their stamps [ns].
-        slow : bool
-            Whether temperatures and covariates count.
-
-        Returns
-        -------
-        bool
-            Whether all that would be heard is newer than what was before, and drives nothing out
-            that may belong to a sample.
+        `log_time_ns`: of the last one [ns]; `first_ns`: the least of their stamps [ns]; `slow`:
+        whether temperatures and covariates count.  Gives whether all that would be heard is newer
+        than what was before, and drives nothing out that may belong to a sample.
         """
         end_ns = log_time_ns + LOOKAHEAD_NS
         self._fetch(end_ns)

@@ -43,26 +43,11 @@ def check(
     rebuild: bool = False,
     progress: Progress = silent,
 ) -> list[Finding]:
-    """Verify a table.
+    """Verify a table: all checks; the table is good if all passed.
 
-    Parameters
-    ----------
-    geometry : path, optional
-        Geometry file that the table must be of.
-    rebuild : bool
-        Also condense the parts and sweep again, and compare all numbers.
-    progress : callable
-        Called with steps done and in all.
-
-    Returns
-    -------
-    list of Finding
-        All checks; the table is good if all passed.
-
-    Raises
-    ------
-    TableError, GeometryError
-        If a file cannot be read at all.
+    `geometry`: geometry file that the table must be of; `rebuild`: also condense the parts and
+    sweep again, and compare all numbers; `progress`: called with steps done and in all.  Raises
+    `TableError` or `GeometryError` if a file cannot be read at all.
     """
     table = load_table(path)
     findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]

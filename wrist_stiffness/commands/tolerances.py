@@ -229,19 +229,9 @@ def study_tolerances(
 
     The same seed gives the same wrists and the same table on any number of processes.
 
-    Parameters
-    ----------
-    load : sequence of 6 float
-        On the platform at O in F [N, N m].
-    limits : mapping
-        See `tolerances_of`.
-    workers, progress
-        See `fleet.spread`.
-
-    Raises
-    ------
-    WristError
-        If there are too few wrists to tell the tolerances apart, or some cannot be computed.
+    `load` (sequence of 6 float): on the platform at O in F [N, N m]; `limits`: see `tolerances_of`;
+    `workers`, `progress`: see `fleet.spread`.  Raises `WristError` if there are too few wrists to
+    tell the tolerances apart, or some cannot be computed.
     """
     tolerances = tolerances_of(limits)
     if wrists < (least := 3 * len(tolerances)):

@@ -59,7 +59,7 @@ def stiffness_matrix(mesh: SolidMesh, material: AnyMaterial) -> sparse.csr_matri
 def _isotropic_blocks(mesh: SolidMesh, material: Material) -> Array:
     """Stiffness of each element (e, 3, 10, 3, 10) [N/m]."""
     first, shear = lame(material)
-    gradient, volume = _gradients(mesh, FOUR_POINTS)
+    gradient, volume = _gradients(mesh)
     count = gradient.shape[0]
     # products[e, a, i, b, j] = integral of d_a N_i d_b N_j over element e
     weighted = (gradient * volume[:, None, None, :]).reshape(count, 30, -1)
@@ -77,7 +77,7 @@ def _orthotropic_blocks(mesh: SolidMesh, material: OrthotropicMaterial) -> Array
     elastic = np.linalg.inv(material.compliance)
     basis = Basis(mesh.tets, ElementTetP2(), intorder=FOUR_POINTS)
     place = np.asarray(basis.global_coordinates())
-    gradient, volume = _gradients(mesh, FOUR_POINTS)
+    gradient, volume = _gradients(mesh)
     count = len(gradient)
     block = np.zeros((count, 30, 30))
     for q in range(volume.shape[1]):
@@ -99,22 +99,11 @@ def _orthotropic_blocks(mesh: SolidMesh, material: OrthotropicMaterial) -> Array
     return block
 
 
-def _gradients(mesh: SolidMesh, order: int) -> tuple[Array, Array]:
+def _gradients(mesh: SolidMesh) -> tuple[Array, Array]:
     """Gradients (e, 3, 10, q) [1/m] and volumes (e, q) [m^3] at the quadrature points."""
-    basis = Basis(mesh.tets, ElementTetP2(), intorder=order)
+    basis = Basis(mesh.tets, ElementTetP2(), intorder=FOUR_POINTS)
     gradient = np.array([field[0].grad for field in basis.basis])
     return np.ascontiguousarray(gradient.transpose(2, 1, 0, 3)), basis.dx
-
-
-def thermal_load(mesh: SolidMesh, material: Material) -> Array:
-    """Nodal forces of a free thermal expansion by one kelvin (3 n,) [N/K]."""
-    first, shear = lame(material)
-    gradient, volume = _gradients(mesh, FOUR_POINTS)
-    stress = (3.0 * first + 2.0 * shear) * material.expansion
-    forces = stress * np.einsum("eaiq,eq->eia", gradient, volume)
-    load = np.zeros((len(mesh.nodes), 3))
-    np.add.at(load, mesh.elements, forces)
-    return load.ravel()
 
 
 def mass_matrix(mesh: SolidMesh, density: float) -> sparse.csr_matrix:

@@ -75,14 +75,9 @@ class GuardedNode(LifecycleNode):
     ) -> None:
         """Subscribe to a part of the node's stream.
 
-        Parameters
-        ----------
-        callback : callable
-            Takes a message; may raise anything.
-        states : sequence of str
-            States of the lifecycle in which messages count; in others they are dropped.
-        read : callable, optional
-            Takes a payload apart that is too quick for rclpy's message objects.
+        `callback`: takes a message; may raise anything; `states`: states of the lifecycle in which
+        messages count; in others they are dropped; `read`: takes a payload apart that is too quick
+        for rclpy's message objects.
         """
 
         def heard(message: Any, info: Mapping[str, Any]) -> None:

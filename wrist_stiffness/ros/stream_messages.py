@@ -94,14 +94,8 @@ def error_payload(
 ) -> bytes:
     """Return a pose error as geometry_msgs/PoseWithCovarianceStamped.
 
-    Parameters
-    ----------
-    stamp_ns : int
-        [ns].
-    twist : (6,) float
-        Of the error, at O in F [m, rad].
-    covariance : (6, 6) float
-        Of the twist.
+    `stamp_ns` [ns]; `twist` (6,): of the error, at O in F [m, rad]; `covariance` (6, 6): of the
+    twist.
     """
     place, turn = pose_of_twist(twist)
     return _in_frame(PoseWithCovarianceStamped, frame_id).payload(

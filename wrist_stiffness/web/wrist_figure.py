@@ -13,7 +13,7 @@ from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.energy import strain_energies
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.statics import contact_operators
-from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes
+from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes, round_down
 from wrist_stiffness.web.figures import MAP, RED, Figure
 
 MM = 1e3
@@ -60,7 +60,7 @@ def wrist_figure(
     error = np.nan_to_num(measured)
     moved.append(np.linalg.norm(error[:3]) + reach * np.linalg.norm(error[3:]))
     if exaggeration is None:
-        exaggeration = _round(SEEN_M / max(float(max(moved)), 1e-9))
+        exaggeration = round_down(SEEN_M / max(float(max(moved)), 1e-9))
     bent = [shape.points + exaggeration * shape.shift for shape in shapes]
     bodies = list(zip(bent, share.tolist(), strict=False))
     traces = [_bodies(bodies, top), _rigid(shapes)]
@@ -84,12 +84,6 @@ def wrist_figure(
     }
     config = {"displaylogo": False, "modeBarButtonsToRemove": REMOVED}
     return {"data": traces, "layout": layout, "config": config}, exaggeration
-
-
-def _round(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, ... that is not above a value."""
-    size = 10.0 ** np.floor(np.log10(value))
-    return float(size * max(step for step in (1.0, 2.0, 5.0) if step * size <= value))
 
 
 def _shares(table: Table, theta: Array, load: Array) -> Array:

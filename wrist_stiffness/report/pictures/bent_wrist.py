@@ -83,7 +83,7 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
 
     shapes = bent_shapes(table, theta, push)
     largest = max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
-    factor = _round_down(SHOWN_M / largest) if largest > 0.0 else 1.0
+    factor = round_down(SHOWN_M / largest) if largest > 0.0 else 1.0
     colours = ScalarMappable(Normalize(0.0, 1e6 * largest), "viridis")
     figure = new_figure(8.0, 7.0)
     plot: Any = figure.add_subplot(projection="3d")
@@ -257,6 +257,7 @@ def _corner_sum(values: Array) -> Array:
     return values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:]
 
 
-def _round_down(value: float) -> float:
+def round_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is not above a value."""
     size = 10.0 ** np.floor(np.log10(value))
     return float(size * max(step for step in (1.0, 2.0, 5.0) if step * size <= value))

@@ -61,14 +61,9 @@ class KnownFrames:
 def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -> KnownFrames:
     """Return the frames in which sensors may speak, as the nodes learn them.
 
-    Parameters
-    ----------
-    recording : Recording
-        May hold `/tf_static`; of two transforms of one child the later counts.
-    remaps : mapping
-        Actual by standard topic name.
-    mapped : Frames
-        What the user says of frames goes before what the recording says.
+    `recording`: may hold `/tf_static`; of two transforms of one child the later counts; `remaps`:
+    actual by standard topic name; `mapped`: what the user says of frames goes before what the
+    recording says.
     """
     topic = remaps.get(TF_STATIC, TF_STATIC)
     if topic not in {info.name for info in recording.topics}:
