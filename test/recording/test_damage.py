@@ -57,8 +57,6 @@ def test_a_cut_file_gives_a_prefix_and_says_so(tmp_path, small):
         assert str(length) in recording.damage or "closing magic" in recording.damage
         assert sum(info.count for info in recording.topics) == len(found)
         found_lengths.add(len(found))
-        with pytest.raises(RecordingError, match="cut.mcap"):
-            open_recording(path, strict=True)
     # Cuts in the summary lose nothing, cuts in the data whole chunks.
     assert len(entries) in found_lengths
     assert len(found_lengths) > 10
@@ -173,8 +171,6 @@ def test_a_chunk_with_a_wrong_checksum_is_left_out_and_reported(tmp_path, small)
     # A second reading does not report it again.
     list(recording.messages())
     assert recording.damage.count("checksum") == 1
-    with pytest.raises(RecordingError, match="checksum"):
-        list(open_recording(path, strict=True).messages())
 
 
 def test_payloads_that_cannot_be_decoded_are_counted(tmp_path):
@@ -187,8 +183,6 @@ def test_payloads_that_cannot_be_decoded_are_counted(tmp_path):
     for _ in range(2):
         assert [time_ns for _, time_ns, _ in recording.messages()] == [0, 2]
         assert recording.damage == "/covariates/a: 2 messages cannot be decoded"
-    with pytest.raises(RecordingError, match="/covariates/a at log time 1 ns"):
-        list(open_recording(path, strict=True).messages())
 
 
 def test_a_folder_whose_recorder_crashed_is_read_by_its_files(tmp_path, timeline, written):
@@ -197,8 +191,6 @@ def test_a_folder_whose_recorder_crashed_is_read_by_its_files(tmp_path, timeline
     recording = open_recording(path)
     assert len(list(recording.messages())) == 16
     assert "metadata.yaml is missing" in recording.damage
-    with pytest.raises(RecordingError, match="metadata.yaml is missing"):
-        open_recording(path, strict=True)
 
 
 METADATA = "rosbag2_bagfile_information: {{storage_identifier: {}, relative_file_paths: [{}]{}}}"

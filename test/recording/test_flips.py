@@ -140,8 +140,6 @@ def test_behind_a_damaged_chunk_reading_goes_on_and_the_loss_is_told(
     if lost:
         assert "/joint_states: 60 messages stated, " in recording.damage
     assert "damaged from byte" in recording.damage or "lost with its chunk" in recording.damage
-    with pytest.raises(RecordingError, match=r"damaged\.mcap"):
-        open_recording(path, strict=True)
 
 
 def test_the_summary_of_another_recording_is_not_believed(tmp_path, timeline):

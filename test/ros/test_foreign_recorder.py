@@ -9,9 +9,10 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
+from undamaged import undamaged
 
 from wrist_stiffness.commands.replay import replay
-from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording import read_samples
 from wrist_stiffness.ros.qos import RELIABLE_QOS
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
@@ -96,7 +97,7 @@ def heard(graph):
 @pytest.mark.parametrize("store", STORES.values(), ids=STORES)
 def test_what_rclpy_sends_is_read_whole_from_every_recorder(tmp_path, heard, model_path, store):
     path = store(tmp_path / "foreign", heard)
-    recording = open_recording(path, strict=True)
+    recording = undamaged(path)
     raw = list(recording.raw_messages())
     assert {topic.name: topic.count for topic in recording.topics} == dict.fromkeys(TYPES, COUNT)
     assert [(each.channel.topic, each.log_time_ns, each.payload) for each in raw] == heard

@@ -30,11 +30,9 @@ def vector(values: Mapping[str, float], pattern: str) -> Array:
 SHIFT, TURN = "shift_{}_um", "turn_{}_mdeg"
 
 
-def twist_parameters(
-    shift: tuple[float, float], turn: tuple[float, float]
-) -> tuple[Parameter, ...]:
-    """Return six parameters of a small screw, from (bound, prior scale) of shift and turn."""
-    return (*symmetric_vector(SHIFT, *shift), *symmetric_vector(TURN, *turn))
+def twist_parameters() -> tuple[Parameter, ...]:
+    """Return six parameters of a small screw: where something was set up by hand."""
+    return (*symmetric_vector(SHIFT, 1e5, 1000.0), *symmetric_vector(TURN, 2e4, 200.0))
 
 
 def twist(values: Mapping[str, float]) -> Array:

@@ -54,10 +54,9 @@ class Recording:
         By name; also those that cannot be decoded.
     """
 
-    def __init__(self, path: Path, indices: list[McapIndex], bag: Bag, strict: bool):
+    def __init__(self, path: Path, indices: list[McapIndex], bag: Bag):
         self.path = path
         self._indices = indices
-        self._strict = strict
         # Texts in order of discovery; a second reading meets the same flaws again.
         self._flaws: dict[str, None] = {}
         self._undecodable: Counter[str] = Counter()
@@ -65,7 +64,7 @@ class Recording:
         self.topics = topics_of(indices)
         flaws = [flaw for index in indices for flaw in index.flaws]
         for flaw in [*bag.flaws, *flaws, *_check_counts(self.topics, bag.counts)]:
-            self._report(flaw)
+            self._flaws[flaw] = None
 
     @property
     def damage(self) -> str:
@@ -94,11 +93,6 @@ class Recording:
         RawMessage
             Ties in log time come in the order of the file.  Memory is bounded by the chunks that
             overlap in time.
-
-        Raises
-        ------
-        RecordingError
-            If the recording was opened as strict and a chunk is damaged.
         """
         for part in self._parts(topics):
             yield from part.messages()
@@ -200,11 +194,6 @@ class Recording:
         ------
         tuple[str, array, Payloads]
             Topic, log times [ns] and payloads, in their order.
-
-        Raises
-        ------
-        RecordingError
-            If the recording was opened as strict and a chunk is damaged.
         """
         for block in self.blocks(topics, PAYLOADS_AT_A_TIME):
             for topic, rows in block.topics().items():
@@ -222,11 +211,6 @@ class Recording:
         ------
         tuple[str, int, Message]
             Topic, log time [ns], message.
-
-        Raises
-        ------
-        RecordingError
-            If the recording was opened as strict and a chunk or a payload is damaged.
         """
         self._undecodable.clear()
         for channel, log_time_ns, payload in self.raw_messages(topics):
@@ -235,10 +219,7 @@ class Recording:
                 continue
             try:
                 message = decode(message_type, payload)
-            except RecordingError as error:
-                if self._strict:
-                    place = f"{self.path}: {channel.topic} at log time {log_time_ns} ns"
-                    raise RecordingError(f"{place}: {error}") from error
+            except RecordingError:
                 self._undecodable[channel.topic] += 1
                 continue
             yield channel.topic, log_time_ns, message
@@ -254,30 +235,23 @@ class Recording:
         try:
             contents = contents_of(chunk)
             if flaw := index.disagreement(contents, position):
-                self._report(flaw)
+                self._flaws[flaw] = None
         except RecordingError as error:
-            self._report(f"{error}, left out: {index.told(index.chunk_spans[position])}")
+            self._flaws[f"{error}, left out: {index.told(index.chunk_spans[position])}"] = None
             return None
         self._recent[chunk] = contents
         while sum(kept.uncompressed_size for kept in self._recent) > RECENT_BYTES:
             del self._recent[next(iter(self._recent))]
         return contents
 
-    def _report(self, flaw: str) -> None:
-        if self._strict:
-            raise RecordingError(f"{self.path}: {flaw}")
-        self._flaws[flaw] = None
 
-
-def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Recording:
+def open_recording(path: str | PathLike[str]) -> Recording:
     """Open a recording for reading.
 
     Parameters
     ----------
     path : str or PathLike
         A rosbag2 folder or an MCAP file.
-    strict : bool
-        Raise at the first damage instead of giving what is there.
 
     Returns
     -------
@@ -287,15 +261,14 @@ def open_recording(path: str | PathLike[str], *, strict: bool = False) -> Record
     Raises
     ------
     RecordingError
-        If the path is missing, empty, no recording, or of a storage other than MCAP; with `strict`
-        also if it is cut.
+        If the path is missing, empty, no recording, or of a storage other than MCAP.
     """
     path = Path(path)
     # Unlike Path.exists, this one takes a name that is too long or has a zero byte.
     if not os.path.exists(path):
         raise RecordingError(f"{path} does not exist")
     bag = bag_of(path) if path.is_dir() else Bag([path])
-    return Recording(path, [index_mcap(file) for file in bag.files], bag, strict)
+    return Recording(path, [index_mcap(file) for file in bag.files], bag)
 
 
 def _earlier(opened: dict[int, RawBlock], start_ns: int, order: int) -> Iterator[RawBlock]:

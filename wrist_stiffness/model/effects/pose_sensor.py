@@ -27,7 +27,7 @@ class MeasurementFrame(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the screw."""
-        return twist_parameters((1e5, 1000.0), (2e4, 200.0))
+        return twist_parameters()
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
@@ -50,7 +50,7 @@ class TargetMounting(Law):
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the screw."""
-        return twist_parameters((1e5, 1000.0), (2e4, 200.0))
+        return twist_parameters()
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
