@@ -40,12 +40,6 @@ def spurious(line: Line) -> int:
     return sum(not right(line, names) for names in line["named"])
 
 
-def held_out_left(line: Line) -> float:
-    """Return the mean square of what an answer leaves of held-out units, in units of the noise."""
-    after = line["held_out"][1]
-    return max((after[key] / line["noise"][key]) ** 2 for key in after)
-
-
 def claims(lines: Sequence[Line]) -> tuple[Array, NDArray[np.bool_]]:
     """Return the probability of every class that was found or suspected, and whether it is true."""
     told = [
@@ -175,10 +169,6 @@ def main() -> None:
         print(f"\ncalibration error of {name}: {calibration_error(*told):.3f} of {len(told[1])}")
         for mean, count, hits in binned(*told):
             print(f"  told {100 * mean:3.0f} %: {hits} of {count}")
-    left = sorted(held_out_left(line) for line in lines if line["named"] and not spurious(line))
-    print(
-        f"\nright answers leave on held-out units, in noise: {', '.join(f'{x:.3g}' for x in left)}"
-    )
     spent = np.array([line["cpu_s"] for line in lines])
     print(f"\nCPU: median {np.median(spent):.0f} s, 90 % {np.quantile(spent, 0.9):.0f} s")
     print(f"longest {spent.max():.0f} s")
