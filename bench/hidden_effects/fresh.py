@@ -2,6 +2,9 @@
 
     python bench/hidden_effects/fresh.py run --output results.jsonl [--part 0/2] [--only KIND]
 
+A list that was looked at while the search was mended is no longer fresh.  `unseen` asks every
+effect and every stranger once, on wrists from `--first` on, which nothing else may have used.
+
 With `--names` answers are judged by their names alone: the dictionary of all effects costs hours.
 
 `fresh_cases.json` was drawn with `draw` and committed before any search was asked.  The same file
@@ -111,6 +114,16 @@ def listed() -> list[tuple[str, Case, int, bool]]:
     return found
 
 
+def unseen(first: int) -> list[tuple[str, Case, int, bool]]:
+    """Return every stranger and every effect once, in wrists and noise of seeds from `first` on."""
+    pool = [("outside", place, 10.0) for place in one_each(STRANGERS)]
+    pool += [("single", place, 3.0) for place in one_each(CATALOGUE)]
+    return [
+        (group, Case((place,), size, seed=first + number), 1, True)
+        for number, (group, place, size) in enumerate(pool)
+    ]
+
+
 def posed(case: Case, days: int) -> tuple[Riddle, list[MeasuredSession]]:
     """Return a riddle, whose second day judges, and the sessions that a search may see."""
     riddle = pose_riddle(case)
@@ -187,12 +200,18 @@ def by_names(line: dict[str, Any], riddle: Riddle) -> dict[str, Any]:
     return {"kind": kind, "plausible": plausible, "inside": any(hits), "found": found}
 
 
-def run(output: Path, part: tuple[int, int], only: str, names: bool) -> None:
+def run(
+    riddles: Sequence[tuple[str, Case, int, bool]],
+    output: Path,
+    part: tuple[int, int],
+    only: str,
+    names: bool,
+) -> None:
     """Ask all riddles of a part that have no line yet."""
     done = set()
     if output.exists():
         done = {json.loads(line)["seed"] for line in output.read_text().splitlines()}
-    for number, (group, case, days, stated) in enumerate(listed()):
+    for number, (group, case, days, stated) in enumerate(riddles):
         if number % part[1] != part[0] or case.seed in done or only not in group:
             continue
         line = answer(group, case, days, stated, names)
@@ -204,20 +223,22 @@ def run(output: Path, part: tuple[int, int], only: str, names: bool) -> None:
 def main() -> None:
     """Draw, run or tell."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("draw", "run"))
+    parser.add_argument("what", choices=("draw", "run", "unseen"))
     parser.add_argument("--output", type=Path, default=Path("fresh.jsonl"))
     parser.add_argument("--part", default="0/1", help="which of how many parts of the list")
     parser.add_argument("--only", default="", help="only groups whose name holds this")
     parser.add_argument(
         "--names", action="store_true", help="judge names alone; a dictionary costs hours"
     )
+    parser.add_argument("--first", type=int, default=9101, help="seed of the first unseen wrist")
     given = parser.parse_args()
     if given.what == "draw":
         rows = [json.dumps(each) for each in draw()]
         LIST.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
         return
     first, count = map(int, given.part.split("/"))
-    run(given.output, (first, count), given.only, given.names)
+    riddles = unseen(given.first) if given.what == "unseen" else listed()
+    run(riddles, given.output, (first, count), given.only, given.names)
 
 
 if __name__ == "__main__":
