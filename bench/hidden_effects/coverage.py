@@ -119,7 +119,7 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
         inside = sum(abs(each) < CENTRAL for each in off)
         hits += inside
         told = ", ".join(f"{each:.1f}" for each in off)
-        rows.append(f"| {name.rstrip(':')} | {inside} of {len(own)} | {told} |")
+        rows.append(f"| {name.removesuffix(':plain')} | {inside} of {len(own)} | {told} |")
     low, high = wilson(hits, len(kept))
     share = f"{100 * low:.0f} to {100 * high:.0f} %"
     return "\n".join([*rows, f"together {hits} of {len(kept)} (95 %: {share})"])

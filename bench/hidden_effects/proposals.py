@@ -40,8 +40,8 @@ from wrist_stiffness.identification.proposal import Proposal
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.blocks import time_blocks
-from wrist_stiffness.inference.evidence import evidence
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

@@ -1,39 +1,11 @@
-"""`--json FILE`: complete, or not at all, and never in the place of something else."""
+"""`--json FILE`: complete, or one clear error; devices and links are those of `atomic_file`."""
 
-import json
 import os
-import threading
 
 import pytest
 
 from wrist_stiffness.cli.output import write_json
 from wrist_stiffness.errors import InputError
-
-
-def test_pipe_gets_the_result_and_stays_a_pipe(tmp_path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    received = []
-    reader = threading.Thread(target=lambda: received.append(pipe.read_text()))
-    reader.start()
-    # Opened here too, so that the reader ends even if nothing is written.
-    guard = os.open(pipe, os.O_WRONLY)
-    write_json(pipe, {"s_um": 1.5})
-    os.close(guard)
-    reader.join()
-    assert pipe.is_fifo()
-    assert json.loads(received[0]) == {"s_um": 1.5}
-
-
-def test_link_stays_a_link_to_the_new_result(tmp_path):
-    (tmp_path / "results").mkdir()
-    target = tmp_path / "results" / "old.json"
-    target.write_text("old")
-    link = tmp_path / "latest.json"
-    link.symlink_to(target)
-    write_json(link, [1])
-    assert link.is_symlink()
-    assert json.loads(target.read_text()) == [1]
 
 
 @pytest.mark.parametrize("name", ["folder", "missing/x.json"])

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy import integrate
 from scipy.stats import multivariate_normal, multivariate_t
 
-from wrist_stiffness.inference.evidence import TAIL, Evidence, evidence, log_size_prior
+from wrist_stiffness.inference.amplitudes import evidence
+from wrist_stiffness.inference.evidence import TAIL, Evidence, log_size_prior
 from wrist_stiffness.inference.point import Background, Group, Point
 
 ROWS = 14

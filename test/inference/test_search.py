@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import probabilities, read, standings
-from wrist_stiffness.inference.evidence import evidence
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.search import LEADERS, Search, Trial
 

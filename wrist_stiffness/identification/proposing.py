@@ -20,8 +20,9 @@ from wrist_stiffness.identification.forms import Form, Shape, Span, evaluated, f
 from wrist_stiffness.identification.proposal import Proposal, Proposals, twins
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import MEMBER, NAMING
-from wrist_stiffness.inference.evidence import TAIL, Evidence, evidence
+from wrist_stiffness.inference.evidence import TAIL, Evidence
 from wrist_stiffness.inference.point import OUTSIDE
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel

@@ -294,8 +294,7 @@ def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, f
     """Return the parameters of an effect and their standard uncertainties, in their units."""
     places = state.fit.places[name]
     known = {each.key: each for each in effect.parameters}
-    evidence = replace(state.evidence, point=state.fit.whole)
-    sigma = np.sqrt(np.diag(evidence.covariance_of_fit)[places])
+    sigma = np.sqrt(np.diag(state.fit.covariance_by(state.evidence))[places])
     keys = [state.fit.base.problem.unknowns[place].key for place in places]
     return {
         key: (effect.estimates[key].value, float(own * known[key].scale))

@@ -12,7 +12,8 @@ from scipy.optimize import lsq_linear
 
 from wrist_stiffness.identification.base_fit import BaseFit
 from wrist_stiffness.identification.likelihood import WristTable
-from wrist_stiffness.inference.evidence import Evidence, evidence, known_noise
+from wrist_stiffness.inference.amplitudes import evidence
+from wrist_stiffness.inference.evidence import Evidence, known_noise
 from wrist_stiffness.inference.giving import WAYS, Give, given
 from wrist_stiffness.inference.point import Point
 from wrist_stiffness.mechanism.components import Array
@@ -164,8 +165,17 @@ class WristFit:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the steps of all unknowns where a fit has settled, (p, p)."""
-        found = replace(self.evidence, point=self.whole)
-        return found.covariance_of_fit * np.outer(self.ratio, self.ratio)
+        return self.covariance_by(self.evidence) * np.outer(self.ratio, self.ratio)
+
+    def covariance_by(self, found: Evidence) -> Array:
+        """Covariance of all unknowns of `point`, by its evidence; what stands at a bound may move.
+
+        Parameters
+        ----------
+        found : Evidence
+            Of this fit.
+        """
+        return replace(found, point=self.whole).covariance_of_fit
 
     def settled(self) -> WristFit:
         """Return the most probable values beside noise and drift as they are known.

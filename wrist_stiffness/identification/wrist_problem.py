@@ -28,7 +28,7 @@ from wrist_stiffness.identification.likelihood import WristTable, likelihood_of
 from wrist_stiffness.identification.own_law import Beyond
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.wrist_fit import WristFit
-from wrist_stiffness.inference.evidence import evidence
+from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.point import Background, Point
 from wrist_stiffness.inference.search import Ranked, Trial, ranked
 from wrist_stiffness.mechanism.components import Array

@@ -12,15 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wrist_stiffness.inference.amplitudes import further, settled
 from wrist_stiffness.inference.answer import MEMBER
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT
-from wrist_stiffness.inference.evidence import (
-    OFF,
-    Array,
-    Evidence,
-    further,
-    settled,
-)
+from wrist_stiffness.inference.evidence import OFF, Array, Evidence
 from wrist_stiffness.inference.point import Background, Point
 
 HELD = 3.0

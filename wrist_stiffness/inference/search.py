@@ -14,7 +14,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wrist_stiffness.inference.evidence import ENOUGH, Array, Evidence, evidence
+from wrist_stiffness.inference.amplitudes import ENOUGH, evidence
+from wrist_stiffness.inference.evidence import Array, Evidence
 from wrist_stiffness.inference.giving import GIVES, WAYS
 from wrist_stiffness.inference.point import Background, Point
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import (
     NAMING,
     Class,
@@ -21,7 +22,6 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.candidates import Candidate
-from wrist_stiffness.inference.evidence import evidence
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem, linear_problem
 from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns

@@ -1,0 +1,167 @@
+"""The amplitudes of what has no name: those of the largest evidence (MacKay 1992)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from wrist_stiffness.inference.evidence import (
+    OFF,
+    Array,
+    Evidence,
+    beside_known,
+    log_amplitude,
+    log_excess,
+)
+from wrist_stiffness.inference.point import Background, Group, Point
+
+LAST_STEPS = 3
+"""Steps to the most probable unknowns where slopes hold everywhere; only the tails of the priors
+ask for more than one."""
+
+AMPLITUDES = np.geomspace(0.02, 1e4, 60)
+"""Sizes of a group, in scatters of a unit, among which the best is sought first."""
+
+MOST_STEPS, ENOUGH = 15, 0.1
+"""Steps of the search for the amplitudes, and the gain of log evidence below which it ends."""
+
+LOG_EXCESS = np.linspace(-0.7, 16.0, 1600)
+"""Logarithms of the excess among which the best is sought."""
+
+
+def evidence(point: Point, background: Background, near: Evidence | None = None) -> Evidence:
+    """Return a fitted set at the amplitudes of its largest evidence.
+
+    Groups of the discrepancy that do not pay are not there.
+
+    Parameters
+    ----------
+    point : Point
+        Where its fit ended.
+    background : Background
+        Of the table; of a part no further groups are asked.
+    near : Evidence, optional
+        Of a set like it, beside the same background: where the search for the amplitudes begins.
+    """
+    at = beside_known(point, background) if near is None else settled(replace(near, point=point))
+    while background.whole is None:
+        asked = {n: size for n, (gain, size) in further(at, background).items() if gain > 0.0}
+        tried = _pruned(settled(_beside(at, {**_sizes(at), **asked}))) if asked else at
+        if tried.log < at.log + ENOUGH:
+            break
+        at = tried
+    at = _pruned(settled(at))
+    for _ in range(LAST_STEPS if point.linear else 0):
+        at = replace(at, point=at.point.moved(at.step))
+    return at
+
+
+def settled(at: Evidence) -> Evidence:
+    """Return a set at the best amplitudes of the groups that are there."""
+    for _ in range(MOST_STEPS):
+        trial = _improved(at)
+        gained = trial.log - at.log
+        at = trial if gained > 0.0 else at
+        if gained < ENOUGH:
+            break
+    return at
+
+
+def further(at: Evidence, background: Background) -> dict[int, tuple[float, float]]:
+    """Return what groups that are not there would add, all else held.
+
+    Parameters
+    ----------
+    at : Evidence
+        Of a set beside a part of the background.
+    background : Background
+        The whole.
+
+    Returns
+    -------
+    dict of int to (float, float)
+        By the place of each absent group: gain of log evidence at its best amplitude, and that.
+    """
+    absent = background.part(set(range(len(background.groups))) - set(at.background.numbers))
+    if not absent.groups:
+        return {}
+    whole_gram = background.gram[np.ix_(at.background.places, absent.places)]
+    mixed = np.vstack([at.point.mixed(absent), whole_gram])
+    blocks = [each.columns.T @ each.columns for each in absent.groups]
+    scores = at.scores(mixed, absent.products(at.point.left), blocks)
+    found = {}
+    for number, group, score in zip(absent.numbers, absent.groups, scores, strict=True):
+        gain, size = _group_gain(*score, group)
+        found[number] = gain + (0.0 if group.expected else background.log_odds), size
+    return found
+
+
+def _group_gain(information: Array, slope: Array, group: Group) -> tuple[float, float]:
+    """Return what a group adds to the log evidence at its best amplitude, and that."""
+    sizes, vectors = np.linalg.eigh(information)
+    along, sizes = (vectors.T @ slope) ** 2, np.maximum(sizes, 0.0)
+    squares = AMPLITUDES[:, None] ** 2
+    found = 0.5 * np.sum(squares * along / (1.0 + squares * sizes) - np.log1p(squares * sizes), 1)
+    found += [log_amplitude(float(each), group, len(slope)) for each in AMPLITUDES]
+    best = int(np.argmax(found))
+    return float(found[best]), float(AMPLITUDES[best])
+
+
+def _sizes(at: Evidence) -> dict[int, float]:
+    """Return the amplitudes of the groups that are there by their places in the whole."""
+    return dict(zip(at.background.numbers, at.amplitude.tolist(), strict=True))
+
+
+def _beside(at: Evidence, sizes: Mapping[int, float]) -> Evidence:
+    """Return a set beside other groups of the whole, at these amplitudes."""
+    ground = (at.background.whole or at.background).part(sizes)
+    amplitude = np.array([sizes[number] for number in ground.numbers])
+    return replace(at, background=ground, amplitude=amplitude)
+
+
+def _pruned(at: Evidence) -> Evidence:
+    """Return a set without the groups of the discrepancy that do not pay."""
+    sizes = _sizes(at)
+    for number, group in zip(at.background.numbers, at.background.groups, strict=True):
+        if group.expected:
+            continue
+        absent = _beside(at, {n: size for n, size in sizes.items() if n != number})
+        if absent.log > at.log:
+            at = absent
+            del sizes[number]
+    return at
+
+
+def _improved(at: Evidence) -> Evidence:
+    """Return fixed points of the evidence's slope, one step on (MacKay 1992)."""
+    ground = at.background
+    second = at.unnamed**2 + at.variances[len(at.variances) - len(ground.group) :]
+    squares = np.bincount(ground.group, second, minlength=len(ground.groups))
+    amplitude = [
+        _amplitude(float(square), int(count), group)
+        for square, count, group in zip(squares, ground.sizes, ground.groups, strict=True)
+    ]
+    # Of the products times the covariance, the inverse of products over excess plus precision.
+    trace = at.excess * float(np.sum(1.0 - at.precision * at.variances))
+    excess = _excess(at.square + trace, at.point.count, ground.noise_width)
+    return replace(at, amplitude=np.array(amplitude), excess=excess)
+
+
+def _amplitude(square: float, count: int, group: Group) -> float:
+    size = float(np.sqrt(square / count))
+    for _ in range(5):
+        if group.expected:
+            slope = float(np.log(size / group.expected)) / group.width**2
+        else:
+            # Of the logarithm of a half-Cauchy density of scale 1 over the logarithm of the size.
+            slope = (size**2 - 1.0) / (size**2 + 1.0)
+        size = float(np.sqrt(square / max(count + slope, 0.3 * count)))
+    return max(size, OFF)
+
+
+def _excess(square: float, count: int, width: float) -> float:
+    grid = np.exp(LOG_EXCESS)
+    log = -0.5 * (count * LOG_EXCESS + square / grid) + log_excess(grid, width)
+    return float(grid[np.argmax(log)])
