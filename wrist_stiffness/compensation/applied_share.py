@@ -17,24 +17,15 @@ class AppliedShare:
 
     While the moment of a contact works against the correction's turn, the part falls towards none.
     It comes back when the command has left that place, never before, so that nothing can oscillate.
-
-    Attributes
-    ----------
-    value : float
-        [-].
-    sure : bool
-        Whether it is known what is carried; where it is not, the correction fades.
-    against : (3,) float or None
-        Moment of a contact, along u, v and down; None where there is none [N m].
-    place : (2,) float or None
-        Command at which the correction yielded [rad].
     """
 
     def __init__(self) -> None:
-        self.value = 1.0
+        self.value = 1.0  # [-]
+        # whether it is known what is carried; where it is not, the correction fades
         self.sure = False
+        # (3,), moment of a contact, along u, v and down; None where there is none [N m]
         self.against: Row | None = None
-        self.place: list[float] | None = None
+        self.place: list[float] | None = None  # (2,), command at which the correction yielded [rad]
 
     @property
     def settled(self) -> bool:

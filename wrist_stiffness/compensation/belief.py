@@ -56,16 +56,11 @@ TEXTS = ("", NO_LOAD, NEW_WEIGHT, NO_WEIGHT, CHANGES)
 class Belief:
     """What is kept from command to command.
 
-    Attributes
-    ----------
-    scatter : Thresholds
-        The least thresholds, from the noise of the load.
-    followed : Load or None
-        The last load that was followed as it was measured.
+    `followed`: the last load that was followed as it was measured.
     """
 
     def __init__(self) -> None:
-        self.scatter = Thresholds(0.0, 0.0)
+        self.scatter = Thresholds(0.0, 0.0)  # the least thresholds, from the noise of the load
         self._scales: Scales | None = None
         self._expected: Payload | None = None
         self._told = False

@@ -18,47 +18,26 @@ from wrist_stiffness.mechanism.components import Array
 
 
 class CorrectedCommand(NamedTuple):
-    """What to send to the motors for one command.
+    """What to send to the motors for one command."""
 
-    Parameters
-    ----------
-    frame_id : str
-        For the header: `wrist_corrected` where correction is on or still fades out.
-    positions : (n,) float
-        All joints of the command, the motors corrected [rad].
-    theta : (2,) float
-        Corrected motor angles [rad].
-    correction : Correction or None
-        As it is applied, with the residual that remains; None while none can be had.
-    fault : WristError or None
-        Why none can be had although correction is on (what was applied before then fades out), or
-        why the model could not remember the command.
-    valid : bool
-        Whether the residual holds: the load is known and corrected for in full
-        (`Supervisor.valid`).
-    """
-
-    frame_id: str
-    positions: Array
-    theta: Array
+    frame_id: str  # for the header: `wrist_corrected` where correction is on or still fades out
+    positions: Array  # (n,), all joints of the command, the motors corrected [rad]
+    theta: Array  # (2,), corrected motor angles [rad]
+    # as it is applied, with the residual that remains; None while none can be had
     correction: Correction | None
+    # why none can be had although correction is on (what was applied before then fades out), or why
+    # the model could not remember the command
     fault: WristError | None
+    # whether the residual holds: the load is known and corrected for in full (`Supervisor.valid`)
     valid: bool = False
 
     def residuals(self, tool_point: Array) -> list[tuple[Array, Array]]:
         """Return what a correction leaves: actual minus desired pose.
 
-        Parameters
-        ----------
-        tool_point : (3,) float
-            Of the geometry, in U [m].
-
-        Returns
-        -------
-        list of ((6,) float, (6, 6) float)
-            Twist in F at O and its covariance, and the same at the tool point where that is not O;
-            empty without a correction.  Where the residual does not hold, the covariance says so as
-            that of a pose does that is not measured.
+        `tool_point` (3,): of the geometry, in U [m].  Gives list of ((6,), (6, 6)): twist in F at O
+        and its covariance, and the same at the tool point where that is not O; empty without a
+        correction.  Where the residual does not hold, the covariance says so as that of a pose does
+        that is not measured.
         """
         if self.correction is None:
             return []
@@ -69,55 +48,26 @@ class CorrectedCommand(NamedTuple):
 
 @dataclass(frozen=True)
 class CorrectedTrajectory:
-    """What to send for a whole trajectory.
+    """What to send for a whole trajectory."""
 
-    Parameters
-    ----------
-    frame_id : str
-        For the header: `wrist_corrected` where correction is on.
-    points : tuple of PlannedPoint
-        The motors' angles, speeds and accelerations corrected.
-    fault : WristError or None
-        Why it passes unchanged although correction is on.
-    valid : bool
-        As of a command, at its start.
-    """
-
-    frame_id: str
-    points: tuple[PlannedPoint, ...]
-    fault: WristError | None
-    valid: bool = False
+    frame_id: str  # for the header: `wrist_corrected` where correction is on
+    points: tuple[PlannedPoint, ...]  # the motors' angles, speeds and accelerations corrected
+    fault: WristError | None  # why it passes unchanged although correction is on
+    valid: bool = False  # as of a command, at its start
 
 
 @dataclass(frozen=True)
 class CorrectedBlock:
-    """What to send to the motors for n commands.
+    """What to send to the motors for n commands."""
 
-    Parameters
-    ----------
-    theta : (n, 2) float
-        Corrected motor angles [rad].
-    corrected : (n,) bool
-        Which of them have a correction; residual and covariance of the others are undefined.
-    after : (n, 6) float
-        Residual with the correction as it is applied, at O in F [m, rad].
-    covariance : (n, 6, 6) float
-        Of the prediction behind it.
-    faults : dict of int to WristError
-        Why a command has none.
-    platform : (n, 3, 3) float
-        U -> F of the rigid platform at the corrected angles.
-    valid : (n,) bool
-        As `CorrectedCommand.valid`.
-    """
-
-    theta: Array
+    theta: Array  # (n, 2), corrected motor angles [rad]
+    # (n,), which of them have a correction; residual and covariance of the others are undefined
     corrected: Flags
-    after: Array
-    covariance: Array
-    faults: dict[int, WristError]
-    platform: Array
-    valid: Flags
+    after: Array  # (n, 6), residual with the correction as it is applied, at O in F [m, rad]
+    covariance: Array  # (n, 6, 6), of the prediction behind it
+    faults: dict[int, WristError]  # why a command has none
+    platform: Array  # (n, 3, 3), U -> F of the rigid platform at the corrected angles
+    valid: Flags  # (n,), as `CorrectedCommand.valid`
 
     @classmethod
     def of(cls, answers: Iterable[CorrectedCommand], n: int) -> CorrectedBlock:

@@ -30,24 +30,13 @@ ANSWERS = 0.5
 
 
 class Correction(NamedTuple):
-    """Corrected motor angles and what remains.
+    """Corrected motor angles and what remains."""
 
-    Parameters
-    ----------
-    delta : (2,) float
-        To be added to the command [rad].
-    after : (6,) float
-        Residual twist with the correction, actual minus desired, at O in F [m, rad].
-    prediction : Prediction
-        At the corrected angles, or so near to them that the twist is the same.
-    jacobian : (3, 2) float
-        Of the platform's angular velocity, at the command.
-    """
-
-    delta: Array
+    delta: Array  # (2,), to be added to the command [rad]
+    # (6,), residual twist with the correction, actual minus desired, at O in F [m, rad]
     after: Array
-    prediction: Prediction
-    jacobian: Array
+    prediction: Prediction  # at the corrected angles, or so near to them that the twist is the same
+    jacobian: Array  # (3, 2), of the platform's angular velocity, at the command
 
 
 def correct(
@@ -148,16 +137,9 @@ def correction_of(found: CorrectedRows, place: int, model: ErrorModel, load: Loa
 def as_applied(correction: Correction, delta: Array) -> Correction:
     """Return what a correction leaves where only another one near it is applied.
 
-    Parameters
-    ----------
-    delta : (2,) float
-        What is applied instead [rad].
-
-    Returns
-    -------
-    Correction
-        With the residual moved by the rigid Jacobian; the error's own change between the two poses
-        is smaller than that by the ratio of error to pose, 1e-3.
+    `delta` (2,): what is applied instead [rad].  Gives `Correction`: with the residual moved by the
+    rigid Jacobian; the error's own change between the two poses is smaller than that by the ratio
+    of error to pose, 1e-3.
     """
     if delta.tolist() == correction.delta.tolist():
         return correction

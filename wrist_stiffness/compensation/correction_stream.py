@@ -48,24 +48,14 @@ NOTHING = np.zeros(2)
 class CorrectionStream(Stream):
     """Corrected motor angles for every command; never worse than no correction.
 
-    Parameters
-    ----------
-    model : ErrorModel or None
-        May be replaced between samples; without one commands pass unchanged.
-    enabled : bool
-        Whether commands are corrected; else they pass unchanged.
-
-    Attributes
-    ----------
-    supervisor : Supervisor
-        Judges what of the load is a payload.
-    active : bool
-        False where a correction, though enabled, is to fade out: of a node that is not active.
+    `model`: may be replaced between samples; without one commands pass unchanged.  `enabled`:
+    whether commands are corrected; else they pass unchanged.
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings, enabled: bool) -> None:
         super().__init__(model, settings)
-        self.supervisor = Supervisor()
+        self.supervisor = Supervisor()  # judges what of the load is a payload
+        # False where a correction, though enabled, is to fade out: of a node that is not active
         self.active = True
         self._corrector = Corrector()
         self._enabled = enabled
@@ -204,14 +194,8 @@ class CorrectionStream(Stream):
     ) -> CorrectedBlock:
         """Correct many commands, to the bit as `on_command` would one by one.
 
-        Parameters
-        ----------
-        stamps : (n,) int
-            Not falling [ns].
-        theta : (n, 2) float
-            Motor angles, finite and within the joint limits [rad].
-        theta_dot : (n, 2) float, optional
-            Their speeds [rad/s].
+        `stamps` (n,): not falling [ns]; `theta` (n, 2): motor angles, finite and within the joint
+        limits [rad]; `theta_dot` (n, 2): their speeds [rad/s].
         """
         running, settings, supervisor = self.running_model(), self.settings, self.supervisor
         compiled = running.compiled
@@ -275,23 +259,10 @@ class CorrectionStream(Stream):
         are those of the first step.  A trajectory is a plan: it is neither slewed nor held by the
         hysteresis, and not remembered.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its start [ns].
-        points : sequence of PlannedPoint
-            Of all these joints (see `planned_point`).
-
-        Returns
-        -------
-        CorrectedTrajectory
-            Unchanged as a whole, with the fault, if one point cannot be corrected.
-
-        Raises
-        ------
-        InputError
-            If a motor is missing, named twice or driven beyond its joint limits: it is not to be
-            forwarded.
+        `stamp_ns`: its start [ns]; `points`: of all these joints (see `planned_point`).  Gives
+        `CorrectedTrajectory`: unchanged as a whole, with the fault, if one point cannot be
+        corrected.  Raises `InputError` if a motor is missing, named twice or driven beyond its
+        joint limits: it is not to be forwarded.
         """
         motors, model, correcting = self.settings.motors, self.model, self.correcting
         places = motors.places(names, "trajectory")

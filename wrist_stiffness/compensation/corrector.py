@@ -48,19 +48,11 @@ class Corrected(NamedTuple):
 
 
 class Corrector:
-    """What one stream of commands remembers of its corrections.
-
-    Attributes
-    ----------
-    applied : AppliedCorrection
-        What is added to the commands.
-    held : (2,) float
-        The correction that was found last [rad].
-    """
+    """What one stream of commands remembers of its corrections."""
 
     def __init__(self) -> None:
-        self.applied = AppliedCorrection()
-        self.held = np.zeros(2)
+        self.applied = AppliedCorrection()  # what is added to the commands
+        self.held = np.zeros(2)  # (2,), the correction that was found last [rad]
         self._settings_of: tuple[StreamSettings, ErrorModel] | None = None
         self._task = self._safety = np.zeros(0)
         self._one: Correcting | None = None
@@ -86,18 +78,10 @@ class Corrector:
     ) -> Corrected:
         """Correct one command.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Of the command [ns].
-        theta : (2,) float
-            Commanded motor angles [rad].
-        theta_dot : (2,) float, optional
-            Their speeds [rad/s].
-        load : Load or None
-            To correct for; None where there shall be no correction, and what is applied fades out.
-        share : float or callable
-            Which part of a correction is applied, by the platform's turn (3,) [rad].
+        `stamp_ns`: of the command [ns].  `theta` (2,): commanded motor angles [rad].  `theta_dot`
+        (2,): their speeds [rad/s].  `load`: to correct for; None where there shall be no
+        correction, and what is applied fades out.  `share`: which part of a correction is applied,
+        by the platform's turn (3,) [rad].
         """
         compiled = running.compiled
         if load is not None and compiled is not None:
@@ -156,25 +140,8 @@ class Corrector:
 class Correcting:
     """A block of commands of a model that remembers nothing, on its way through a corrector.
 
-    Parameters
-    ----------
-    corrector : Corrector
-        Goes on from the command before.
-    running : RunningModel
-        Predicts.
-    compiled : CompiledWrist
-        Its compiled formulas.
-    settings : StreamSettings
-        Objective and limits.
-    commands : CompiledCommands
-        n of them.
-
-    Attributes
-    ----------
-    found : CorrectedRows
-        The corrections.
-    faults : dict of int to WristError
-        Why a command has no correction, by its place.
+    `corrector`: goes on from the command before; `running`: predicts; `compiled`: its compiled
+    formulas; `settings`: objective and limits; `commands`: n of them.
     """
 
     def __init__(
@@ -191,8 +158,8 @@ class Correcting:
         self._settings = settings
         self._task, self._safety = corrector.compiled_settings(running.model, settings)
         self.commands = commands
-        self.found = CorrectedRows.room(len(commands.wanted), compiled.sectors)
-        self.faults: dict[int, WristError] = {}
+        self.found = CorrectedRows.room(len(commands.wanted), compiled.sectors)  # the corrections
+        self.faults: dict[int, WristError] = {}  # why a command has no correction, by its place
         applied = corrector.applied
         self._state = CorrectorState(
             corrector.held, running.contact, applied.value, applied.stamp_ns

@@ -15,22 +15,14 @@ from wrist_stiffness.errors import InputError
 class HeldSignals:
     """To a sample belongs, of every name, the newest value whose stamp is not younger.
 
-    Parameters
-    ----------
-    age_limit_s : float
-        Oldest value that is still used [s]; may be changed.
-
-    Attributes
-    ----------
-    stale : tuple of str
-        Names whose values were too old for the last sample.
+    `age_limit_s`: oldest value that is still used [s]; may be changed.
     """
 
     CAPACITY = 1024
 
     def __init__(self, age_limit_s: float) -> None:
         self.age_limit_s = age_limit_s
-        self.stale: tuple[str, ...] = ()
+        self.stale: tuple[str, ...] = ()  # names whose values were too old for the last sample
         self._stamps: dict[str, list[int]] = {}
         self._values: dict[str, list[float]] = {}
 

@@ -50,24 +50,9 @@ class MotorNames:
     ) -> Array:
         """Return the motor angles of a joint state or command.
 
-        Parameters
-        ----------
-        names : sequence of str
-            In any order, other joints ignored.
-        positions : sequence of float
-            One a name [rad].
-        what : str
-            What the angles are of, for the message.
-
-        Returns
-        -------
-        (2,) float
-            Motor angles [rad].
-
-        Raises
-        ------
-        InputError
-            If a motor is missing, named twice, without a position or not finite.
+        `names`: in any order, other joints ignored; `positions`: one a name [rad]; `what`: what the
+        angles are of, for the message.  Gives (2,): motor angles [rad].  Raises `InputError` if a
+        motor is missing, named twice, without a position or not finite.
         """
         places = self.places(names, what)
         if len(positions) != len(names):
@@ -125,23 +110,14 @@ def frame_name(frame_id: str) -> str:
 
 @dataclass(frozen=True)
 class SensorFrame:
-    """A fixed transform from a sensor's frame to `wrist_base` or `wrist_platform`.
+    """A fixed transform from a sensor's frame to `wrist_base` or `wrist_platform`."""
 
-    Parameters
-    ----------
-    parent : str
-        `wrist_base` or `wrist_platform`.
-    rotation : (3, 3) float
-        Turns sensor components into the parent's.
-    position : (3,) float
-        The sensor's origin in the parent [m].
-    acts_on : str
-        `platform`, or `environment` where the sensor reports the reaction.
-    """
-
-    parent: str
+    parent: str  # `wrist_base` or `wrist_platform`
+    # (3, 3), turns sensor components into the parent's
     rotation: Array = field(default_factory=lambda: np.eye(3))
+    # (3,), the sensor's origin in the parent [m]
     position: Array = field(default_factory=lambda: np.zeros(3))
+    # `platform`, or `environment` where the sensor reports the reaction
     acts_on: Literal["platform", "environment"] = "platform"
 
 
@@ -151,18 +127,11 @@ ON_PLATFORM = SensorFrame(PLATFORM_FRAME)
 
 @dataclass(frozen=True)
 class Frames:
-    """The frames in which a wrench, a pose or markers may arrive.
+    """The frames in which a wrench, a pose or markers may arrive."""
 
-    Parameters
-    ----------
-    sensors : mapping of str to SensorFrame
-        By `frame_name`, beside `wrist_base` and `wrist_platform`.
-    prefix : str
-        Which may stand before the name of every frame, as tf2 tells robots apart.
-    """
-
+    # by `frame_name`, beside `wrist_base` and `wrist_platform`
     sensors: Mapping[str, SensorFrame] = field(default_factory=dict)
-    prefix: str = ""
+    prefix: str = ""  # which may stand before the name of every frame, as tf2 tells robots apart
 
     def own_name(self, frame_id: str) -> str:
         """Return the name of a frame without the prefix."""
@@ -171,24 +140,9 @@ class Frames:
     def load(self, frame_id: str, force: Sequence[float], moment: Sequence[float]) -> Load:
         """Move a wrench to O.
 
-        Parameters
-        ----------
-        frame_id : str
-            Frame of the message; its origin is the point of the moment.
-        force, moment : sequence of 3 float
-            [N], [N m].
-
-        Returns
-        -------
-        Load
-            At O, in F or U.
-
-        Raises
-        ------
-        FrameError
-            If the frame is neither known nor mapped.
-        InputError
-            If a component is not finite.
+        `frame_id`: frame of the message; its origin is the point of the moment.  `force`, `moment`
+        [N], [N m].  Gives `Load`: at O, in F or U.  Raises `FrameError` if the frame is neither
+        known nor mapped; `InputError` if a component is not finite.
         """
         known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: ON_PLATFORM}
         name = self.own_name(frame_id)

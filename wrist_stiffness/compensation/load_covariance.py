@@ -13,21 +13,9 @@ from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 def load_covariance(model: ErrorModel, prediction: Prediction, load: Load, noise: Array) -> Array:
     """Return the covariance of the twist that comes from the load.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Made the prediction.
-    prediction : Prediction
-        At the pose and under the load; its flange sectors in contact stay so.
-    load : Load
-        Says in which axes the noise is.
-    noise : (6,) float
-        Standard deviation of force and moment at O [N, N m].
-
-    Returns
-    -------
-    (6, 6) float
-        Of the twist at O in F [m, rad].
+    `model`: made the prediction.  `prediction`: at the pose and under the load; its flange sectors
+    in contact stay so.  `load`: says in which axes the noise is.  `noise` (6,): standard deviation
+    of force and moment at O [N, N m].  Gives (6, 6): of the twist at O in F [m, rad].
     """
     sensitivity = tangent_compliance(model, prediction)
     if load.on_platform:

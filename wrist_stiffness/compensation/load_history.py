@@ -29,18 +29,10 @@ SIGMAS = 3.0
 
 @dataclass(frozen=True)
 class Zero:
-    """What a load sensor shows without a load.
+    """What a load sensor shows without a load."""
 
-    Parameters
-    ----------
-    load : Load
-        In the frame in which loads come.
-    scatter : (6,) float
-        Standard deviations of the loads that it is the mean of [N, N m].
-    """
-
-    load: Load
-    scatter: Array
+    load: Load  # in the frame in which loads come
+    scatter: Array  # (6,), standard deviations of the loads that it is the mean of [N, N m]
 
 
 class LoadHistory:
@@ -49,22 +41,15 @@ class LoadHistory:
     Stamps alone decide, never arrival, so live nodes and replay agree wherever the load had
     arrived.  Loads are held up to an age limit and never extrapolated.
 
-    Parameters
-    ----------
-    age_limit_s : float
-        Oldest load that is still used [s]; may be changed.
-
-    Attributes
-    ----------
-    late : int
-        Loads that arrived after a joint state had been served that they belonged to: where live
-        and replayed predictions may differ.
+    `age_limit_s`: oldest load that is still used [s]; may be changed.
     """
 
     CAPACITY = 4096
 
     def __init__(self, age_limit_s: float) -> None:
         self.age_limit_s = age_limit_s
+        # loads that arrived after a joint state had been served that they belonged to: where live
+        # and replayed predictions may differ
         self.late = 0
         self._served_ns = (0, 0)
         self._stamps: list[int] = []
@@ -136,20 +121,8 @@ class LoadHistory:
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp and load that belong to a joint state.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Stamp of the joint state [ns].
-
-        Returns
-        -------
-        int, Load
-            Stamp [ns] and load.
-
-        Raises
-        ------
-        StaleLoadError
-            If there is none, or it is older than the age limit.
+        `stamp_ns`: stamp of the joint state [ns].  Gives stamp [ns] and load.  Raises
+        `StaleLoadError` if there is none, or it is older than the age limit.
         """
         if stamp_ns == 0:
             raise StaleLoadError("the sample has no stamp (zero), so no load belongs to it")
@@ -213,24 +186,9 @@ class LoadHistory:
     def mean_since(self, window_s: float, limit: Thresholds) -> Zero:
         """Return mean and scatter of the newest loads over a window, for the tare.
 
-        Parameters
-        ----------
-        window_s : float
-            Up to the newest stamp [s].
-        limit : Thresholds
-            By which another load departs.
-
-        Returns
-        -------
-        Zero
-            In the frame in which they came.
-
-        Raises
-        ------
-        StaleLoadError
-            If there is no load.
-        InputError
-            If loads in F and in U are mixed, or the load moves.
+        `window_s`: up to the newest stamp [s]; `limit`: by which another load departs.  Gives
+        `Zero`: in the frame in which they came.  Raises `StaleLoadError` if there is no load;
+        `InputError` if loads in F and in U are mixed, or the load moves.
         """
         if not self._stamps:
             raise StaleLoadError("tare: no load estimate has arrived")
@@ -260,24 +218,14 @@ class LoadHistory:
 class LoadIntake:
     """Loads as they arrive, moved to O, less the tare.
 
-    Parameters
-    ----------
-    frames : Frames
-        Frames in which loads arrive; may be changed.
-    age_limit_s : float
-        Oldest load that is still used [s].
-
-    Attributes
-    ----------
-    history : LoadHistory
-        Untared loads by stamp.
-    zero : Zero or None
-        What is subtracted; may be set to one that was measured or stored.
+    `frames`: frames in which loads arrive; may be changed.  `age_limit_s`: oldest load that is
+    still used [s].
     """
 
     def __init__(self, frames: Frames, age_limit_s: float) -> None:
         self.frames = frames
-        self.history = LoadHistory(age_limit_s)
+        self.history = LoadHistory(age_limit_s)  # untared loads by stamp
+        # what is subtracted; may be set to one that was measured or stored
         self.zero: Zero | None = None
 
     def add(

@@ -36,28 +36,10 @@ def measured_pose(
 ) -> tuple[Array, Array]:
     """Return a measured pose in F.
 
-    Parameters
-    ----------
-    frames : Frames
-        Frames in which it may come.
-    position, quaternion : sequence of 3 and 4 float
-        [m], x y z w.
-    what : str
-        What was measured, for the message.
-
-    Returns
-    -------
-    rotation : (3, 3) float
-        To F.
-    position : (3,) float
-        In F [m].
-
-    Raises
-    ------
-    FrameError
-        If the frame is neither `wrist_base` nor mapped to it.
-    InputError
-        If a number is not finite or beyond reason or the quaternion is no unit quaternion.
+    `frames`: frames in which it may come; `position`, `quaternion` [m], x y z w; `what`: what was
+    measured, for the message.  Gives `rotation` (3, 3): to F, and `position` (3,): in F [m].
+    Raises `FrameError` if the frame is neither `wrist_base` nor mapped to it; `InputError` if a
+    number is not finite or beyond reason or the quaternion is no unit quaternion.
     """
     turn, origin = frames.in_base(frame_id, what)
     numbers = np.array([*position, *quaternion], dtype=float)
@@ -121,20 +103,12 @@ def _require_near(places: Array, what: str) -> None:
 class FrameMotion:
     """How the wrist's frame has moved since a target on it was first measured.
 
-    Parameters
-    ----------
-    age_limit_s : float
-        Oldest pose of the frame that is still used [s].
-
-    Attributes
-    ----------
-    count : int
-        Poses of the frame taken in.
+    `age_limit_s`: oldest pose of the frame that is still used [s].
     """
 
     def __init__(self, age_limit_s: float) -> None:
         self._age_limit_s = age_limit_s
-        self.count = 0
+        self.count = 0  # poses of the frame taken in
         self._first: tuple[Array, Array] | None = None
         self._poses: deque[tuple[int, Array, Array]] = deque(maxlen=FRAME_POSES_KEPT)
 
@@ -148,25 +122,10 @@ class FrameMotion:
     def taken_out(self, stamp_ns: int, rotation: Array, position: Array) -> tuple[Array, Array]:
         """Return a pose of the platform as seen from the frame where it was first.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Of the platform's pose [ns].
-        rotation : (3, 3) float
-            U -> F.
-        position : (3,) float
-            In F [m].
-
-        Returns
-        -------
-        (3, 3) float, (3,) float
-            The same; unchanged where the frame was never measured.
-
-        Raises
-        ------
-        InputError
-            If the frame was measured once, but not lately: a pose with its motion left in would
-            look like a change of the wrist.
+        `stamp_ns`: of the platform's pose [ns]; `rotation` (3, 3): U -> F; `position` (3,): in F
+        [m].  Gives (3, 3), (3,): the same; unchanged where the frame was never measured.  Raises
+        `InputError` if the frame was measured once, but not lately: a pose with its motion left in
+        would look like a change of the wrist.
         """
         if self._first is None:
             return rotation, position

@@ -22,19 +22,9 @@ from wrist_stiffness.model.error_model import Prediction
 def residual_of_pose(rotation: Array, position: Array, prediction: Prediction) -> Array:
     """Return log(T_err,measured T_err,predicted^-1).
 
-    Parameters
-    ----------
-    rotation : (3, 3) float
-        Measured rotation U -> F of the platform.
-    position : (3,) float
-        Measured place of the platform's point O in F [m].
-    prediction : Prediction
-        At the measured motor angles.
-
-    Returns
-    -------
-    (6,) float
-        Twist at O in F, measured minus predicted [m, rad].
+    `rotation` (3, 3): measured rotation U -> F of the platform; `position` (3,): measured place of
+    the platform's point O in F [m]; `prediction`: at the measured motor angles.  Gives (6,): twist
+    at O in F, measured minus predicted [m, rad].
     """
     bent, shift = prediction.motion
     left = rotation @ prediction.configuration.platform.T @ bent.T
@@ -43,24 +33,13 @@ def residual_of_pose(rotation: Array, position: Array, prediction: Prediction) -
 
 @dataclass(frozen=True)
 class MonitorSettings:
-    """What counts as a change.
+    """What counts as a change."""
 
-    Parameters
-    ----------
-    noise : (6,) float
-        Standard deviation of the measured pose [m, rad].
-    baseline : int
-        Samples from which the baseline is learned.
-    slack : float
-        Changes below this are not counted [standard deviations].
-    threshold : float
-        Sum at which there is an alarm [standard deviations]; 15 means one false alarm in about a
-        million samples of white noise.
-    """
-
-    noise: Array
-    baseline: int = 500
-    slack: float = 0.5
+    noise: Array  # (6,), standard deviation of the measured pose [m, rad]
+    baseline: int = 500  # samples from which the baseline is learned
+    slack: float = 0.5  # changes below this are not counted [standard deviations]
+    # sum at which there is an alarm [standard deviations]; 15 means one false alarm in about a
+    # million samples of white noise
     threshold: float = 15.0
 
     def __post_init__(self) -> None:
@@ -72,23 +51,13 @@ class MonitorSettings:
 class ResidualMonitor:
     """Statistics and change alarm over a stream of residuals.
 
-    Parameters
-    ----------
-    settings : MonitorSettings
-        What counts as a change.
-
-    Attributes
-    ----------
-    count : int
-        Residuals taken in.
-    alarm : bool
-        Whether the residuals have left the baseline.
+    `settings`: what counts as a change.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
-        self.count = 0
-        self.alarm = False
+        self.count = 0  # residuals taken in
+        self.alarm = False  # whether the residuals have left the baseline
         self._mean = np.zeros(6)
         self._squares = np.zeros(6)
         self._whitened_squares = np.zeros(6)

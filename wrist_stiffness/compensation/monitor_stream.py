@@ -39,41 +39,19 @@ JointStateKept = tuple[int, Array, Array | None]
 
 @dataclass(frozen=True)
 class MonitoredPose:
-    """Residual of one measured pose.
+    """Residual of one measured pose."""
 
-    Parameters
-    ----------
-    residual : (6,) float
-        Measured minus predicted; NaN where not measured [m, rad].
-    covariance : (6, 6) float
-        Of measurement and prediction together.
-    warnings : tuple of str
-        Of the prediction.
-    """
-
-    residual: Array
-    covariance: Array
-    warnings: tuple[str, ...]
+    residual: Array  # (6,), measured minus predicted; NaN where not measured [m, rad]
+    covariance: Array  # (6, 6), of measurement and prediction together
+    warnings: tuple[str, ...]  # of the prediction
 
 
 class MonitorStream(Stream):
     """Residual for every measured pose.
 
-    Parameters
-    ----------
-    model : ErrorModel or None
-        May be replaced between samples; the baseline is then learned anew.
-    monitoring : MonitorSettings
-        What counts as a change.
-    joint_age_limit_s, frame_age_limit_s : float
-        Oldest joint state and oldest pose of the frame that are still matched with a pose [s].
-
-    Attributes
-    ----------
-    monitor : ResidualMonitor
-        Statistics and alarm since the model was loaded.
-    frame : FrameMotion
-        Motion of the wrist's frame, where a target on it is measured.
+    `model`: may be replaced between samples; the baseline is then learned anew.  `monitoring`: what
+    counts as a change.  `joint_age_limit_s`, `frame_age_limit_s`: oldest joint state and oldest
+    pose of the frame that are still matched with a pose [s].
     """
 
     def __init__(
@@ -88,8 +66,10 @@ class MonitorStream(Stream):
         self._monitoring = monitoring
         self._age_limit_ns = round(joint_age_limit_s * NANOSECONDS)
         self._joints: deque[JointStateKept] = deque(maxlen=JOINT_STATES_KEPT)
+        # motion of the wrist's frame, where a target on it is measured
         self.frame = FrameMotion(frame_age_limit_s)
         self._judged: ErrorModel | None = None
+        # statistics and alarm since the model was loaded
         self.monitor = ResidualMonitor(monitoring)
 
     def on_joint_state(
@@ -144,24 +124,10 @@ class MonitorStream(Stream):
     def on_markers(self, stamp_ns: int, frame_id: str, points: ArrayLike) -> MonitoredPose:
         """Compare the platform's pose that its markers tell with the prediction.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Their stamp [ns].
-        frame_id : str
-            `wrist_base`, or mapped to it.
-        points : (n, 3) array_like
-            The geometry's readout points in their order [m]; NaN where lost.
-
-        Returns
-        -------
-        MonitoredPose
-            To be published with the markers' stamp.
-
-        Raises
-        ------
-        WristError
-            If too few are seen, or as `on_pose`.
+        `stamp_ns`: their stamp [ns].  `frame_id`: `wrist_base`, or mapped to it.  `points` (n, 3):
+        the geometry's readout points in their order [m]; NaN where lost.  Gives `MonitoredPose`: to
+        be published with the markers' stamp.  Raises `WristError` if too few are seen, or as
+        `on_pose`.
         """
         nominal = self.running_model().model.table.geometry.platform.readout_points
         pose = pose_of_markers(self.loads.frames, frame_id, points, nominal)

@@ -24,22 +24,13 @@ OBJECTIVES: tuple[ObjectiveName, ...] = ("pointing", "orientation", "tool_point"
 
 @dataclass(frozen=True)
 class Objective:
-    """What to make right.
+    """What to make right."""
 
-    Parameters
-    ----------
-    name : str
-        `pointing` (the normal's direction, two components, both cancellable), `orientation` (three,
-        in the least-squares sense) or `tool_point` (three, in the least-squares sense).
-    normal : (3,) float
-        Platform normal in U.
-    tool_point : (3,) float
-        In U [m].
-    """
-
+    # `pointing` (the normal's direction, two components, both cancellable), `orientation` (three,
+    # in the least-squares sense) or `tool_point` (three, in the least-squares sense)
     name: ObjectiveName
-    normal: Array
-    tool_point: Array
+    normal: Array  # (3,), platform normal in U
+    tool_point: Array  # (3,), in U [m]
 
     def matrix(self, configuration: Configuration) -> Array:
         """Return the matrix from a residual twist at O in F to the task error, (2 or 3, 6)."""

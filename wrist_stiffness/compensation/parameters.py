@@ -27,31 +27,16 @@ COVARIATE = re.compile("[A-Za-z][A-Za-z0-9_]*")
 
 @dataclass(frozen=True)
 class ParameterEntry:
-    """One parameter of a node.
+    """One parameter of a node."""
 
-    Parameters
-    ----------
-    name : str
-        With its unit at the end where it has one.
-    default : bool, int, float or str
-        Also says the type.
-    text : str
-        What it does, one line.
-    lower, upper : float or None
-        Range of a number.
-    choices : tuple of str
-        Allowed texts; empty for any.
-    fixed : bool
-        Can only be set at the start.
-    """
-
-    name: str
-    default: ParameterValue
-    text: str
+    name: str  # with its unit at the end where it has one
+    default: ParameterValue  # also says the type
+    text: str  # what it does, one line
+    # `lower`, `upper`: range of a number
     lower: float | None = None
     upper: float | None = None
-    choices: tuple[str, ...] = ()
-    fixed: bool = False
+    choices: tuple[str, ...] = ()  # allowed texts; empty for any
+    fixed: bool = False  # can only be set at the start
 
 
 def check_choices(entries: Sequence[ParameterEntry], values: Mapping[str, Any]) -> None:
@@ -317,20 +302,9 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
 def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     """Return the settings of the sample path of a node that does not correct.
 
-    Parameters
-    ----------
-    values : mapping
-        Parameters of `COMMON` by name.
-
-    Returns
-    -------
-    StreamSettings
-        In SI units, its corrections' part at the defaults.
-
-    Raises
-    ------
-    InputError
-        If both motors have the same name or the frames cannot be read.
+    `values`: parameters of `COMMON` by name.  Gives `StreamSettings`: in SI units, its corrections'
+    part at the defaults.  Raises `InputError` if both motors have the same name or the frames
+    cannot be read.
     """
     if values["motor_1_joint"] == values["motor_2_joint"]:
         raise InputError(f"motor_1_joint, motor_2_joint: both are {values['motor_1_joint']!r}")

@@ -32,21 +32,11 @@ Row = tuple[float, float, float]
 class Payload:
     """What the platform carries.
 
-    Parameters
-    ----------
-    mass_kg : float
-        [kg].
-    centre_m : (float, float, float)
-        Its centre of gravity in U, from O [m].
-
-    Raises
-    ------
-    InputError
-        If a number is not finite or the mass is not positive.
+    Raises `InputError` if a number is not finite or the mass is not positive.
     """
 
-    mass_kg: float
-    centre_m: Row
+    mass_kg: float  # [kg]
+    centre_m: Row  # its centre of gravity in U, from O [m]
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -57,14 +47,9 @@ class Payload:
 
 
 class Thresholds(NamedTuple):
-    """A load that departs by more than these is another load.
+    """A load that departs by more than these is another load."""
 
-    Parameters
-    ----------
-    force, moment : float
-        [N], [N m].
-    """
-
+    # `force`, `moment` [N], [N m]
     force: float
     moment: float
 
@@ -79,24 +64,12 @@ class Thresholds(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A load along u, v and down, and what its moments say of a payload.
+    """A load along u, v and down, and what its moments say of a payload."""
 
-    Parameters
-    ----------
-    side : float
-        Force across gravity [N].
-    weight : float
-        Force along gravity [N].
-    moments : (float, float, float)
-        About u, v and down [N m].
-    rows : (Row, Row)
-        What the first two moments are of Q [-].
-    """
-
-    side: float
-    weight: float
-    moments: Row
-    rows: tuple[Row, Row]
+    side: float  # force across gravity [N]
+    weight: float  # force along gravity [N]
+    moments: Row  # about u, v and down [N m]
+    rows: tuple[Row, Row]  # what the first two moments are of Q [-]
 
     @classmethod
     def of_row(cls, row: list[float]) -> Reading:
@@ -128,14 +101,8 @@ class Reading(NamedTuple):
 class PayloadEstimate:
     """Weight and moments of a payload by a Kalman filter of a constant.
 
-    Parameters
-    ----------
-    weight : float
-        [N].
-    moments : (float, float, float)
-        Weight times centre in U [N m].
-    open_moment : float
-        Standard deviation of each moment [N m]; 0 where they are known.
+    `weight` [N].  `moments`: weight times centre in U [N m].  `open_moment`: standard deviation of
+    each moment [N m]; 0 where they are known.
     """
 
     def __init__(self, weight: float, moments: Row, open_moment: float) -> None:

@@ -16,20 +16,9 @@ from wrist_stiffness.mechanism.geometry import Limits
 def require_fresh(what: str, stamp_ns: int, now_ns: int, limit_s: float) -> None:
     """Refuse a command that is older than a limit, as ros2_control's reference timeout does.
 
-    Parameters
-    ----------
-    what : str
-        For the message.
-    stamp_ns, now_ns : int
-        When it was made, and now, by the same clock [ns].
-    limit_s : float
-        Oldest command that is obeyed [s]; 0 for any.  As far ahead of the clock, a stamp says that
-        two clocks differ.
-
-    Raises
-    ------
-    StaleCommandError
-        With the age and the limit.
+    `what`: for the message.  `stamp_ns`, `now_ns`: when it was made, and now, by the same clock
+    [ns].  `limit_s`: oldest command that is obeyed [s]; 0 for any.  As far ahead of the clock, a
+    stamp says that two clocks differ.  Raises `StaleCommandError` with the age and the limit.
     """
     age_s = (now_ns - stamp_ns) / NANOSECONDS
     if limit_s and abs(age_s) > limit_s:

@@ -25,15 +25,7 @@ class RunningModel:
 
     Where effects are constant there is nothing to remember, and samples may come in any order.
 
-    Parameters
-    ----------
-    temperatures, covariates : HeldSignals
-        What the stream has heard of them.
-
-    Attributes
-    ----------
-    contact : (m,) bool
-        Flange sectors in contact at the last sample, for a model without a memory.
+    `temperatures`, `covariates`: what the stream has heard of them.
     """
 
     def __init__(
@@ -44,6 +36,7 @@ class RunningModel:
         self._covariates = covariates
         self._session: Session | None = None if model.stateless else model.session()
         self._last_ns = 0
+        # (m,), flange sectors in contact at the last sample, for a model without a memory
         self.contact: Flags = np.zeros(len(model.parts.sectors.gap), dtype=bool)
 
     def advance(
@@ -51,19 +44,9 @@ class RunningModel:
     ) -> Prediction:
         """Predict a sample and remember it.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            [ns].
-        theta : (2,) float
-            Motor angles [rad].
-        theta_dot : (2,) float, optional
-            Motor speeds; where absent the difference to the sample before [rad/s].
-
-        Raises
-        ------
-        WristError
-            If the sample is out of range or, with effects, before the last one.
+        `stamp_ns` [ns].  `theta` (2,): motor angles [rad].  `theta_dot` (2,): motor speeds; where
+        absent the difference to the sample before [rad/s].  Raises `WristError` if the sample is
+        out of range or, with effects, before the last one.
         """
         session = self._session_at(stamp_ns)
         if session is None:

@@ -19,25 +19,15 @@ LONGEST_STEP_S = 0.1
 
 @dataclass(frozen=True)
 class SafetySettings:
-    """How the correction may change and where it fades.
+    """How the correction may change and where it fades."""
 
-    Parameters
-    ----------
-    slew : float
-        Largest change of a motor's correction [rad/s].
-    deadband_steps : float
-        Error that a motor may leave before its correction moves [encoder steps]; at 0.15 it adds at
-        most 13 % to the RMS of the rounding to whole steps.
-    domain_fade : float
-        Within this distance from the border of the table's domain the correction fades [rad].
-    singularity_fade : float
-        The same for |D| above its limit [-].
-    """
-
-    slew: float = float(np.radians(0.5))
+    slew: float = float(np.radians(0.5))  # largest change of a motor's correction [rad/s]
+    # error that a motor may leave before its correction moves [encoder steps]; at 0.15 it adds at
+    # most 13 % to the RMS of the rounding to whole steps
     deadband_steps: float = 0.15
+    # within this distance from the border of the table's domain the correction fades [rad]
     domain_fade: float = float(np.radians(2.0))
-    singularity_fade: float = 0.05
+    singularity_fade: float = 0.05  # the same for |D| above its limit [-]
 
     def compiled(self, limits: Limits) -> Array:
         """Return what the compiled formulas must know, with the limits of the joints, (8,)."""
@@ -51,19 +41,8 @@ def guard_weight(
 ) -> Array:
     """Return how much of the correction is applied at poses.
 
-    Parameters
-    ----------
-    workspace : Workspace
-        The table's domain.
-    configuration : Configuration
-        Poses inside it, or one.
-    settings : SafetySettings
-        Widths of the fades.
-
-    Returns
-    -------
-    (...) float
-        1 well inside, 0 at the border, with a continuous slope in between.
+    `workspace`: the table's domain; `configuration`: poses inside it, or one; `settings`: widths of
+    the fades.  Gives (...): 1 well inside, 0 at the border, with a continuous slope in between.
     """
     lower, upper = workspace.rectangle
     theta = configuration.theta
@@ -93,18 +72,11 @@ class AppliedCorrection:
     """What is really added to the commands, and how it moves towards what is wanted.
 
     It begins at zero, so that enabling is a ramp, and ends there at the slew limit.
-
-    Attributes
-    ----------
-    value : (2,) float
-        What was added to the last command [rad].
-    stamp_ns : (1,) int
-        Its stamp [ns].
     """
 
     def __init__(self) -> None:
-        self.value = np.zeros(2)
-        self.stamp_ns = np.array([NEVER_NS])
+        self.value = np.zeros(2)  # (2,), what was added to the last command [rad]
+        self.stamp_ns = np.array([NEVER_NS])  # (1,), its stamp [ns]
 
     def reset(self) -> None:
         """Begin at zero again."""
@@ -120,23 +92,10 @@ class AppliedCorrection:
     ) -> Array:
         """Return the correction for the command of a stamp.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Of the command; one that is not later than the one before changes nothing [ns].
-        theta : (2,) float
-            Commanded angles [rad].
-        wanted : (2,) float
-            Correction that would meet the objective; zero where there shall be none [rad].
-        limits : Limits
-            Of the joints.
-        settings : SafetySettings
-            Slew.
-
-        Returns
-        -------
-        (2,) float
-            To be added to the command [rad].
+        `stamp_ns`: of the command; one that is not later than the one before changes nothing [ns].
+        `theta` (2,): commanded angles [rad].  `wanted` (2,): correction that would meet the
+        objective; zero where there shall be none [rad].  `limits`: of the joints.  `settings`:
+        slew.  Gives (2,): to be added to the command [rad].
         """
         reach = settings.slew * self._seconds_since_last(stamp_ns)
         near = self.value + between(wanted - self.value, -reach, reach)

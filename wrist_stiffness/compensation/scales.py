@@ -19,15 +19,7 @@ from wrist_stiffness.model.error_model import IN_F, IN_U, Load
 class Scales:
     """What payloads and other loads weigh on one wrist.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Gravity, and the largest moment of the table: a payload beyond it is refused anyway.
-
-    Attributes
-    ----------
-    constants : (10,) float
-        Axes u, v and down, and gravity, as compiled formulas take them.
+    `geometry`: gravity, and the largest moment of the table: a payload beyond it is refused anyway.
     """
 
     def __init__(self, geometry: Geometry) -> None:
@@ -36,6 +28,7 @@ class Scales:
         down = geometry.gravity / self._g if self._g else np.array([0.0, 0.0, -1.0])
         frame = triad(down, np.eye(3)[np.argmin(np.abs(down))])
         self._axes: list[list[float]] = [*frame[:, 1:].T.tolist(), down.tolist()]
+        # (10,), axes u, v and down, and gravity, as compiled formulas take them
         self.constants = np.append(self._axes, self._g)
 
     def read(self, table: Table, theta: Array, load: Load) -> Reading:
@@ -137,28 +130,15 @@ class Scales:
 
 @dataclass(frozen=True)
 class Held:
-    """What a plan is corrected for, from `Supervisor.held`.
+    """What a plan is corrected for, from `Supervisor.held`."""
 
-    Parameters
-    ----------
-    scales, payload : Scales, PayloadEstimate or None
-        None where there is no payload.
-    followed : Load or None
-        Where every load is followed.
-    share : float
-        Part of the correction that is applied [-].
-    valid : bool
-        Whether the load was known and corrected for, as `Supervision.valid`.
-    threshold : float
-        A moment by which a load would be another one [N m].
-    """
-
+    # `scales`, `payload`: None where there is no payload
     scales: Scales | None
     payload: PayloadEstimate | None
-    followed: Load | None
-    share: float
-    valid: bool
-    threshold: float
+    followed: Load | None  # where every load is followed
+    share: float  # part of the correction that is applied [-]
+    valid: bool  # whether the load was known and corrected for, as `Supervision.valid`
+    threshold: float  # a moment by which a load would be another one [N m]
 
     def load(self, rotation: Array) -> Load:
         """Return the load on the platform that is turned by (3, 3), U -> F."""

@@ -20,20 +20,12 @@ UNIT_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class StaticTransform:
-    """Where a child frame stands in its parent.
-
-    Parameters
-    ----------
-    rotation : (3, 3) float
-        Turns the child's components into the parent's.
-    position : (3,) float
-        The child's origin in the parent [m].
-    """
+    """Where a child frame stands in its parent."""
 
     parent: str
     child: str
-    rotation: Array
-    position: Array
+    rotation: Array  # (3, 3), turns the child's components into the parent's
+    position: Array  # (3,), the child's origin in the parent [m]
 
 
 def static_transform(
@@ -67,16 +59,9 @@ def transform_of(message: Any) -> StaticTransform:
 def sensor_frames(transforms: Iterable[StaticTransform]) -> dict[str, SensorFrame]:
     """Return every frame that hangs at `wrist_base` or `wrist_platform`, over any number of steps.
 
-    Parameters
-    ----------
-    transforms : iterable of StaticTransform
-        In any order, followed in both directions.
-
-    Returns
-    -------
-    dict of str to SensorFrame
-        By frame name.  A sensor's own transform does not say on what its wrench acts: on the
-        platform.  Between base and platform there is nothing fixed, so a chain ends at either.
+    `transforms`: in any order, followed in both directions.  Gives frames by name.  A sensor's own
+    transform does not say on what its wrench acts: on the platform.  Between base and platform
+    there is nothing fixed, so a chain ends at either.
     """
     found = {name: SensorFrame(name) for name in (BASE_FRAME, PLATFORM_FRAME)}
     left = list(transforms)

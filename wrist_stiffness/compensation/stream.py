@@ -30,27 +30,14 @@ from wrist_stiffness.model.error_model import ErrorModel, Prediction
 class Stream:
     """What all streams share: a model, the signals it needs and the settings.
 
-    Parameters
-    ----------
-    model : ErrorModel or None
-        May be replaced between samples.
-    settings : StreamSettings
-        Names, frames, limits.
-
-    Attributes
-    ----------
-    loads : LoadIntake
-        Loads by stamp, tared.
-    temperatures : HeldSignals
-        By component or `ambient` [degC].
-    covariates : HeldSignals
-        By name, in their own units.
+    `model`: may be replaced between samples; `settings`: names, frames, limits.
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings) -> None:
-        self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)
+        self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)  # loads by stamp, tared
+        # by component or `ambient` [degC]
         self.temperatures = HeldSignals(settings.signal_age_limit_s)
-        self.covariates = HeldSignals(settings.signal_age_limit_s)
+        self.covariates = HeldSignals(settings.signal_age_limit_s)  # by name, in their own units
         self._settings = settings
         self._transforms: dict[str, StaticTransform] = {}
         self.model = model
@@ -118,56 +105,32 @@ class Stream:
 
 
 class PredictedSample(NamedTuple):
-    """Prediction for one joint state.
+    """Prediction for one joint state."""
 
-    Parameters
-    ----------
-    stamp_ns, load_stamp_ns : int
-        Stamps of the joint state and of the load that belonged to it [ns].
-    prediction : Prediction
-        The pose error.
-    """
-
+    # `stamp_ns`, `load_stamp_ns`: stamps of the joint state and of the load that belonged to it
+    # [ns]
     stamp_ns: int
     load_stamp_ns: int
-    prediction: Prediction
+    prediction: Prediction  # the pose error
 
 
 @dataclass(frozen=True)
 class PredictedBlock:
-    """Predictions for n joint states.
+    """Predictions for n joint states."""
 
-    Parameters
-    ----------
-    known : (n,) bool
-        Which of them could be predicted; the rest of the others is undefined.
-    faults : dict of int to WristError
-        Why one could not, by its place.
-    warnings : Counter of str
-        Effects and signals that were left out.
-    twist : (n, 6) float
-        At O in F [m, rad].
-    covariance : (n, 6, 6) float
-        Of the twist.
-    configuration : (n, 66) float
-        The rigid wrist, as `Configuration.of_row` takes it.
-    """
-
-    known: Flags
-    twist: Array
-    covariance: Array
-    configuration: Array
-    faults: dict[int, WristError] = field(default_factory=dict)
+    known: Flags  # (n,), which of them could be predicted; the rest of the others is undefined
+    twist: Array  # (n, 6), at O in F [m, rad]
+    covariance: Array  # (n, 6, 6), of the twist
+    configuration: Array  # (n, 66), the rigid wrist, as `Configuration.of_row` takes it
+    faults: dict[int, WristError] = field(default_factory=dict)  # why one could not, by its place
+    # effects and signals that were left out
     warnings: Counter[str] = field(default_factory=Counter)
 
 
 class PredictionStream(Stream):
     """Pose error for every joint state.
 
-    Parameters
-    ----------
-    model : ErrorModel or None
-        May be replaced between samples; without one nothing is predicted.
+    `model`: may be replaced between samples; without one nothing is predicted.
     """
 
     def on_joint_state(
@@ -224,14 +187,8 @@ class PredictionStream(Stream):
 
         Where not `in_blocks` it is asked one by one.
 
-        Parameters
-        ----------
-        stamps : (n,) int
-            Not falling [ns].
-        theta : (n, 2) float
-            Motor angles [rad].
-        theta_dot : (n, 2) float, optional
-            Their speeds [rad/s].
+        `stamps` (n,): not falling [ns]; `theta` (n, 2): motor angles [rad]; `theta_dot` (n, 2):
+        their speeds [rad/s].
         """
         running, compiled = self.running_model(), None
         if self.in_blocks:

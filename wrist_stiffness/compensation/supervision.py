@@ -20,21 +20,14 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class SupervisorSettings:
-    """What counts as another load, and how far the model is trusted beside obstacles.
+    """What counts as another load, and how far the model is trusted beside obstacles."""
 
-    Parameters
-    ----------
-    limit : Thresholds
-        A load that departs by less is the same load.  Never below five times the scatter that the
-        tare found.
-    model_doubt : float
-        The wrist may be so many times stiffer or softer than the model, 1 or more [-].
-    follow : bool
-        Correct for every load as it is measured, and in full.  Only where it cannot be a contact.
-    """
-
+    # a load that departs by less is the same load.  Never below five times the scatter that the
+    # tare found
     limit: Thresholds = Thresholds(0.05, 0.002)
+    # the wrist may be so many times stiffer or softer than the model, 1 or more [-]
     model_doubt: float = 2.0
+    # correct for every load as it is measured, and in full.  Only where it cannot be a contact
     follow: bool = False
 
     @property
@@ -52,32 +45,16 @@ class SupervisorSettings:
 
 @dataclass(frozen=True)
 class Supervision:
-    """What the supervisor believed at a moment.
+    """What the supervisor believed at a moment."""
 
-    Parameters
-    ----------
-    state : State
-        By the operators' names.
-    text : str
-        Why the correction is restricted; empty where it is not.
-    payload : Payload or None
-        What is corrected for.
-    told : bool
-        Whether the gripper told that payload.
-    share : float
-        Part of the correction that is applied, of what the model is trusted with; below 1 where it
-        yielded to a contact or is not certain [-].
-    valid : bool
-        Whether the load is known and corrected for, so that the residual holds.
-    stamp_ns, since_ns : int
-        Of the last command, and of the one at which the state began [ns].
-    """
-
-    state: State
-    text: str
-    payload: Payload | None
-    told: bool
+    state: State  # by the operators' names
+    text: str  # why the correction is restricted; empty where it is not
+    payload: Payload | None  # what is corrected for
+    told: bool  # whether the gripper told that payload
+    # part of the correction that is applied, of what the model is trusted with; below 1 where it
+    # yielded to a contact or is not certain [-]
     share: float
-    valid: bool
+    valid: bool  # whether the load is known and corrected for, so that the residual holds
+    # `stamp_ns`, `since_ns`: of the last command, and of the one at which the state began [ns]
     stamp_ns: int
     since_ns: int

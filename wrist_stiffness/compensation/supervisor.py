@@ -149,24 +149,10 @@ class Supervisor(Belief):
     ) -> tuple[float, ...] | None:
         """Return the load to correct for.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Of the command [ns].
-        theta : list of 2 float
-            Commanded motor angles [rad].
-        reading : Reading
-            Of the tared load, from `scales`.
-        settings : SupervisorSettings
-            Thresholds, and how far the model is trusted.
-        reach : float
-            A command that has moved by this has left the place of a contact: the largest
-            correction [rad].
-
-        Returns
-        -------
-        (6,) float or None
-            At O in F [N, N m]; None for no load.
+        `stamp_ns`: of the command [ns]; `theta`: commanded motor angles [rad]; `reading`: of the
+        tared load, from `scales`; `settings`: thresholds, and how far the model is trusted;
+        `reach`: a command that has moved by this has left the place of a contact: the largest
+        correction [rad].  Gives (6,): at O in F [N, N m]; None for no load.
         """
         self._begin(stamp_ns)
         self._trust = settings.trust

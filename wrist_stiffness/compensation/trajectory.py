@@ -20,17 +20,10 @@ LARGEST = 1e9
 
 @dataclass(frozen=True)
 class PlannedPoint:
-    """One point of a trajectory.
+    """One point of a trajectory."""
 
-    Parameters
-    ----------
-    positions : (n,) float
-        Of all joints [rad].
-    velocities, accelerations : (n,) or (0,) float
-        Empty where the plan has none [rad/s, rad/s^2].
-    """
-
-    positions: Array
+    positions: Array  # (n,), of all joints [rad]
+    # `velocities`, `accelerations`: (n,) or (0,), empty where the plan has none [rad/s, rad/s^2]
     velocities: Array
     accelerations: Array
 
@@ -85,17 +78,9 @@ def corrected_point(
     c' theta_dot and the acceleration c' theta_ddot + c'' (theta_dot, theta_dot), by central
     differences.
 
-    Parameters
-    ----------
-    places : (2,) sequence of int
-        Where the motors stand among the joints.
-    corrected : sequence of (2,) float
-        Corrected motor angles at the point's `neighbours` [rad].
-
-    Returns
-    -------
-    PlannedPoint
-        Other joints unchanged; speeds and accelerations where the plan has them.
+    `places` (2,) sequence of int: where the motors stand among the joints; `corrected` sequence of
+    (2,): corrected motor angles at the point's `neighbours` [rad].  Gives `PlannedPoint`: other
+    joints unchanged; speeds and accelerations where the plan has them.
     """
     at = list(places)
     there, beside = corrected[0], iter(corrected[1:])

@@ -25,26 +25,13 @@ AT_ONCE = 8
 
 @dataclass
 class PlanCorrector:
-    """Corrects motor angles of one plan, each for itself: neither slewed nor held by hysteresis.
+    """Corrects motor angles of one plan, each for itself: neither slewed nor held by hysteresis."""
 
-    Parameters
-    ----------
-    running : RunningModel
-        A model with its memory at the plan's start.
-    stamp_ns : int
-        The plan's start [ns].
-
-    Attributes
-    ----------
-    known : bool
-        Whether what is held was known at every pose that was corrected.
-    """
-
-    running: RunningModel
+    running: RunningModel  # a model with its memory at the plan's start
     settings: StreamSettings
-    stamp_ns: int
+    stamp_ns: int  # the plan's start [ns]
     held: Held
-    known: bool = True
+    known: bool = True  # whether what is held was known at every pose that was corrected
 
     def __post_init__(self) -> None:
         """Leave the hysteresis away."""

@@ -39,28 +39,15 @@ PartProgress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True)
 class Provenance:
-    """How elastic components were made.
+    """How elastic components were made."""
 
-    Parameters
-    ----------
-    interface : str
-        `rigid`, `distributing` or `sliding`.
-    sizes : MeshSettings
-        Element sizes [m].
-    nodes, elements : dict of str to int
-        By component; equal parts share one mesh.
-    seconds : float
-        Wall time of the whole condensation [s].
-    packages : dict of str to str
-        Versions.
-    """
-
-    interface: str
-    sizes: MeshSettings
+    interface: str  # `rigid`, `distributing` or `sliding`
+    sizes: MeshSettings  # element sizes [m]
+    # `nodes`, `elements`: by component; equal parts share one mesh
     nodes: dict[str, int]
     elements: dict[str, int]
-    seconds: float
-    packages: dict[str, str]
+    seconds: float  # wall time of the whole condensation [s]
+    packages: dict[str, str]  # versions
 
 
 def elastic_components(
@@ -73,28 +60,10 @@ def elastic_components(
 ) -> tuple[ElasticComponents, Provenance]:
     """Condense every elastic part of a wrist.
 
-    Parameters
-    ----------
-    interface : {"rigid", "distributing", "sliding"}
-        How walls follow their frames.
-    progress : callable, optional
-        See `PartProgress`.
-    condenser : callable
-        `condense_solid`, or a `CondensedStore` that remembers.
-    rings : int
-        Contact modes over the width of a flange.
-
-    Returns
-    -------
-    ElasticComponents
-        At O in F with the wrist at home.
-
-    Raises
-    ------
-    GeometryError
-        If a part cannot be built.
-    InputError
-        If the interface model is unknown.
+    `interface`: how walls follow their frames; `progress`: see `PartProgress`; `condenser`:
+    `condense_solid`, or a `CondensedStore` that remembers; `rings`: contact modes over the width of
+    a flange.  Gives `ElasticComponents`: at O in F with the wrist at home.  Raises `GeometryError`
+    if a part cannot be built; `InputError` if the interface model is unknown.
     """
     if interface not in INTERFACES:
         raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
@@ -125,15 +94,8 @@ def place_components(
 ) -> ElasticComponents:
     """Turn and move condensed solids to their places in the wrist at home.
 
-    Parameters
-    ----------
-    parts : list of Part
-        Its elastic parts, in the order of `ELASTIC`.
-
-    Returns
-    -------
-    ElasticComponents
-        At O in F with the wrist at home.
+    `parts`: its elastic parts, in the order of `ELASTIC`.  Gives `ElasticComponents`: at O in F
+    with the wrist at home.
     """
     flexibility, motor_side, platform_side, mass = [], [], [], []
     contact: dict[str, FlangeContact] = {}

@@ -27,17 +27,10 @@ PACKAGES = ("netgen-mesher", "scikit-fem", "scipy", "numpy", "pymetis")
 
 @dataclass(frozen=True)
 class CondensedSolid:
-    """One solid, condensed.
+    """One solid, condensed."""
 
-    Parameters
-    ----------
-    element : Superelement
-        As its frames see it.
-    nodes, elements : int
-        Size of its mesh.
-    """
-
-    element: Superelement
+    element: Superelement  # as its frames see it
+    # `nodes`, `elements`: size of its mesh
     nodes: int
     elements: int
 
@@ -55,10 +48,7 @@ def condense_solid(solid: Solid, sizes: MeshSettings, interface: Interface) -> C
 class CondensedStore:
     """Condenses a solid once and keeps it in a folder; called as `condense_solid`.
 
-    Parameters
-    ----------
-    folder : path
-        Made if missing; `remove` takes it away when the build is done.
+    `folder`: made if missing; `remove` takes it away when the build is done.
     """
 
     def __init__(self, folder: str | Path) -> None:

@@ -23,18 +23,10 @@ SAME_PLACE = 1e-9
 
 @dataclass(frozen=True)
 class CyclicFactor:
-    """A factored stiffness of cyclic symmetry.
+    """A factored stiffness of cyclic symmetry."""
 
-    Parameters
-    ----------
-    slices : (n, m) int
-        Places of the unknowns of each slice in the right-hand side.
-    harmonics : list of Factor
-        Real and imaginary parts of the harmonics 0 ... n // 2.
-    """
-
-    slices: NDArray[np.int64]
-    harmonics: list[Factor]
+    slices: NDArray[np.int64]  # (n, m), places of the unknowns of each slice in the right-hand side
+    harmonics: list[Factor]  # real and imaginary parts of the harmonics 0 ... n // 2
 
     def solve(self, right: Array) -> Array:
         """Solve for right-hand sides (u, k) in the nodes' cylindrical axes."""
@@ -57,18 +49,10 @@ def factorise_cyclic(
 ) -> CyclicFactor:
     """Factor the stiffness of the free unknowns of a body of cyclic symmetry.
 
-    Parameters
-    ----------
-    stiffness : sparse.csr_matrix
-        (3 n, 3 n) of all nodes [N/m].
-    axes : sparse.csr_matrix
-        (3 n, 3 n) from `elasticity.cylindrical_axes`.
-    nodes : (n, 3) float
-        Their places [m].
-    free : (u,) int
-        Unknowns in cylindrical axes to solve for, sorted, the same in every slice.
-    count : int
-        Number of equal slices about z, at least 3.
+    `stiffness`: (3 n, 3 n) of all nodes [N/m]; `axes`: (3 n, 3 n) from
+    `elasticity.cylindrical_axes`; `nodes` (n, 3): their places [m]; `free` (u,): unknowns in
+    cylindrical axes to solve for, sorted, the same in every slice; `count`: number of equal slices
+    about z, at least 3.
     """
     sliced = _slices(nodes, count)
     unknowns = (3 * sliced[:, :, None] + np.arange(3)).reshape(count, -1)

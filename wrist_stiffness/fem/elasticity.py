@@ -33,15 +33,8 @@ def lame(material: Material) -> tuple[float, float]:
 def stiffness_matrix(mesh: SolidMesh, material: AnyMaterial) -> sparse.csr_matrix:
     """Stiffness of a solid.
 
-    Parameters
-    ----------
-    material : Material or OrthotropicMaterial
-        Its material; the axes of an orthotropic one turn about z.
-
-    Returns
-    -------
-    sparse.csr_matrix
-        (3 n, 3 n) symmetric positive semi-definite [N/m].
+    `material`: its material; the axes of an orthotropic one turn about z.  Gives (3 n, 3 n)
+    symmetric positive semi-definite [N/m].
     """
     if isinstance(material, Material):
         block = _isotropic_blocks(mesh, material)
@@ -119,10 +112,7 @@ def mass_matrix(mesh: SolidMesh, density: float) -> sparse.csr_matrix:
 def surface_integrals(mesh: SolidMesh, surface: str) -> Array:
     """Integrals of each node's shape function N times 1, x, y, z over a named surface.
 
-    Returns
-    -------
-    Array
-        (n, 4) integrals of N [m^2] and of N x, N y, N z [m^3].
+    Gives `Array`: (n, 4) integrals of N [m^2] and of N x, N y, N z [m^3].
     """
     triangles = mesh.surface_triangles(surface)
     points, weights = get_quadrature(RefTri, LOAD_ORDER)
@@ -148,16 +138,8 @@ def body_force(mass: sparse.csr_matrix) -> Array:
 def rigid_motion(points: Array) -> Array:
     """Displacements of points by the six unit screws at the origin.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Places [m].
-
-    Returns
-    -------
-    Array
-        (3 n, 6): translations along and rotations about x, y, z; its transpose gives the resultant
-        force and moment at the origin of nodal forces.
+    `points` (n, 3): places [m].  Gives `Array`: (3 n, 6): translations along and rotations about x,
+    y, z; its transpose gives the resultant force and moment at the origin of nodal forces.
     """
     x, y, z = points.T
     zero = np.zeros_like(x)
@@ -169,15 +151,8 @@ def rigid_motion(points: Array) -> Array:
 def cylindrical_axes(points: Array) -> sparse.csr_matrix:
     """Return the axes along the radius, around and along z at each point off z.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Places [m].
-
-    Returns
-    -------
-    sparse.csr_matrix
-        (3 n, 3 n) orthogonal: x, y, z components from radial, tangential and axial ones.
+    `points` (n, 3): places [m].  Gives (3 n, 3 n) orthogonal: x, y, z components from radial,
+    tangential and axial ones.
     """
     cosine, sine = points[:, :2].T / np.hypot(points[:, 0], points[:, 1])
     blocks = np.zeros((len(points), 3, 3))

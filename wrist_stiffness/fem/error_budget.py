@@ -61,20 +61,10 @@ def error_budget(
 ) -> dict[str, Any]:
     """State what the mesh, the flanges' discretisation and two-sided walls leave out.
 
-    Parameters
-    ----------
-    interface : {"rigid", "distributing", "sliding"}
-        How walls follow their frames.
-    rings : int
-        The table's rings over the width of a flange.
-    condenser : callable
-        `condense_solid`, or one that remembers.
-
-    Returns
-    -------
-    dict
-        `mesh`, `contact` and `walls` (empty unless the bushings slide): error of s and phi,
-        relative to their lengths, that `STATED` of the draws keep; `stated`: that of the sums.
+    `interface`: how walls follow their frames; `rings`: the table's rings over the width of a
+    flange; `condenser`: `condense_solid`, or one that remembers.  Gives `mesh`, `contact` and
+    `walls` (empty unless the bushings slide): error of s and phi, relative to their lengths, that
+    `STATED` of the draws keep; `stated`: that of the sums.
     """
     workspace = Workspace(mechanism_of(geometry), geometry.limits)
     lifts = interface == "sliding"

@@ -15,18 +15,11 @@ from wrist_stiffness.mechanism.components import Array
 
 @dataclass(frozen=True)
 class Factor:
-    """A factored symmetric positive definite matrix.
+    """A factored symmetric positive definite matrix."""
 
-    Parameters
-    ----------
-    order : (n,) int
-        Elimination order of the unknowns; those that are not among them stay zero.
-    lu : SuperLU
-        Factors of the reordered matrix.
-    """
-
+    # (n,), elimination order of the unknowns; those that are not among them stay zero
     order: NDArray[np.int64]
-    lu: SuperLU
+    lu: SuperLU  # factors of the reordered matrix
 
     def solve(self, right: Array) -> Array:
         """Solve for one or more right-hand sides (n,) or (n, k)."""

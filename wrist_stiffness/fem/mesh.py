@@ -21,20 +21,12 @@ SKFEM_TET10 = (0, 1, 2, 3, 4, 7, 5, 6, 8, 9)
 
 @dataclass(frozen=True)
 class SolidMesh:
-    """Ten-node tetrahedra of one solid.
+    """Ten-node tetrahedra of one solid."""
 
-    Parameters
-    ----------
-    tets : MeshTet2
-        The mesh, in metres; curved elements at curved faces.
-    surfaces : dict of str to (n,) int
-        Facet numbers of each named surface.
-    slices : int
-        Equal turns about z that map the mesh, its bore and its hub wall onto themselves; 1 if none.
-    """
-
-    tets: MeshTet2
+    tets: MeshTet2  # the mesh, in metres; curved elements at curved faces
+    # dict of str to (n,), facet numbers of each named surface
     surfaces: dict[str, NDArray[np.int64]]
+    # equal turns about z that map the mesh, its bore and its hub wall onto themselves; 1 if none
     slices: int = 1
 
     @property
@@ -61,20 +53,8 @@ class SolidMesh:
 def mesh_solid(shape: OCCGeometry) -> SolidMesh:
     """Mesh a shape with ten-node tetrahedra of the sizes stored in it.
 
-    Parameters
-    ----------
-    shape : OCCGeometry
-        From `solids.py`, in millimetres; a shape is meshed once (the kernel keeps the first sizes).
-
-    Returns
-    -------
-    SolidMesh
-        In metres.
-
-    Raises
-    ------
-    GeometryError
-        If the shape cannot be meshed.
+    `shape`: from `solids.py`, in millimetres; a shape is meshed once (the kernel keeps the first
+    sizes).  Gives `SolidMesh`: in metres.  Raises `GeometryError` if the shape cannot be meshed.
     """
     netgen = generate_mesh(shape)
     netgen.SecondOrder()

@@ -81,23 +81,13 @@ LEAST_FALL = 1e-13
 
 @dataclass(frozen=True)
 class PatchedBushing:
-    """A bushing as its contact patches see it, in its own axes; patches go slice after slice.
+    """A bushing as its contact patches see it, in its own axes; patches go slice after slice."""
 
-    Parameters
-    ----------
-    flexibility : (m, m) float
-        Retreat of each patch for 1 N spread over each, the wall that is glued held [m/N].
-    wrench : (6, m) float
-        On what slides in or on the bushing, for 1 N on each patch [N, N m].
-    surface : (m,) str
-        `wall`, `inner` or `outer`: where each patch is.
-    angle, height, area : (m,) float
-        Its middle about z [rad] and along z [m], and its area [m^2].
-    """
-
+    # (m, m), retreat of each patch for 1 N spread over each, the wall that is glued held [m/N]
     flexibility: Array
-    wrench: Array
-    surface: NDArray[np.str_]
+    wrench: Array  # (6, m), on what slides in or on the bushing, for 1 N on each patch [N, N m]
+    surface: NDArray[np.str_]  # (m,) str, `wall`, `inner` or `outer`: where each patch is
+    # `angle`, `height`, `area`: (m,), its middle about z [rad] and along z [m], and its area [m^2]
     angle: Array
     height: Array
     area: Array
@@ -152,36 +142,20 @@ def patch_bushing(body: ElasticBody, wall_rings: int) -> PatchedBushing:
 
 @dataclass(frozen=True)
 class PatchedWrist:
-    """A wrist of patched bushings and condensed links.
-
-    Parameters
-    ----------
-    parts : list of Part
-        In the order of `ELASTIC`.
-    components : ElasticComponents
-        For the flexibility of the links.
-    """
+    """A wrist of patched bushings and condensed links."""
 
     geometry: Geometry
-    parts: list[Part]
-    components: ElasticComponents
+    parts: list[Part]  # in the order of `ELASTIC`
+    components: ElasticComponents  # for the flexibility of the links
     bushings: dict[str, PatchedBushing]
 
 
 @dataclass(frozen=True)
 class Lifted:
-    """One pose solved.
+    """One pose solved."""
 
-    Parameters
-    ----------
-    twist : (6,) float
-        Of the platform at O in F [m, rad].
-    forces : dict of str to (m,) float
-        Of each bushing's patches [N].
-    """
-
-    twist: Array
-    forces: dict[str, Array]
+    twist: Array  # (6,), of the platform at O in F [m, rad]
+    forces: dict[str, Array]  # dict of str to (m,), of each bushing's patches [N]
 
 
 def solve_patches(
@@ -193,14 +167,9 @@ def solve_patches(
 ) -> Lifted:
     """Solve a pose for a load, without own weight.
 
-    Parameters
-    ----------
-    wrench : (6,) float
-        On the platform at O in F [N, N m].
-    clearance : float
-        Radial clearance of every sliding wall [m].
-    lifts : bool
-        Whether walls lift off; if not they pull too, as the two-sided walls of a table do.
+    `wrench` (6,): on the platform at O in F [N, N m].  `clearance`: radial clearance of every
+    sliding wall [m].  `lifts`: whether walls lift off; if not they pull too, as the two-sided walls
+    of a table do.
     """
     springs = [_Spring.placed(wrist, joint, configuration, clearance, lifts) for joint in JOINTS]
     ways = _free_ways(wrist.geometry)
@@ -252,19 +221,9 @@ def lifting_misses(
 ) -> Array:
     """Return how far walls that lift off, without clearance, are from two-sided ones.
 
-    Parameters
-    ----------
-    sizes : MeshSettings
-        Element sizes of the bushings in patches.
-    poses : (n, 2) float
-        Motor angles [rad].
-    loads : (n, 6) float
-        On the platform at O in F [N, N m].
-
-    Returns
-    -------
-    (n, 2) float
-        Lengths of the differences of s and phi over those of the two-sided walls.
+    `sizes`: element sizes of the bushings in patches; `poses` (n, 2): motor angles [rad]; `loads`
+    (n, 6): on the platform at O in F [N, N m].  Gives (n, 2): lengths of the differences of s and
+    phi over those of the two-sided walls.
     """
     parts = wrist_parts(geometry, rings=1)
     bushings = {

@@ -36,18 +36,10 @@ RINGS = 2
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a part's own axes are in F.
+    """Where a part's own axes are in F."""
 
-    Parameters
-    ----------
-    rotation : (3, 3) float
-        Part axes to F.
-    origin : (3,) float
-        Origin of the part's axes in F [m].
-    """
-
-    rotation: Array
-    origin: Array
+    rotation: Array  # (3, 3), part axes to F
+    origin: Array  # (3,), origin of the part's axes in F [m]
 
     @property
     def screw(self) -> Array:
@@ -76,29 +68,18 @@ class Placement:
 
 @dataclass(frozen=True)
 class Solid:
-    """One shape to be meshed, and which of its walls are held.
+    """One shape to be meshed, and which of its walls are held."""
 
-    Parameters
-    ----------
-    dimensions : LinkDimensions or BushingDimensions
-        Without what does not shape it (a bushing's place, the size of its gaps).
-    angle : float
-        Between a link's bores [rad]; zero for a bushing.
-    motor_wall, platform_wall : str
-        Surfaces that follow the frames on the motor side and on the platform side; a bushing
-        turns, and at a passive joint slides, against what is on the platform side.
-    flanges : tuple of str
-        Flanges that take part in contact.
-    rings : int
-        Contact modes over the width of each sector.
-    """
-
+    # without what does not shape it (a bushing's place, the size of its gaps)
     dimensions: LinkDimensions | BushingDimensions
-    angle: float
+    angle: float  # between a link's bores [rad]; zero for a bushing
+    # `motor_wall`, `platform_wall`: surfaces that follow the frames on the motor side and on the
+    # platform side; a bushing turns, and at a passive joint slides, against what is on the platform
+    # side
     motor_wall: str
     platform_wall: str
-    flanges: tuple[str, ...]
-    rings: int = RINGS
+    flanges: tuple[str, ...]  # flanges that take part in contact
+    rings: int = RINGS  # contact modes over the width of each sector
 
     @property
     def material(self) -> AnyMaterial:
@@ -132,26 +113,15 @@ class Part:
 
 @dataclass(frozen=True)
 class ElasticBody:
-    """The finite-element matrices of one solid in its own axes.
-
-    Parameters
-    ----------
-    stiffness : sparse.csr_matrix
-        (3 n, 3 n) [N/m].
-    mass : sparse.csr_matrix
-        (n, n) along each direction [kg].
-    weight : (3 n, 3) float
-        Nodal forces of unit accelerations [N/(m/s^2)].
-    pressure : (3 n, m) float
-        Nodal forces of 1 N spread evenly over each contact sector, pressing the flange away from
-        the hub [-].
-    """
+    """The finite-element matrices of one solid in its own axes."""
 
     solid: Solid
     mesh: SolidMesh
-    stiffness: sparse.csr_matrix
-    mass: sparse.csr_matrix
-    weight: Array
+    stiffness: sparse.csr_matrix  # (3 n, 3 n) [N/m]
+    mass: sparse.csr_matrix  # (n, n) along each direction [kg]
+    weight: Array  # (3 n, 3), nodal forces of unit accelerations [N/(m/s^2)]
+    # (3 n, m), nodal forces of 1 N spread evenly over each contact sector, pressing the flange away
+    # from the hub [-]
     pressure: Array
 
 
@@ -169,10 +139,7 @@ def wrist_parts(geometry: Geometry, rings: int = RINGS) -> list[Part]:
 def assemble_body(solid: Solid, sizes: MeshSettings) -> ElasticBody:
     """Mesh a solid and assemble its matrices.
 
-    Returns
-    -------
-    ElasticBody
-        In the solid's own axes.
+    Gives `ElasticBody`: in the solid's own axes.
     """
     if isinstance(solid.dimensions, LinkDimensions):
         return assemble_mesh(solid, mesh_solid(link_shape(solid.dimensions, solid.angle, sizes)))

@@ -44,26 +44,16 @@ CAD_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Largest element sizes [m].
+    """Largest element sizes [m]."""
 
-    Parameters
-    ----------
-    link : float
-        In the bar of a link.
-    bore : float
-        At the bore walls of a link, where the rotational terms of its flexibility converge slowest.
-    bushing, bushing_corner : float
-        In the half section of a bushing, and at the ends of its hub wall, where the stress of a
-        held edge under a flange is singular.
-    bushing_arc : float
-        Along the circumference of a bushing, at the hub wall.
-    """
-
-    link: float
+    link: float  # in the bar of a link
+    # at the bore walls of a link, where the rotational terms of its flexibility converge slowest
     bore: float
+    # `bushing`, `bushing_corner`: in the half section of a bushing, and at the ends of its hub
+    # wall, where the stress of a held edge under a flange is singular
     bushing: float
     bushing_corner: float
-    bushing_arc: float
+    bushing_arc: float  # along the circumference of a bushing, at the hub wall
 
     def times(self, factor: float) -> MeshSettings:
         """Return all sizes times a factor."""
@@ -73,24 +63,10 @@ class MeshSettings:
 def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGeometry:
     """Solid of a link, with the faces `motor_bore` and `platform_bore`.
 
-    Parameters
-    ----------
-    link : LinkDimensions
-        The link's dimensions [m].
-    angle : float
-        Angle at O between the axes of its bores [rad], in (0, pi).
-    sizes : MeshSettings
-        Element sizes [m], stored in the shape.
-
-    Returns
-    -------
-    OCCGeometry
-        The shape, in millimetres.
-
-    Raises
-    ------
-    GeometryError
-        If the bar closes on itself, a bore is wider than the bar or the bores meet.
+    `link`: the link's dimensions [m]; `angle`: angle at O between the axes of its bores [rad], in
+    (0, pi); `sizes`: element sizes [m], stored in the shape.  Gives `OCCGeometry`: the shape, in
+    millimetres.  Raises `GeometryError` if the bar closes on itself, a bore is wider than the bar
+    or the bores meet.
     """
     radius, radial, axial = (
         MILLIMETRES * v for v in (link.arc_radius, link.section_radial, link.section_axial)
@@ -141,24 +117,10 @@ def bushing_section(bushing: BushingDimensions, sizes: MeshSettings, rings: int)
     The ends of the hub wall and of the bore carry the singular stresses of a held edge, so the
     mesh is graded towards them; a section can afford it, a tetrahedral mesh of the solid cannot.
 
-    Parameters
-    ----------
-    bushing : BushingDimensions
-        The bushing's dimensions [m]; its `radius` and the size of its gaps do not enter.
-    sizes : MeshSettings
-        Element sizes [m], stored in the shape.
-    rings : int
-        Rings over the width of a flange.
-
-    Returns
-    -------
-    OCCGeometry
-        The plane shape, in millimetres.
-
-    Raises
-    ------
-    GeometryError
-        If a flange is not wider than the sleeve.
+    `bushing`: the bushing's dimensions [m]; its `radius` and the size of its gaps do not enter.
+    `sizes`: element sizes [m], stored in the shape.  `rings`: rings over the width of a flange.
+    Gives `OCCGeometry`: the plane shape, in millimetres.  Raises `GeometryError` if a flange is not
+    wider than the sleeve.
     """
     r_pin = MILLIMETRES * bushing.pin_diameter / 2.0
     r_hub = r_pin + MILLIMETRES * bushing.wall

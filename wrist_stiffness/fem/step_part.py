@@ -27,47 +27,22 @@ COARSER = 1.25
 
 @dataclass(frozen=True)
 class StepPart:
-    """A link as its STEP file draws it.
+    """A link as its STEP file draws it."""
 
-    Parameters
-    ----------
-    stiffness : (6, 6) float
-        Between the two bores' frames, at O in F with the wrist at home [N/m, N, N m].
-    elements : int
-        Of its mesh.
-    coarser : float
-        How much stiffer it is on elements `COARSER` times as large, in the worst direction [-].
-    """
-
+    # (6, 6), between the two bores' frames, at O in F with the wrist at home [N/m, N, N m]
     stiffness: Array
-    elements: int
+    elements: int  # of its mesh
+    # how much stiffer it is on elements `COARSER` times as large, in the worst direction [-]
     coarser: float
 
 
 def step_part(path: Path, geometry: Geometry, link: str, sizes: MeshSettings) -> StepPart:
     """Mesh and condense a link's STEP file onto its bores.
 
-    Parameters
-    ----------
-    path : Path
-        One solid, drawn in F with the wrist at home and O at the origin; its faces `motor_bore` and
-        `platform_bore` are held.
-    geometry : Geometry
-        For the link's material and the axes of its bores.
-    link : str
-        Its name.
-    sizes : MeshSettings
-        Element sizes.
-
-    Returns
-    -------
-    StepPart
-        With both bores rigid.
-
-    Raises
-    ------
-    GeometryError
-        If the file is no such solid, or its bores are not where the geometry has them.
+    `path`: one solid, drawn in F with the wrist at home and O at the origin; its faces `motor_bore`
+    and `platform_bore` are held.  `geometry`: for the link's material and the axes of its bores.
+    `link`: its name.  `sizes`: element sizes.  Gives `StepPart`: with both bores rigid.  Raises
+    `GeometryError` if the file is no such solid, or its bores are not where the geometry has them.
     """
     solid = wrist_parts(geometry)[ELASTIC.index(link)].solid
     if isinstance(solid.material, OrthotropicMaterial):

@@ -47,32 +47,24 @@ class Superelement:
         frame screw = flexibility @ (w + weight_platform_side @ g) + sector_screw @ f
         work screw of sectors = sector_screw.T @ (w + weight_platform_side @ g)
                                 + sector_approach @ f + sector_weight @ g
-
-    Parameters
-    ----------
-    flexibility : (6, 6) float
-        Screw of the platform-side frame for unit wrenches [m/N, rad/N, rad/(N m)].
-    weight_motor_side, weight_platform_side : (6, 3) float
-        Consistent wrenches on the frames for unit accelerations [N/(m/s^2), N m/(m/s^2)].
-    sector_wrench : (6, m) float
-        Wrench on the hub of 1 N between each sector and the hub [N, N m].
-    sector_screw : (6, m) float
-        Screw of the platform-side frame for 1 N on each sector of the flange [m/N, rad/N].
-    sector_approach : (m, m) float
-        Mean displacement of each sector away from the hub for 1 N on each sector [m/N].
-    sector_weight : (m, 3) float
-        The same for unit accelerations with both frames held [m/(m/s^2)].
-    mass : (12, 12) float
-        Of the motion that follows the frames without inertia, motor side first [kg, kg m, kg m^2].
     """
 
+    # (6, 6), screw of the platform-side frame for unit wrenches [m/N, rad/N, rad/(N m)]
     flexibility: Array
+    # `weight_motor_side`, `weight_platform_side`: (6, 3), consistent wrenches on the frames for
+    # unit accelerations [N/(m/s^2), N m/(m/s^2)]
     weight_motor_side: Array
     weight_platform_side: Array
+    # (6, m), wrench on the hub of 1 N between each sector and the hub [N, N m]
     sector_wrench: Array
+    # (6, m), screw of the platform-side frame for 1 N on each sector of the flange [m/N, rad/N]
     sector_screw: Array
+    # (m, m), mean displacement of each sector away from the hub for 1 N on each sector [m/N]
     sector_approach: Array
+    # (m, 3), the same for unit accelerations with both frames held [m/(m/s^2)]
     sector_weight: Array
+    # (12, 12), of the motion that follows the frames without inertia, motor side first [kg, kg m,
+    # kg m^2]
     mass: Array
 
 

@@ -48,29 +48,14 @@ FINER, FINEST = 0.8, 0.5
 
 @dataclass(frozen=True)
 class BuildSettings:
-    """How a table is built.
+    """How a table is built."""
 
-    Parameters
-    ----------
-    sizes : MeshSettings
-        Element sizes [m].
-    interface : str
-        Interface model of the condensation.
-    evaluation : str
-        What the nodes shall use.
-    rings : int
-        Contact modes over the width of a flange.
-    tolerance : float
-        Relative error of s and phi that mesh, rings and grid are refined to.
-    per_axis : int or None
-        Fixed number of grid points along each angle; None refines until the tolerance is met.
-    """
-
-    sizes: MeshSettings = SHIPPED_SIZES
-    interface: Interface = "rigid"
-    evaluation: Evaluation = "closed_form"
-    rings: int = RINGS
-    tolerance: float = 0.025
+    sizes: MeshSettings = SHIPPED_SIZES  # element sizes [m]
+    interface: Interface = "rigid"  # interface model of the condensation
+    evaluation: Evaluation = "closed_form"  # what the nodes shall use
+    rings: int = RINGS  # contact modes over the width of a flange
+    tolerance: float = 0.025  # relative error of s and phi that mesh, rings and grid are refined to
+    # fixed number of grid points along each angle; None refines until the tolerance is met
     per_axis: int | None = None
 
 

@@ -40,21 +40,15 @@ class BiharmonicSpline:
     machine; the same angle inside a longer query may differ in the last bits, because the matrix
     product then sums in another order.  Outside of the nodes' box the spline extrapolates
     silently: the domain is the table's affair.  A NaN angle gives NaN.
-
-    Parameters
-    ----------
-    nodes : (n, 2) array
-        Joint angles of the nodes [rad].
-    offset, scale : (2,) array
-        Unit box: (theta - offset) / scale lies in [0, 1]^2 for all nodes [rad].
-    coefficients : (n + 3, m) array
-        Weights of the nodes, then of the trend 1, x, y in scaled angles, for m value columns [unit
-        of the values].
     """
 
-    nodes: NDArray[np.float64]
+    nodes: NDArray[np.float64]  # (n, 2), joint angles of the nodes [rad]
+    # `offset`, `scale`: (2,), unit box: (theta - offset) / scale lies in [0, 1]^2 for all nodes
+    # [rad]
     offset: NDArray[np.float64]
     scale: NDArray[np.float64]
+    # (n + 3, m), weights of the nodes, then of the trend 1, x, y in scaled angles, for m value
+    # columns [unit of the values]
     coefficients: NDArray[np.float64]
 
     @classmethod

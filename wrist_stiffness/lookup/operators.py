@@ -75,19 +75,10 @@ def unpack(
 ) -> ContactOperators:
     """Return the operators from interpolated spline columns.
 
-    Parameters
-    ----------
-    columns : (..., columns) float
-        As `pack` orders them.
-    components : ElasticComponents
-        Of the table: they say which joint each sector belongs to.
-    configuration : Configuration
-        The poses, for the slides that a screw at a component makes (kinematics, not elasticity).
-
-    Returns
-    -------
-    ContactOperators
-        C and A positive semi-definite at every pose.
+    `columns` (..., columns): as `pack` orders them; `components`: of the table: they say which
+    joint each sector belongs to; `configuration`: the poses, for the slides that a screw at a
+    component makes (kinematics, not elasticity).  Gives `ContactOperators`: C and A positive
+    semi-definite at every pose.
     """
     slide = components.sectors.slide
     m = len(slide)

@@ -26,18 +26,10 @@ MIN_SPREAD_RATIO = 0.1
 
 @dataclass(frozen=True, eq=False)
 class PlatformError:
-    """Rigid motion of the platform from its nominal to its actual pose, about O in F.
+    """Rigid motion of the platform from its nominal to its actual pose, about O in F."""
 
-    Parameters
-    ----------
-    shift : (..., 3) array
-        Shift s of the platform's point at O [m].
-    rotation : (..., 3, 3) array
-        R_err = R_D R_U^T, a proper rotation.
-    """
-
-    shift: NDArray[np.float64]
-    rotation: NDArray[np.float64]
+    shift: NDArray[np.float64]  # (..., 3), shift s of the platform's point at O [m]
+    rotation: NDArray[np.float64]  # (..., 3, 3), R_err = R_D R_U^T, a proper rotation
 
     @property
     def shift_norm(self) -> NDArray[np.float64]:

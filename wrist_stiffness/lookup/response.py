@@ -19,21 +19,11 @@ from wrist_stiffness.mechanism.statics import ContactOperators
 
 @dataclass(frozen=True)
 class Response:
-    """Elastic answer of the wrist.
+    """Elastic answer of the wrist."""
 
-    Parameters
-    ----------
-    twist : (..., 6) float
-        Platform twist at O in F, first order [m, rad].
-    force : (..., m) float
-        Contact force of each sector [N].
-    active : (..., m) bool
-        Sectors in contact.
-    """
-
-    twist: Array
-    force: Array
-    active: NDArray[np.bool_]
+    twist: Array  # (..., 6), platform twist at O in F, first order [m, rad]
+    force: Array  # (..., m), contact force of each sector [N]
+    active: NDArray[np.bool_]  # (..., m), sectors in contact
 
 
 def respond(
@@ -43,19 +33,9 @@ def respond(
 ) -> Response:
     """Solve for the platform's twist under a load, with contact.
 
-    Parameters
-    ----------
-    operators : ContactOperators
-        Of shape (...).
-    wrench : (..., 6) float
-        Load on the platform at O in F [N, N m].
-    active : (m,) bool, optional
-        First guess of the sectors in contact, for a single pose.
-
-    Returns
-    -------
-    Response
-        Twist, contact forces and active sectors of shape (...).
+    `operators`: of shape (...); `wrench` (..., 6): load on the platform at O in F [N, N m];
+    `active` (m,): first guess of the sectors in contact, for a single pose.  Gives `Response`:
+    twist, contact forces and active sectors of shape (...).
     """
     free = operators.weight_twist + np.einsum("...ij,...j->...i", operators.compliance, wrench)
     gap = operators.gap + np.einsum("...im,...i->...m", operators.force_twist, wrench)

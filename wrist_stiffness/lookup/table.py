@@ -32,60 +32,30 @@ MAP_COLUMNS = ("s_x", "s_y", "s_z", "s", "phi")
 
 @dataclass(frozen=True)
 class TableHeader:
-    """Where a table comes from and how good it is.
+    """Where a table comes from and how good it is."""
 
-    Parameters
-    ----------
-    geometry : dict
-        The values of the geometry file.
-    interface : str
-        Interface model of the condensation: `rigid`, `distributing` or `sliding`.
-    evaluation : str
-        `closed_form` or `spline`: what the nodes use.
-    kernel : str
-        Of the splines: `lookup.biharmonic.KERNEL`.
-    per_axis : int
-        Grid points along each motor angle.
-    mesh : dict
-        Element sizes [mm] and counts.
-    versions : dict
-        Solver and package versions.
-    errors : dict
-        Stated errors of the splines [relative to the local value].
-    """
-
-    geometry: dict[str, Any]
-    interface: str
-    evaluation: Evaluation
-    kernel: str
-    per_axis: int
-    mesh: dict[str, Any]
-    versions: dict[str, str]
-    errors: dict[str, Any]
+    geometry: dict[str, Any]  # the values of the geometry file
+    interface: str  # interface model of the condensation: `rigid`, `distributing` or `sliding`
+    evaluation: Evaluation  # `closed_form` or `spline`: what the nodes use
+    kernel: str  # of the splines: `lookup.biharmonic.KERNEL`
+    per_axis: int  # grid points along each motor angle
+    mesh: dict[str, Any]  # element sizes [mm] and counts
+    versions: dict[str, str]  # solver and package versions
+    errors: dict[str, Any]  # stated errors of the splines [relative to the local value]
 
 
 @dataclass(frozen=True)
 class Table:
-    """Lookup of one wrist.
-
-    Parameters
-    ----------
-    nodes : (n, 2) float
-        Motor angles of the grid [rad].
-    operators : (n, columns) float
-        Operators at the nodes, as `lookup.operators.pack` orders them.
-    map_values : (n, 5) float
-        `MAP_COLUMNS` at the nodes for the rated load alone, from the readout fit, Eqs. (1)-(10).
-    checksum : str
-        SHA-256 of header and arrays; empty before the table is written.
-    """
+    """Lookup of one wrist."""
 
     header: TableHeader
     components: ElasticComponents
-    nodes: Array
-    operators: Array
+    nodes: Array  # (n, 2), motor angles of the grid [rad]
+    operators: Array  # (n, columns), operators at the nodes, as `lookup.operators.pack` orders them
+    # (n, 5), `MAP_COLUMNS` at the nodes for the rated load alone, from the readout fit, Eqs.
+    # (1)-(10)
     map_values: Array
-    checksum: str = ""
+    checksum: str = ""  # SHA-256 of header and arrays; empty before the table is written
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -117,17 +87,9 @@ class Table:
     ) -> ContactOperators:
         """Elastic operators at a configuration.
 
-        Parameters
-        ----------
-        configuration : Configuration
-            Of shape (...), inside the map domain.
-        evaluation : str, optional
-            `closed_form` or `spline`; what the header says if None.
-
-        Returns
-        -------
-        ContactOperators
-            Of shape (...), with own weight in the geometry's gravity.
+        `configuration`: of shape (...), inside the map domain.  `evaluation`: `closed_form` or
+        `spline`; what the header says if None.  Gives `ContactOperators`: of shape (...), with own
+        weight in the geometry's gravity.
         """
         if (evaluation or self.header.evaluation) == "spline":
             return unpack(self.operator_spline(configuration.theta), self.components, configuration)

@@ -81,20 +81,9 @@ def save_table(table: Table, path: str | Path) -> Table:
 def load_table(path: str | Path) -> Table:
     """Read a table and check it.
 
-    Parameters
-    ----------
-    path : path
-        A file that `save_table` wrote.
-
-    Returns
-    -------
-    Table
-        Complete and with a checksum that fits.
-
-    Raises
-    ------
-    TableError
-        If the file is missing, no table, of another version, damaged or contradictory.
+    `path`: a file that `save_table` wrote.  Gives `Table`: complete and with a checksum that fits.
+    Raises `TableError` if the file is missing, no table, of another version, damaged or
+    contradictory.
     """
     arrays = _read_arrays(path)
     try:

@@ -83,13 +83,10 @@ def spline_misses(
 def interpolation_errors(table: Table) -> dict[str, Any]:
     """State how well the table's splines follow the closed form at poses that they never saw.
 
-    Returns
-    -------
-    dict
-        By region and quantity, relative to the local value: `predicted` covers all but one in a
-        hundred of the errors, as vectors, of the splines of the operators with contact solved under
-        random loads; `map` is the largest one of the splines of the rated load's s and phi
-        themselves (the paper's way), `leave_one_out` their leave-one-out error.
+    Gives errors by region and quantity, relative to the local value: `predicted` covers all but one
+    in a hundred of the errors, as vectors, of the splines of the operators with contact solved
+    under random loads; `map` is the largest one of the splines of the rated load's s and phi
+    themselves (the paper's way), `leave_one_out` their leave-one-out error.
     """
     workspace = table.workspace
     misses, operative = spline_misses(table)

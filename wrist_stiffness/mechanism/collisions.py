@@ -23,35 +23,22 @@ POINTS_PER_SECTION = 2
 
 @dataclass(frozen=True)
 class Collision:
-    """Two bodies in one place.
+    """Two bodies in one place."""
 
-    Parameters
-    ----------
-    first, second : str
-        A link, a pin by its joint, the platform or `BOSS`.
-    theta : (2,) float
-        Motor angles [rad].
-    """
-
+    # `first`, `second`: a link, a pin by its joint, the platform or `BOSS`
     first: str
     second: str
-    theta: Array
+    theta: Array  # (2,), motor angles [rad]
 
 
 @dataclass(frozen=True)
 class _Body:
-    """A box in polar coordinates of its own (an arc, a disc, a pin): its points, its inside.
-
-    Parameters
-    ----------
-    axes : (3, 3) float
-        Its axes in F at home, as columns.
-    lower, upper : (3,) float
-        Its limits in radius and angle about its third axis and along it [m, rad, m].
-    """
+    """A box in polar coordinates of its own (an arc, a disc, a pin): its points, its inside."""
 
     carrier: str
-    axes: Array
+    axes: Array  # (3, 3), its axes in F at home, as columns
+    # `lower`, `upper`: (3,), its limits in radius and angle about its third axis and along it [m,
+    # rad, m]
     lower: Array
     upper: Array
 

@@ -35,23 +35,12 @@ Flags = NDArray[np.bool_]
 
 
 class PredictedRows(NamedTuple):
-    """What a wrist does at n samples.
+    """What a wrist does at n samples."""
 
-    Parameters
-    ----------
-    twist : (n, 6) float
-        Of the platform at O in F [m, rad].
-    configuration : (n, 66) float
-        As `Configuration.of_row` takes them.
-    active : (n, m) bool
-        Sectors in contact.
-    status : (n,) int
-        0 where the sample could be served; of the others the rest is undefined.
-    """
-
-    twist: Array
-    configuration: Array
-    active: Flags
+    twist: Array  # (n, 6), of the platform at O in F [m, rad]
+    configuration: Array  # (n, 66), as `Configuration.of_row` takes them
+    active: Flags  # (n, m), sectors in contact
+    # (n,), 0 where the sample could be served; of the others the rest is undefined
     status: NDArray[np.uint8]
 
 
@@ -105,19 +94,12 @@ NEVER_NS = np.iinfo(np.int64).min
 
 
 class CorrectedRows(NamedTuple):
-    """Corrections of n commands.
+    """Corrections of n commands."""
 
-    Parameters
-    ----------
-    rows : (n, 86) float
-        What the properties give, and from 14 on the Jacobian (3, 2) of the platform's angular
-        velocity at the command.
-    active : (n, m) bool
-        Sectors in contact at the corrected angles.
-    """
-
+    # (n, 86), what the properties give, and from 14 on the Jacobian (3, 2) of the platform's
+    # angular velocity at the command
     rows: Array
-    active: Flags
+    active: Flags  # (n, m), sectors in contact at the corrected angles
 
     @classmethod
     def room(cls, n: int, sectors: int) -> CorrectedRows:
@@ -153,20 +135,10 @@ class CorrectedRows(NamedTuple):
 class CompiledWrist:
     """One wrist with all that is constant.
 
-    Parameters
-    ----------
-    mechanism : (MECHANISM,) float
-        From `mechanism_constants`.
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
-    screws : (5, 6) float, optional
-        Constant screws of `GROUPS`, at O in the home frames of their bodies [m, rad].
-    opening : (m,) float, optional
-        Of the sectors beyond the components' gaps [m].
-    load_scale : float
-        Factor on what the load sensor says.
-    load_added : (6,) float, optional
-        Added to it then, in F [N, N m].
+    `mechanism` (MECHANISM,): from `mechanism_constants`; `gravity` (3,): acceleration of gravity in
+    F [m/s^2]; `screws` (5, 6): constant screws of `GROUPS`, at O in the home frames of their bodies
+    [m, rad]; `opening` (m,): of the sectors beyond the components' gaps [m]; `load_scale`: factor
+    on what the load sensor says; `load_added` (6,): added to it then, in F [N, N m].
     """
 
     def __init__(
@@ -245,18 +217,10 @@ class CompiledWrist:
     ) -> PredictedRows:
         """Predict n samples in their order.
 
-        Parameters
-        ----------
-        theta : (n, 2) float
-            Motor angles [rad].
-        load : (n, 6) float
-            As the load sensor says it at O [N, N m].
-        on_platform : (n,) bool
-            Which of them are in U, not in F.
-        closed : (m,) bool
-            First guess of the contact state; afterwards that of the last sample.
-        wanted : (n,) bool, optional
-            Samples to serve; all if None.
+        `theta` (n, 2): motor angles [rad].  `load` (n, 6): as the load sensor says it at O [N, N
+        m].  `on_platform` (n,): which of them are in U, not in F.  `closed` (m,): first guess of
+        the contact state; afterwards that of the last sample.  `wanted` (n,): samples to serve; all
+        if None.
         """
         n = len(on_platform)
         rows = PredictedRows(

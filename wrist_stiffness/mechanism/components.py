@@ -51,83 +51,52 @@ class FlangeContact:
         delta = C W + screw @ force        gap = gap0 + sign * x + screw.T @ W + approach @ force
 
     Everything is at O in F with the wrist at home; it turns with the bushing's carrier.
-
-    Parameters
-    ----------
-    sign : (m,) float
-        +1 where a positive slide opens the gap (flange on the motor side of the hub face along the
-        joint axis), -1 where it closes it.
-    screw : (6, m) float
-        Screw of the bushing for a unit contact force of each sector [m/N, rad/N].
-    approach : (m, m) float
-        Opening of each gap by the unit forces, without the slide [m/N]; symmetric.
-    weight_approach : (m, 3) float
-        Opening of each gap by a unit acceleration field on the bushing itself [m/(m/s^2)].
-    gap : (m,) float
-        Gap of the unloaded bushing with the slide at zero [m].
     """
 
+    # (m,), +1 where a positive slide opens the gap (flange on the motor side of the hub face along
+    # the joint axis), -1 where it closes it
     sign: Array
+    # (6, m), screw of the bushing for a unit contact force of each sector [m/N, rad/N]
     screw: Array
+    # (m, m), opening of each gap by the unit forces, without the slide [m/N]; symmetric
     approach: Array
+    # (m, 3), opening of each gap by a unit acceleration field on the bushing itself [m/(m/s^2)]
     weight_approach: Array
-    gap: Array
+    gap: Array  # (m,), gap of the unloaded bushing with the slide at zero [m]
 
 
 @dataclass(frozen=True)
 class ContactSectors:
-    """The sectors of all flanges in one row of m, joint after joint as in `PASSIVE_JOINTS`.
+    """The sectors of all flanges in one row of m, joint after joint as in `PASSIVE_JOINTS`."""
 
-    Parameters
-    ----------
-    component : (m,) int
-        Number in `ELASTIC` of the bushing that a sector belongs to.
-    slide : (m, 3) float
-        Opening of each gap for a unit slide of joint_2, joint_3 and joint_4.
-    screw : (m, 6) float
-        Screw of the bushing for a unit contact force of each sector [m/N, rad/N].
-    approach : (m, m) float
-        Opening of the gaps by unit forces without the slides, zero between joints [m/N].
-    weight_approach : (m, 3) float
-        Opening by a unit acceleration field on the bushing itself [m/(m/s^2)].
-    gap : (m,) float
-        Gap of the unloaded bushings with the slides at zero [m].
-    """
-
-    component: NDArray[np.intp]
-    slide: Array
+    component: NDArray[np.intp]  # (m,), number in `ELASTIC` of the bushing that a sector belongs to
+    slide: Array  # (m, 3), opening of each gap for a unit slide of joint_2, joint_3 and joint_4
+    # (m, 6), screw of the bushing for a unit contact force of each sector [m/N, rad/N]
     screw: Array
+    # (m, m), opening of the gaps by unit forces without the slides, zero between joints [m/N]
     approach: Array
+    # (m, 3), opening by a unit acceleration field on the bushing itself [m/(m/s^2)]
     weight_approach: Array
-    gap: Array
+    gap: Array  # (m,), gap of the unloaded bushings with the slides at zero [m]
 
 
 @dataclass(frozen=True)
 class ElasticComponents:
-    """All elastic parts, condensed onto rigid interface frames, at O in F with the wrist at home.
+    """All elastic parts, condensed onto rigid interface frames, at O in F, the wrist at home."""
 
-    Parameters
-    ----------
-    flexibility : (8, 6, 6) float
-        Screw of the platform side against the motor side for a unit wrench at O, in the order of
-        `ELASTIC`; symmetric positive definite [m/N, rad/N, rad/(N m)].
-    weight_motor_side, weight_platform_side : (8, 6, 3) float
-        Wrench at O for a unit acceleration field along x, y, z of the body, condensed consistently
-        onto the two interface frames [N/(m/s^2), N m/(m/s^2)]; their sum is the part's weight.
-    platform_weight : (6, 3) float
-        The same for the rigid platform.
-    contact : dict of str to FlangeContact
-        Flange contact by passive joint; a joint without flanges is absent.
-    mass : (8, 12, 12) float
-        Of each part, condensed onto its motor-side and its platform-side frame; only the natural
-        modes need it, a table of an older version has none [kg, kg m, kg m^2].
-    """
-
+    # (8, 6, 6), screw of the platform side against the motor side for a unit wrench at O, in the
+    # order of `ELASTIC`; symmetric positive definite [m/N, rad/N, rad/(N m)]
     flexibility: Array
+    # `weight_motor_side`, `weight_platform_side`: (8, 6, 3), wrench at O for a unit acceleration
+    # field along x, y, z of the body, condensed consistently onto the two interface frames
+    # [N/(m/s^2), N m/(m/s^2)]; their sum is the part's weight
     weight_motor_side: Array
     weight_platform_side: Array
-    platform_weight: Array
+    platform_weight: Array  # (6, 3), the same for the rigid platform
+    # flange contact by passive joint; a joint without flanges is absent
     contact: dict[str, FlangeContact]
+    # (8, 12, 12), of each part, condensed onto its motor-side and its platform-side frame; only the
+    # natural modes need it, a table of an older version has none [kg, kg m, kg m^2]
     mass: Array | None = None
 
     @cached_property

@@ -26,21 +26,9 @@ def third_axis(
 ) -> Array:
     """Return the unit axes w with given cosines to unit u and v, and given w . (u x v).
 
-    Parameters
-    ----------
-    u, v, across : (..., 3) float
-        Unit axes, and u x v.
-    k : (...) float
-        u . v, not +1 or -1.
-    cos_u, cos_v : float
-        w . u and w . v
-    determinant : (...) float
-        Square root of `gram_determinant`; its sign chooses one of the two axes.
-
-    Returns
-    -------
-    (..., 3) float
-        Unit axes, but for rounding.
+    `u`, `v`, `across` (..., 3): unit axes, and u x v.  `k` (...): u . v, not +1 or -1.  `cos_u`,
+    `cos_v`: w . u and w . v.  `determinant` (...): square root of `gram_determinant`; its sign
+    chooses one of the two axes.  Gives (..., 3): unit axes, but for rounding.
     """
     scale = 1.0 / (1.0 - k * k)
     return (

@@ -20,29 +20,18 @@ TURNING["joint_4"] = ("link_2", "link_3")
 
 @dataclass(frozen=True)
 class Configuration:
-    """The wrist at given motor angles, rigid, origin at O, everything in F.
+    """The wrist at given motor angles, rigid, origin at O, everything in F."""
 
-    Parameters
-    ----------
-    theta : (..., 2) float
-        Motor angles [rad].
-    b, c, d : (..., 3) float
-        Unit axes of joint_2, joint_3 and joint_4.
-    singularity : (...) float
-        D = b . (d x c), zero where the platform gains a freedom (type 2).
-    dual : (..., 3, 3) float
-        Rows d x c, b x d and c x b over D, the basis dual to (b, c, d): they hold the influence.
-    bodies : (..., 5, 3, 3) float
-        Rotation of each of `BODIES` from home.
-    """
-
-    theta: Array
+    theta: Array  # (..., 2), motor angles [rad]
+    # `b`, `c`, `d`: (..., 3), unit axes of joint_2, joint_3 and joint_4
     b: Array
     c: Array
     d: Array
-    singularity: Array
+    singularity: Array  # (...), D = b . (d x c), zero where the platform gains a freedom (type 2)
+    # (..., 3, 3), rows d x c, b x d and c x b over D, the basis dual to (b, c, d): they hold the
+    # influence
     dual: Array
-    bodies: Array
+    bodies: Array  # (..., 5, 3, 3), rotation of each of `BODIES` from home
     if TYPE_CHECKING:
         row: ClassVar[Array]
         """The numbers of one pose, (66,)."""

@@ -16,25 +16,10 @@ def solve_contacts(
 ) -> tuple[Array, Flags]:
     """Solve t contact problems of each of n samples.
 
-    Parameters
-    ----------
-    approach : (n, m, m) float
-        A of each sample [m/N].
-    gap : (n, m) or (n, t, m) float
-        Openings without contact forces [m].
-    guess : bool, optional
-        Sectors in contact to begin with, as `gap` or spread to its shape; leaves no trace in the
-        result.
-
-    Returns
-    -------
-    force : as `gap`
-        Not negative [N].
-
-    Raises
-    ------
-    InputError
-        If an input is not finite or a matrix is not positive definite.
+    `approach` (n, m, m): A of each sample [m/N].  `gap` (n, m) or (n, t, m): openings without
+    contact forces [m].  `guess`: sectors in contact to begin with, as `gap` or spread to its shape;
+    leaves no trace in the result.  Gives `force`: not negative [N].  Raises `InputError` if an
+    input is not finite or a matrix is not positive definite.
     """
     n, m = len(approach), approach.shape[-1]
     active = np.zeros(gap.shape, dtype=bool)
@@ -58,24 +43,9 @@ def solve_contacts(
 def forces_of(approach: Array, gap: Array, closed: Flags) -> Array:
     """Return the forces that close the given sectors, of either sign: the tangent of contact.
 
-    Parameters
-    ----------
-    approach : (n, m, m) float
-        A [m/N].
-    gap : (n, m) or (n, t, m) float
-        Openings without contact forces [m].
-    closed : (n, m) bool
-        Sectors held closed.
-
-    Returns
-    -------
-    as `gap`
-        Forces, linear in it; zero where not held [N].
-
-    Raises
-    ------
-    InputError
-        If a matrix is not positive definite.
+    `approach` (n, m, m): A [m/N]; `gap` (n, m) or (n, t, m): openings without contact forces [m];
+    `closed` (n, m): sectors held closed.  Gives forces, linear in it; zero where not held [N].
+    Raises `InputError` if a matrix is not positive definite.
     """
     n, m = closed.shape
     if not gap.size:

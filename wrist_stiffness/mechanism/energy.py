@@ -19,19 +19,9 @@ def component_wrenches(
 ) -> Array:
     """Return the wrench through each component under a platform load and contact forces.
 
-    Parameters
-    ----------
-    projectors : Influence
-        Of configurations of shape (...).
-    wrench : (..., 6) float
-        On the platform at O in F [N, N m].
-    force : (..., m) float
-        Contact force of each sector [N], as the contact solution gives it.
-
-    Returns
-    -------
-    (..., 8, 6) float
-        G_k' W + N_k' lambda at O in F [N, N m]; own weight is not in it.
+    `projectors`: of configurations of shape (...); `wrench` (..., 6): on the platform at O in F [N,
+    N m]; `force` (..., m): contact force of each sector [N], as the contact solution gives it.
+    Gives (..., 8, 6): G_k' W + N_k' lambda at O in F [N, N m]; own weight is not in it.
     """
     halves = np.reshape(wrench, (*np.shape(wrench)[:-1], 1, 2, 3)) @ projectors.of_components()
     # Net push of the hubs along the joint axes, by virtual work on the slides.
@@ -45,19 +35,9 @@ def component_screws(
 ) -> Array:
     """Return the elastic screw of each component under a platform load and contact forces.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    wrench : (..., 6) float
-        On the platform at O in F [N, N m].
-    force : (..., m) float
-        Contact force of each sector [N].
-
-    Returns
-    -------
-    (..., 8, 6) float
-        C_k W_k, plus what pressed flanges add to their bushing; at O in F [m, rad].
+    `configuration`: of shape (...); `wrench` (..., 6): on the platform at O in F [N, N m]; `force`
+    (..., m): contact force of each sector [N].  Gives (..., 8, 6): C_k W_k, plus what pressed
+    flanges add to their bushing; at O in F [m, rad].
     """
     through = component_wrenches(influence(configuration), components, wrench, force)
     flexibility = turned_flexibilities(configuration, components)
@@ -73,19 +53,8 @@ def strain_energies(
     Where every touching sector had no gap, the energies add up to half the load's work: shares are
     then an error budget.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    wrench : (..., 6) float
-        On the platform at O in F [N, N m].
-    force : (..., m) float
-        Contact force of each sector [N].
-
-    Returns
-    -------
-    (..., 8) float
-        In the order of `ELASTIC` [J].
+    `configuration`: of shape (...); `wrench` (..., 6): on the platform at O in F [N, N m]; `force`
+    (..., m): contact force of each sector [N].  Gives (..., 8): in the order of `ELASTIC` [J].
     """
     through = component_wrenches(influence(configuration), components, wrench, force)
     flexibility = turned_flexibilities(configuration, components)

@@ -20,29 +20,20 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class LinkDimensions:
-    """Circular arc bar about O between two joint axes, with a radial bore for the pin at each end.
+    """Circular arc bar about O between two joint axes, with a radial bore for a pin at each end."""
 
-    Parameters
-    ----------
-    arc_radius : float
-        Radius of the centre line [m].
-    section_radial, section_axial : float
-        Section along the radius and along the normal of the arc's plane [m].
-    overhang : float
-        Arc length of the bar past each bore's centre [m].
-    motor_bore, platform_bore : float
-        Diameter of the radial bore at the motor-side and platform-side joint [m].
-    stiffness : OwnStiffness or None
-        Given by the file instead of the bar's; the bar still says what it weighs.
-    """
-
-    arc_radius: float
+    arc_radius: float  # radius of the centre line [m]
+    # `section_radial`, `section_axial`: section along the radius and along the normal of the arc's
+    # plane [m]
     section_radial: float
     section_axial: float
-    overhang: float
+    overhang: float  # arc length of the bar past each bore's centre [m]
+    # `motor_bore`, `platform_bore`: diameter of the radial bore at the motor-side and platform-side
+    # joint [m]
     motor_bore: float
     platform_bore: float
     material: AnyMaterial
+    # given by the file instead of the bar's; the bar still says what it weighs
     stiffness: OwnStiffness | None = None
 
 
@@ -52,98 +43,56 @@ class BushingDimensions:
 
     "Inner" is the end nearer to O.  A passive joint's flange touches the face of the hub that it
     looks at; its gap is the play of the unloaded joint at that face.
-
-    Parameters
-    ----------
-    radius : float
-        Place of the centre along the joint axis from O [m]; negative on the far side of O.
-    pin_diameter : float
-        Inner diameter [m].
-    length : float
-        Length of the sleeve between the flanges' hub-side faces [m].
-    wall : float
-        Wall thickness of the sleeve [m].
-    flange_diameter, flange_thickness : float
-        Of each flange present [m].
-    inner_gap, outer_gap : float or None
-        Gap between flange and hub face [m]; None where there is no flange.
-    stiffness : OwnStiffness or None
-        Given by the file, or of its ball bearings, instead of the sleeve's, where no flange takes
-        part in contact.
     """
 
+    # place of the centre along the joint axis from O [m]; negative on the far side of O
     radius: float
-    pin_diameter: float
-    length: float
-    wall: float
+    pin_diameter: float  # inner diameter [m]
+    length: float  # length of the sleeve between the flanges' hub-side faces [m]
+    wall: float  # wall thickness of the sleeve [m]
+    # `flange_diameter`, `flange_thickness`: of each flange present [m]
     flange_diameter: float
     flange_thickness: float
+    # `inner_gap`, `outer_gap`: gap between flange and hub face [m]; None where there is no flange
     inner_gap: float | None
     outer_gap: float | None
     material: AnyMaterial
+    # given by the file, or of its ball bearings, instead of the sleeve's, where no flange takes
+    # part in contact
     stiffness: OwnStiffness | None = None
 
 
 @dataclass(frozen=True)
 class PlatformDimensions:
-    """Rigid mobile platform.
+    """Rigid mobile platform."""
 
-    Parameters
-    ----------
-    normal : (3,) float
-        Home normal n0, unit vector in F.
-    centre : (3,) float
-        Plate centre P0 in U [m].
-    diameter, thickness : float
-        Of the round plate [m].
-    mass : float
-        [kg].
-    centre_of_gravity : (3,) float
-        In U [m].
-    tool_point : (3,) float
-        In U [m].
-    readout_points : (n, 3) float
-        Points for Eqs. (1)-(10), in U [m].
-    """
-
-    normal: Array
-    centre: Array
+    normal: Array  # (3,), home normal n0, unit vector in F
+    centre: Array  # (3,), plate centre P0 in U [m]
+    # `diameter`, `thickness`: of the round plate [m]
     diameter: float
     thickness: float
-    mass: float
-    centre_of_gravity: Array
-    tool_point: Array
-    readout_points: Array
+    mass: float  # [kg]
+    centre_of_gravity: Array  # (3,), in U [m]
+    tool_point: Array  # (3,), in U [m]
+    readout_points: Array  # (n, 3), points for Eqs. (1)-(10), in U [m]
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Where the wrist may work.
+    """Where the wrist may work."""
 
-    Parameters
-    ----------
-    joint_lower, joint_upper : (2,) float
-        Motor angles [rad].
-    operative_tilt : float
-        Largest tilt of the platform normal from home in the operative workspace [rad].
-    map_margin : float
-        The map's domain is the operative workspace's bounding rectangle times this [-].
-    singularity : float
-        Least |D| in the map's domain [-].
-    force, moment : float
-        Largest components' norm of the load at O [N, N m].
-    encoder_step : float
-        Resolution of the motor encoders [rad].
-    """
-
+    # `joint_lower`, `joint_upper`: (2,), motor angles [rad]
     joint_lower: Array
     joint_upper: Array
+    # largest tilt of the platform normal from home in the operative workspace [rad]
     operative_tilt: float
+    # the map's domain is the operative workspace's bounding rectangle times this [-]
     map_margin: float
-    singularity: float
+    singularity: float  # least |D| in the map's domain [-]
+    # `force`, `moment`: largest components' norm of the load at O [N, N m]
     force: float
     moment: float
-    encoder_step: float
+    encoder_step: float  # resolution of the motor encoders [rad]
 
     @cached_property
     def reach(self) -> tuple[tuple[float, float], ...]:
@@ -166,43 +115,23 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Everything the geometry file says about one wrist.
+    """Everything the geometry file says about one wrist."""
 
-    Parameters
-    ----------
-    name, status : str
-        Name, and `assumed`, `calibrated` or `measured` for the whole.
-    axes : dict of str to (3,) float
-        Home axes of `joint_1` ... `joint_5`, unit vectors through O in F.
-    links, bushings : dict
-        Dimensions by component name.
-    platform : PlatformDimensions
-        The mobile platform.
-    limits : Limits
-        Joint, load and workspace limits.
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
-    reference_temperature : float
-        [degC].
-    load_point : (3,) float
-        Where the rated 1 N load of the maps acts, in U [m].
-    sha256 : str
-        Checksum of the file's values, the same for the same values in any layout.
-    pins : Material, optional
-        Of which all pins are, as beams; None where they are taken as rigid.
-    """
-
+    # `name`, `status`: name, and `assumed`, `calibrated` or `measured` for the whole
     name: str
     status: str
+    # dict of str to (3,), home axes of `joint_1` ... `joint_5`, unit vectors through O in F
     axes: dict[str, Array]
+    # `links`, `bushings`: dimensions by component name
     links: dict[str, LinkDimensions]
     bushings: dict[str, BushingDimensions]
-    platform: PlatformDimensions
-    limits: Limits
-    gravity: Array
-    reference_temperature: float
-    load_point: Array
-    sha256: str
+    platform: PlatformDimensions  # the mobile platform
+    limits: Limits  # joint, load and workspace limits
+    gravity: Array  # (3,), acceleration of gravity in F [m/s^2]
+    reference_temperature: float  # [degC]
+    load_point: Array  # (3,), where the rated 1 N load of the maps acts, in U [m]
+    sha256: str  # checksum of the file's values, the same for the same values in any layout
+    # of which all pins are, as beams; None where they are taken as rigid
     pins: Material | None = None
 
     def joint_side(self, joint: str) -> Array:

@@ -80,21 +80,9 @@ P = TypeVar("P", LinkDimensions, BushingDimensions)
 def load_geometry(path: str | Path) -> Geometry:
     """Read a geometry file.
 
-    Parameters
-    ----------
-    path : path
-        A YAML file; `config/palmieri2015.yaml` is the documented example.
-
-    Returns
-    -------
-    Geometry
-        Checked values in SI units.
-
-    Raises
-    ------
-    GeometryError
-        If the file cannot be read, a key is missing, unknown or outside its limits, or the home
-        pose is singular.
+    `path`: a YAML file; `config/palmieri2015.yaml` is the documented example.  Gives `Geometry`:
+    checked values in SI units.  Raises `GeometryError` if the file cannot be read, a key is
+    missing, unknown or outside its limits, or the home pose is singular.
     """
     return geometry_of(read_yaml(path, GeometryError))
 
@@ -102,22 +90,8 @@ def load_geometry(path: str | Path) -> Geometry:
 def geometry_from_values(values: Mapping[str, Any], place: str = "geometry") -> Geometry:
     """Build a geometry from the file's values, for example those in a table.
 
-    Parameters
-    ----------
-    values : mapping
-        As a geometry file reads.
-    place : str
-        What error messages call it.
-
-    Returns
-    -------
-    Geometry
-        Checked values in SI units.
-
-    Raises
-    ------
-    GeometryError
-        As `load_geometry`.
+    `values`: as a geometry file reads; `place`: what error messages call it.  Gives `Geometry`:
+    checked values in SI units.  Raises `GeometryError` as `load_geometry`.
     """
     return geometry_of(node_of(values, place, GeometryError))
 

@@ -60,23 +60,15 @@ MOTOR_SIDE_LAW, PLATFORM_SIDE_LAW = _frame_laws()
 
 @dataclass(frozen=True)
 class Influence:
-    """The 3x3 projectors of one configuration (or a stack of them).
+    """The 3x3 projectors of one configuration (or a stack of them)."""
 
-    Parameters
-    ----------
-    limb_1, limb_2 : (..., 3, 3) float
-        G of any component in limb 1 and in limb 2.
-    slides_limb_1 : (..., 3, 3) float
-        Slide of joint_2, joint_3, joint_4 (rows) for a translation in limb 1 (columns); the turns
-        obey the same rows for a rotation.  Limb 2 has the opposite sign.
-    link_3 : (..., 3, 3) float
-        P = d f'/(f.d), f = b x c: how a screw of limb 1 moves link_3.
-    """
-
+    # `limb_1`, `limb_2`: (..., 3, 3), G of any component in limb 1 and in limb 2
     limb_1: Array
     limb_2: Array
+    # (..., 3, 3), slide of joint_2, joint_3, joint_4 (rows) for a translation in limb 1 (columns);
+    # the turns obey the same rows for a rotation.  Limb 2 has the opposite sign
     slides_limb_1: Array
-    link_3: Array
+    link_3: Array  # (..., 3, 3), P = d f'/(f.d), f = b x c: how a screw of limb 1 moves link_3
 
     def of_components(self) -> Array:
         """G of all elastic components in the order of `ELASTIC`, (..., 8, 3, 3)."""
@@ -118,15 +110,8 @@ class Influence:
 def influence(configuration: Configuration) -> Influence:
     """Return the influence projectors of a configuration.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...), away from the singularity D = 0, where the amplifier 1/(e.b) is unbounded.
-
-    Returns
-    -------
-    Influence
-        Projectors of shape (..., 3, 3).
+    `configuration`: of shape (...), away from the singularity D = 0, where the amplifier 1/(e.b) is
+    unbounded.  Gives `Influence`: projectors of shape (..., 3, 3).
     """
     dual = configuration.dual
     # e/(e.b) and f/(f.d) are the dual vectors of b and d.

@@ -46,25 +46,16 @@ HOME_TOLERANCE = 1e-6
 class Mechanism:
     """A spherical five-bar given by its five home axes.
 
-    Parameters
-    ----------
-    a1, b0, c0, d0, a2 : (3,) float
-        Home axes of joint_1 ... joint_5, unit vectors through O.
-    n0 : (3,) float
-        Home normal of the platform, unit vector.
-
-    Raises
-    ------
-    GeometryError
-        If neighbouring axes are parallel or the home pose is singular.
+    Raises `GeometryError` if neighbouring axes are parallel or the home pose is singular.
     """
 
+    # `a1`, `b0`, `c0`, `d0`, `a2`: (3,), home axes of joint_1 ... joint_5, unit vectors through O
     a1: Array
     b0: Array
     c0: Array
     d0: Array
     a2: Array
-    n0: Array
+    n0: Array  # (3,), home normal of the platform, unit vector
 
     def __post_init__(self) -> None:
         """Check the home pose."""

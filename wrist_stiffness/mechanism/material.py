@@ -25,24 +25,12 @@ LEAST_DETERMINANT = 1e-9
 
 @dataclass(frozen=True)
 class Material:
-    """Linear isotropic material.
+    """Linear isotropic material."""
 
-    Parameters
-    ----------
-    young : float
-        Young's modulus [Pa].
-    poisson : float
-        Poisson's ratio [-].
-    density : float
-        [kg/m^3].
-    expansion : float
-        Coefficient of linear thermal expansion [1/K].
-    """
-
-    young: float
-    poisson: float
-    density: float
-    expansion: float
+    young: float  # Young's modulus [Pa]
+    poisson: float  # Poisson's ratio [-]
+    density: float  # [kg/m^3]
+    expansion: float  # coefficient of linear thermal expansion [1/K]
 
 
 @dataclass(frozen=True)
@@ -51,27 +39,15 @@ class OrthotropicMaterial:
 
     Its first axis points along the radius, its second around, its third along the axis: of a
     link's arc, that is normal to its plane, or of a bushing's bore.
-
-    Parameters
-    ----------
-    young : (float, float, float)
-        Young's moduli along the three axes [Pa].
-    poisson : (float, float, float)
-        Contraction along the second axis by the stretch along the first, along the third by that
-        along the first, along the third by that along the second [-].
-    shear : (float, float, float)
-        Shear moduli between the same pairs of axes [Pa].
-    density : float
-        [kg/m^3].
-    expansion : float
-        Coefficient of linear thermal expansion [1/K].
     """
 
-    young: tuple[float, float, float]
+    young: tuple[float, float, float]  # Young's moduli along the three axes [Pa]
+    # contraction along the second axis by the stretch along the first, along the third by that
+    # along the first, along the third by that along the second [-]
     poisson: tuple[float, float, float]
-    shear: tuple[float, float, float]
-    density: float
-    expansion: float
+    shear: tuple[float, float, float]  # shear moduli between the same pairs of axes [Pa]
+    density: float  # [kg/m^3]
+    expansion: float  # coefficient of linear thermal expansion [1/K]
 
     @property
     def compliance(self) -> Array:

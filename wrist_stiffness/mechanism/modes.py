@@ -34,24 +34,12 @@ COORDINATES = 6 * len(ELASTIC)
 class RigidBody:
     """A mass that moves with the platform.
 
-    Parameters
-    ----------
-    mass : float
-        [kg].
-    centre : (3,) float
-        Its centre of gravity in U [m].
-    inertia : (3, 3) float
-        About that, in the axes of U [kg m^2].
-
-    Raises
-    ------
-    InputError
-        If the mass is negative, or no body has such an inertia.
+    Raises `InputError` if the mass is negative, or no body has such an inertia.
     """
 
-    mass: float
-    centre: Array
-    inertia: Array
+    mass: float  # [kg]
+    centre: Array  # (3,), its centre of gravity in U [m]
+    inertia: Array  # (3, 3), about that, in the axes of U [kg m^2]
 
     def __post_init__(self) -> None:
         """Refuse what no body is."""
@@ -90,17 +78,10 @@ def plate(platform: PlatformDimensions) -> RigidBody:
 
 @dataclass(frozen=True)
 class NaturalModes:
-    """Natural modes at poses of shape (...), the slowest first.
+    """Natural modes at poses of shape (...), the slowest first."""
 
-    Parameters
-    ----------
-    frequency : (..., k) float
-        [Hz].
-    screws : (..., k, 8, 6) float
-        Elastic screw of each component, of any scale, at O in F [m, rad].
-    """
-
-    frequency: Array
+    frequency: Array  # (..., k) [Hz]
+    # (..., k, 8, 6), elastic screw of each component, of any scale, at O in F [m, rad]
     screws: Array
 
 
@@ -116,26 +97,9 @@ def natural_modes(
     Inertia inside a part follows its frames as in statics, so modes far below the parts' own are
     right (docs/physics.md).
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    bodies : tuple of RigidBody
-        What moves with the platform: its plate, and a payload.
-    closed : (..., m) bool
-        Flange sectors that are and stay in touch.
-    count : int
-        Modes.
-
-    Returns
-    -------
-    NaturalModes
-        Of shape (...).
-
-    Raises
-    ------
-    TableError
-        If the components have no masses.
+    `configuration`: of shape (...); `bodies`: what moves with the platform: its plate, and a
+    payload; `closed` (..., m): flange sectors that are and stay in touch; `count`: modes.  Gives
+    `NaturalModes`: of shape (...).  Raises `TableError` if the components have no masses.
     """
     if components.mass is None:
         raise TableError(

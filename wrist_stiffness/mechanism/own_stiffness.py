@@ -29,15 +29,10 @@ LOOSE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class OwnStiffness:
-    """A part between its two frames.
+    """A part between its two frames."""
 
-    Parameters
-    ----------
-    flexibility : (6, 6) float
-        Screw of the platform-side frame against the motor-side one for unit wrenches, at O in F
-        with the wrist at home [m/N, rad/N, rad/(N m)]; none where the part holds nothing.
-    """
-
+    # (6, 6), screw of the platform-side frame against the motor-side one for unit wrenches, at O in
+    # F with the wrist at home [m/N, rad/N, rad/(N m)]; none where the part holds nothing
     flexibility: Array
 
 
@@ -50,24 +45,10 @@ _READ = record(
 def own_stiffness(node: Node, distance: float, free: Array) -> OwnStiffness:
     """Read the stiffness of a part: wrenches [N, N mm] by row for twists [mm, rad] by column.
 
-    Parameters
-    ----------
-    node : Node
-        `matrix_N_mm`, and the frame in F at home if it is not O and F: `origin_mm`, `x`, `y`.
-    distance : float
-        Of the part from O [m].
-    free : (6, k) float
-        Twists at O that it need not hold: slide and turn of a joint; none for a link.
-
-    Returns
-    -------
-    OwnStiffness
-        In SI units.
-
-    Raises
-    ------
-    GeometryError
-        If the matrix is not symmetric, not definite or lets go of what it must hold.
+    `node`: `matrix_N_mm`, and the frame in F at home if it is not O and F: `origin_mm`, `x`, `y`.
+    `distance`: of the part from O [m].  `free` (6, k): twists at O that it need not hold: slide and
+    turn of a joint; none for a link.  Gives `OwnStiffness`: in SI units.  Raises `GeometryError` if
+    the matrix is not symmetric, not definite or lets go of what it must hold.
     """
     read, place = _READ(node), node["matrix_N_mm"]
     matrix = np.array(read["matrix_N_mm"])
@@ -99,17 +80,8 @@ def bearing_pair(centre: Array, axis: Array) -> Schema[OwnStiffness]:
     the lines of contact meet the axis.  Balls that share a preload evenly are exactly a radial and
     an axial spring at that point: T. C. Lim and R. Singh, J. Sound Vib. 139 (1990) 179.
 
-    Parameters
-    ----------
-    centre : (3,) float
-        The middle of the pair in F at home [m].
-    axis : (3,) float
-        Unit vector.
-
-    Returns
-    -------
-    schema
-        Refuses what is missing or not positive.
+    `centre` (3,): the middle of the pair in F at home [m]; `axis` (3,): unit vector.  The schema
+    refuses what is missing or not positive.
     """
     keys = dict.fromkeys(("radial_N_um", "axial_N_um", "distance_mm"), Quantity(number(above=0.0)))
 

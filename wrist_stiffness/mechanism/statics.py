@@ -58,22 +58,13 @@ def compliance(configuration: Configuration, components: ElasticComponents) -> A
 
 @dataclass(frozen=True)
 class WeightResponse:
-    """What the own weight of all parts does at a pose, with free slides.
+    """What the own weight of all parts does at a pose, with free slides."""
 
-    Parameters
-    ----------
-    wrench : (..., 8, 6) float
-        Wrench at O in F that bends each component: what its platform side carries, its own
-        condensed weight there included [N, N m].
-    screw : (..., 8, 6) float
-        Elastic screw of each component [m, rad].
-    twist : (..., 6) float
-        Twist of the platform [m, rad].
-    """
-
+    # (..., 8, 6), wrench at O in F that bends each component: what its platform side carries, its
+    # own condensed weight there included [N, N m]
     wrench: Array
-    screw: Array
-    twist: Array
+    screw: Array  # (..., 8, 6), elastic screw of each component [m, rad]
+    twist: Array  # (..., 6), twist of the platform [m, rad]
 
 
 def weight_response(
@@ -81,17 +72,8 @@ def weight_response(
 ) -> WeightResponse:
     """Return the response to the parts' own weight.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
-
-    Returns
-    -------
-    WeightResponse
-        Wrenches through the components, their screws and the platform's twist.
+    `configuration`: of shape (...); `gravity` (3,): acceleration of gravity in F [m/s^2].  Gives
+    `WeightResponse`: wrenches through the components, their screws and the platform's twist.
     """
     projectors = influence(configuration)
     wrench = weight_wrench(configuration, components, gravity, projectors)
@@ -155,34 +137,19 @@ def _turned(matrix: Array, six: Array) -> Array:
 class ContactOperators:
     """What is needed to solve flange contact at a pose for any load and any screw (m sectors).
 
-        0 <= lambda  perpendicular to  gap + B' W + sum_k N_k delta_k + A lambda >= 0
-        xi = C W + twist0 + sum_k G_k delta_k + B lambda
-
-    Parameters
-    ----------
-    compliance : (..., 6, 6) float
-        C [m/N, ...].
-    force_twist : (..., 6, m) float
-        B, the platform's twist for a unit contact force of each sector.
-    approach : (..., m, m) float
-        A, opening of each gap for unit forces [m/N]; symmetric positive definite.
-    gap : (..., m) float
-        Gaps under own weight alone [m].
-    weight_twist : (..., 6) float
-        Platform twist under own weight with free slides [m, rad].
-    slide : (m, 3) float
-        Opening of each gap for a unit slide of joint_2, joint_3 and joint_4.
-    slides : (..., 8, 3, 3) float
-        Slides (rows) by a translation of each elastic component.
+    0 <= lambda  perpendicular to  gap + B' W + sum_k N_k delta_k + A lambda >= 0
+    xi = C W + twist0 + sum_k G_k delta_k + B lambda
     """
 
-    compliance: Array
+    compliance: Array  # (..., 6, 6), C [m/N, ...]
+    # (..., 6, m), B, the platform's twist for a unit contact force of each sector
     force_twist: Array
+    # (..., m, m), A, opening of each gap for unit forces [m/N]; symmetric positive definite
     approach: Array
-    gap: Array
-    weight_twist: Array
-    slide: Array
-    slides: Array
+    gap: Array  # (..., m), gaps under own weight alone [m]
+    weight_twist: Array  # (..., 6), platform twist under own weight with free slides [m, rad]
+    slide: Array  # (m, 3), opening of each gap for a unit slide of joint_2, joint_3 and joint_4
+    slides: Array  # (..., 8, 3, 3), slides (rows) by a translation of each elastic component
 
     @cached_property
     def screw_gap(self) -> Array:
@@ -198,17 +165,8 @@ def contact_operators(
 ) -> ContactOperators:
     """Assemble the operators of the contact problem at a pose.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
-
-    Returns
-    -------
-    ContactOperators
-        Of the same leading shape; m = 0 sectors if no joint has a flange.
+    `configuration`: of shape (...); `gravity` (3,): acceleration of gravity in F [m/s^2].  Gives
+    `ContactOperators`: of the same leading shape; m = 0 sectors if no joint has a flange.
     """
     projectors = influence(configuration)
     return assembled_operators(
@@ -231,16 +189,9 @@ def assembled_operators(
 ) -> ContactOperators:
     """Do the same where what it rests on is known.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    flexibility : (..., 8, 6, 6) float
-        Of the components at O in F at the pose [m/N, rad/N, rad/(N m)].
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
-    wrench : (..., 8, 6) float
-        Of own weight through the components [N, N m].
+    `configuration`: of shape (...); `flexibility` (..., 8, 6, 6): of the components at O in F at
+    the pose [m/N, rad/N, rad/(N m)]; `gravity` (3,): acceleration of gravity in F [m/s^2]; `wrench`
+    (..., 8, 6): of own weight through the components [N, N m].
     """
     sums = _summed(configuration, projectors, components, flexibility, gravity, wrench)
     return ContactOperators(
@@ -260,16 +211,9 @@ def changed_operators(
 
     They are sums over the parts, so only what changes is computed.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of shape (...).
-    before, after : ElasticComponents
-        Parts with the same weights and the same flange sectors.
-    gravity : (3,) float
-        Acceleration of gravity in F [m/s^2].
-    wrench : (..., 8, 6) float
-        Of own weight through the components [N, N m].
+    `configuration`: of shape (...); `before`, `after`: parts with the same weights and the same
+    flange sectors; `gravity` (3,): acceleration of gravity in F [m/s^2]; `wrench` (..., 8, 6): of
+    own weight through the components [N, N m].
     """
     contact = {
         joint: replace(

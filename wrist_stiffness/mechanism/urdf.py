@@ -40,16 +40,8 @@ SEGMENTS = 8
 def urdf(geometry: Geometry, motors: tuple[str, str]) -> str:
     """Return the URDF of a wrist.
 
-    Parameters
-    ----------
-    motors : (str, str)
-        Names of the motors' joints.
-
-    Returns
-    -------
-    str
-        XML; lengths in m.  Effort and speed of the motors, which a URDF must state, are not known
-        and zero.
+    `motors`: names of the motors' joints.  Gives XML; lengths in m.  Effort and speed of the
+    motors, which a URDF must state, are not known and zero.
     """
     robot = ElementTree.Element("robot", name=geometry.name)
     for body, frame in FRAMES.items():

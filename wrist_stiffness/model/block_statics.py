@@ -26,27 +26,14 @@ class BlockStatics:
     """n samples at their configurations with elastic parts.
 
     Models that share it share the work: nothing is computed before it is asked for, or twice.
-
-    Parameters
-    ----------
-    block : Block
-        The samples, with speeds.
-    load : (n, 6) float
-        What the load sensor says, in F at O [N, N m].
-    configuration : Configuration
-        Of shape (n,).
-    evaluation : str
-        `closed_form` or `spline`.
-    parts : ElasticComponents
-        Elastic parts as they are with a model's effects.
     """
 
-    block: Block
-    load: Array
-    configuration: Configuration
-    evaluation: Evaluation
+    block: Block  # the samples, with speeds
+    load: Array  # (n, 6), what the load sensor says, in F at O [N, N m]
+    configuration: Configuration  # of shape (n,)
+    evaluation: Evaluation  # `closed_form` or `spline`
     table: Table
-    parts: ElasticComponents
+    parts: ElasticComponents  # elastic parts as they are with a model's effects
 
     def with_parts(self, parts: ElasticComponents) -> BlockStatics:
         """Return the statics of the same samples with other parts."""

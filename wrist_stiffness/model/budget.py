@@ -25,57 +25,31 @@ from wrist_stiffness.model.stages import Advanced
 
 @dataclass(frozen=True)
 class Share:
-    """What one component or one effect adds to the pose error.
+    """What one component or one effect adds to the pose error."""
 
-    Parameters
-    ----------
-    name : str
-        Component, or effect@component.
-    twist : (6,) float
-        At O in F [m, rad].
-    spread : (p, 6) float
-        What one standard uncertainty of each uncertain parameter moves the whole [m, rad].
-    """
-
-    name: str
-    twist: Array
+    name: str  # component, or effect@component
+    twist: Array  # (6,), at O in F [m, rad]
+    # (p, 6), what one standard uncertainty of each uncertain parameter moves the whole [m, rad]
     spread: Array
 
 
 @dataclass(frozen=True)
 class Budget:
-    """A pose error and its shares.
+    """A pose error and its shares."""
 
-    Parameters
-    ----------
-    elastic : tuple of Share
-        Of the elastic components as the table has them, in the order of `ELASTIC`.
-    effects : tuple of Share
-        Of the model's effects, in their order.
-    second_order : (6,) float
-        What the exact composition with the pose sensor's effects adds to the sum [m, rad].
-    twist : (6,) float
-        Pose error of the platform [m, rad].
-    measured : (6,) float
-        What the pose sensor would say of it: the sum of all shares and `second_order` [m, rad].
-    covariance : (6, 6) float
-        Of the twist: the table's stated error, the encoder step and the effects' parameters.
-    platform : (3, 3) float
-        Rotation U -> F of the rigid platform.
-    warnings : tuple of str
-        Effects that were left out or have left first order.
-    remembering : tuple of str
-        Effects that hang on what was before, of which one sample says nothing.
-    """
-
+    # of the elastic components as the table has them, in the order of `ELASTIC`
     elastic: tuple[Share, ...]
-    effects: tuple[Share, ...]
+    effects: tuple[Share, ...]  # of the model's effects, in their order
+    # (6,), what the exact composition with the pose sensor's effects adds to the sum [m, rad]
     second_order: Array
-    twist: Array
+    twist: Array  # (6,), pose error of the platform [m, rad]
+    # (6,), what the pose sensor would say of it: the sum of all shares and `second_order` [m, rad]
     measured: Array
+    # (6, 6), of the twist: the table's stated error, the encoder step and the effects' parameters
     covariance: Array
-    platform: Array
-    warnings: tuple[str, ...]
+    platform: Array  # (3, 3), rotation U -> F of the rigid platform
+    warnings: tuple[str, ...]  # effects that were left out or have left first order
+    # effects that hang on what was before, of which one sample says nothing
     remembering: tuple[str, ...]
 
 

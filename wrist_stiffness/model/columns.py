@@ -28,42 +28,24 @@ SMALL = 0.1
 
 @dataclass(frozen=True)
 class Factor:
-    """What stands in front of a column.
+    """What stands in front of a column."""
 
-    Parameters
-    ----------
-    name : str
-        With its unit; the parameter's where the column is one of a parameter.
-    lower, upper : float
-        What is physically possible.
-    plausible : float
-        Usual size.
-    """
-
-    name: str
+    name: str  # with its unit; the parameter's where the column is one of a parameter
+    # `lower`, `upper`: what is physically possible
     lower: float = -np.inf
     upper: float = np.inf
-    plausible: float = 1.0
+    plausible: float = 1.0  # usual size
 
 
 @dataclass(frozen=True)
 class ShapeGrid:
     """What a law is not linear in, with the values to try first.
 
-    Parameters
-    ----------
-    name : str
-        With its unit.
-    grid : tuple of float
-        Two or more increasing values; a search stays between the first and the last.
-
-    Raises
-    ------
-    InputError
-        If the grid cannot be searched.
+    Raises `InputError` if the grid cannot be searched.
     """
 
-    name: str
+    name: str  # with its unit
+    # two or more increasing values; a search stays between the first and the last
     grid: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -74,21 +56,13 @@ class ShapeGrid:
 
 @dataclass(frozen=True)
 class Column:
-    """One column: (prediction at `trial` - prediction at `origin`) / size, per unit of a factor.
+    """One column: (prediction at `trial` - prediction at `origin`) / size, per unit of a factor."""
 
-    Parameters
-    ----------
-    factor : Factor
-        What stands in front of the column.
-    trial, origin : dict of str to float
-        Values of the law's parameters, all of them; an empty origin is the law's absence.
-    size : float
-        How many units of the factor the trial has more than the origin.
-    """
-
-    factor: Factor
+    factor: Factor  # what stands in front of the column
+    # `trial`, `origin`: values of the law's parameters, all of them; an empty origin is the law's
+    # absence
     trial: Values
-    size: float
+    size: float  # how many units of the factor the trial has more than the origin
     origin: Values = field(default_factory=dict)
 
 
@@ -99,19 +73,11 @@ class Carried:
     For waves that come round more than once in the second of a unit: the effect of the carrier is
     taken once a unit, the signals at all its moments, and columns are exact between the points of
     the grid as well.
-
-    Parameters
-    ----------
-    law : str
-        Id of the carrier.
-    values : dict of str to float
-        Of its parameters, all of them.
-    signals : callable
-        (shape, block of n samples) -> (n, k), one for each column of the recipe.
     """
 
-    law: str
-    values: Values
+    law: str  # Id of the carrier
+    values: Values  # of its parameters, all of them
+    # (shape, block of n samples) -> (n, k), one for each column of the recipe
     signals: Callable[[Shape, Block], Array]
 
 

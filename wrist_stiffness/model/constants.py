@@ -21,30 +21,15 @@ _LIMBS = {limb: [n for n, seat in enumerate(SEATS) if seat[0] == limb] for limb,
 
 @dataclass(frozen=True, eq=False)
 class Constants:
-    """Sum of constant contributions; None for nothing.
+    """Sum of constant contributions; None for nothing."""
 
-    Parameters
-    ----------
-    screws : (5, 6) float, optional
-        At O in the home frames of `SEATS`, which are the groups of `CompiledWrist` [m, rad].
-    wrench : (6,) float, optional
-        On the platform in F [N, N m].
-    gap : (m,) float, optional
-        Opening of the flange sectors [m].
-    sensor_left : (6,) float, optional
-        X of the pose sensor in F [m, rad].
-    sensor_right : (6,) float, optional
-        Y of the pose sensor in U [m, rad].
-    warnings : tuple of str
-        Of effects past first order.
-    """
-
+    # (5, 6), at O in the home frames of `SEATS`, which are the groups of `CompiledWrist` [m, rad]
     screws: Array | None = None
-    wrench: Array | None = None
-    gap: Array | None = None
-    sensor_left: Array | None = None
-    sensor_right: Array | None = None
-    warnings: tuple[str, ...] = ()
+    wrench: Array | None = None  # (6,), on the platform in F [N, N m]
+    gap: Array | None = None  # (m,), opening of the flange sectors [m]
+    sensor_left: Array | None = None  # (6,), X of the pose sensor in F [m, rad]
+    sensor_right: Array | None = None  # (6,), Y of the pose sensor in U [m, rad]
+    warnings: tuple[str, ...] = ()  # of effects past first order
 
     @classmethod
     def of_home(cls, place: str, added: Contribution, warnings: tuple[str, ...]) -> Constants:

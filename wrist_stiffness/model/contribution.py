@@ -13,36 +13,23 @@ from wrist_stiffness.mechanism.components import Array
 
 @dataclass(frozen=True)
 class Contribution:
-    """What one effect adds at n samples; everything at O in F, None for nothing.
+    """What one effect adds at n samples; everything at O in F, None for nothing."""
 
-    Parameters
-    ----------
-    limb_1, limb_2 : (n, 6) float, optional
-        Screw in a limb, carried by its G and its rows of the slides [m, rad].
-    both : (n, 6) float, optional
-        Screw under or behind both limbs [m, rad].
-    wrench : (n, 6) float, optional
-        On the platform [N, N m].
-    through : (n, 8, 6) float, optional
-        Further wrench through the elastic components, in the order of `ELASTIC` [N, N m].
-    gap : (n, m) float, optional
-        Opening of the flange sectors [m].
-    sensor_left, sensor_right : (n, 6) float, optional
-        Twists X and Y of the pose sensor, T_measured = exp(X) T_err exp(Y) T_nominal [m, rad].
-    rubbing : tuple of Rubbing, optional
-        Joints whose friction is in `through`: they may hold a pin in its play.
-    """
-
+    # `limb_1`, `limb_2`: (n, 6), screw in a limb, carried by its G and its rows of the slides [m,
+    # rad]
     limb_1: Array | None = None
     limb_2: Array | None = None
-    both: Array | None = None
-    wrench: Array | None = None
+    both: Array | None = None  # (n, 6), screw under or behind both limbs [m, rad]
+    wrench: Array | None = None  # (n, 6), on the platform [N, N m]
+    # (n, 8, 6), further wrench through the elastic components, in the order of `ELASTIC` [N, N m]
     through: Array | None = None
-    gap: Array | None = None
+    gap: Array | None = None  # (n, m), opening of the flange sectors [m]
+    # `sensor_left`, `sensor_right`: (n, 6), twists X and Y of the pose sensor, T_measured = exp(X)
+    # T_err exp(Y) T_nominal [m, rad]
     sensor_left: Array | None = None
     sensor_right: Array | None = None
     # Not by its name: what rubs follows a situation, which is made of contributions.
-    rubbing: Any = None
+    rubbing: Any = None  # joints whose friction is in `through`: they may hold a pin in its play
 
     def __add__(self, other: Contribution) -> Contribution:
         """Return both together; to first order they do not know of each other."""

@@ -38,24 +38,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """Result of an evaluation of n samples.
+    """Result of an evaluation of n samples."""
 
-    Parameters
-    ----------
-    staged : Staged
-        What the effects did.
-    twist : (n, 6) float
-        Pose error of the platform, first order in every screw [m, rad].
-    force : (n, m) float
-        Contact forces [N].
-    active : (n, m) bool
-        Contact state.
-    """
-
-    staged: Staged
-    twist: Array
-    force: Array
-    active: NDArray[np.bool_]
+    staged: Staged  # what the effects did
+    twist: Array  # (n, 6), pose error of the platform, first order in every screw [m, rad]
+    force: Array  # (n, m), contact forces [N]
+    active: NDArray[np.bool_]  # (n, m), contact state
 
     @property
     def situation(self) -> Situation:
@@ -92,21 +80,10 @@ def evaluate(
 ) -> Evaluated:
     """Evaluate a model over a block.
 
-    Parameters
-    ----------
-    block : Block
-        n > 0 samples inside the table's domain and load range.
-    memory : Memory or None
-        What the block before left, None at the start.
-    pose : Configuration, optional
-        The configuration of a block of one sample, where it is known.
-    near : dict of str to state, optional
-        Where effects whose states are guesses ended at this block before, by their names.
-
-    Returns
-    -------
-    Evaluated
-        For n samples.
+    `block`: n > 0 samples inside the table's domain and load range; `memory`: what the block before
+    left, None at the start; `pose`: the configuration of a block of one sample, where it is known;
+    `near`: where effects whose states are guesses ended at this block before, by their names.
+    Gives `Evaluated`: for n samples.
     """
     guess = None if memory is None else memory.active
     start = situation_of(model, with_speeds(block, memory), guess, pose)
@@ -122,14 +99,8 @@ def evaluate_beside(
     What they have in common with it is not computed again, and flange contact is solved for all
     models with the same elastic parts together.
 
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-        With the same table.
-    memories : sequence of Memory or None
-        What the block before left of each.
-    like : Evaluated
-        The first model.
+    `models`: with the same table; `memories`: what the block before left of each; `like`: the first
+    model.
     """
     every = [
         staged(model, _start(model, like), memory, like.staged)

@@ -21,12 +21,7 @@ NO_UNITS: Mapping[str, float] = MappingProxyType({})
 class UndefinedFormulaError(InputError):
     """A formula has no finite value at a sample.
 
-    Parameters
-    ----------
-    message : str
-        Which term, and for what.
-    time_s : float
-        Stamp of the sample [s].
+    `message`: which term, and for what; `time_s`: stamp of the sample [s].
     """
 
     def __init__(self, message: str, time_s: float) -> None:
@@ -88,17 +83,10 @@ first-order lag, and `play(x, slack)`.  They begin settled at the first sample."
 
 @dataclass
 class Past:
-    """What a formula remembers while it is evaluated.
+    """What a formula remembers while it is evaluated."""
 
-    Parameters
-    ----------
-    time : (n,) float
-        Stamps [s].
-    states : dict of int to tuple of float
-        Of each remembering function by its column in the formula; empty before the first sample.
-    """
-
-    time: Array
+    time: Array  # (n,), stamps [s]
+    # of each remembering function by its column in the formula; empty before the first sample
     states: dict[int, tuple[float, ...]] = field(default_factory=dict)
 
     def follow(self, node: ast.Call, name: str, values: Sequence[Value]) -> Value:
@@ -164,21 +152,11 @@ def _parsed(text: str) -> ast.expr:
 class Formula:
     """An expression in named variables.
 
-    Parameters
-    ----------
-    text : str
-        Numbers, names, + - * / **, parentheses, `FUNCTIONS` and `MEMORIES`.
-    variables : tuple of str
-        Names that it may use.
-
-    Raises
-    ------
-    InputError
-        If it holds anything else; the message names the column.
+    Raises `InputError` if it holds anything else; the message names the column.
     """
 
-    text: str
-    variables: tuple[str, ...]
+    text: str  # numbers, names, + - * / **, parentheses, `FUNCTIONS` and `MEMORIES`
+    variables: tuple[str, ...]  # names that it may use
 
     def __post_init__(self) -> None:
         """Check the whole expression."""

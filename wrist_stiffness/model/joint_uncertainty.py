@@ -23,17 +23,12 @@ class JointUncertainty:
 
     One by one they tell too much: an axis and a registration may each be uncertain by 40 mdeg where
     only their sum shows, and that is known to one.
-
-    Parameters
-    ----------
-    effects : tuple of str
-        Effects that were fitted; their own uncertainties are not counted again.
-    sigma : (6,) float
-        Standard uncertainty of what the pose sensor would say, at O in F, root mean square over the
-        recordings of the fit [m, rad].
     """
 
+    # effects that were fitted; their own uncertainties are not counted again
     effects: tuple[str, ...]
+    # (6,), standard uncertainty of what the pose sensor would say, at O in F, root mean square over
+    # the recordings of the fit [m, rad]
     sigma: Array
 
     @property

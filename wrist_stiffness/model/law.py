@@ -173,10 +173,7 @@ class Law(ABC):
 def require_id(name: str) -> None:
     """Refuse an id that cannot stand in NAME@COMPONENT, as arguments and reports have it.
 
-    Raises
-    ------
-    InputError
-        If it holds anything but letters, digits, '_', '-' and '.'.
+    Raises `InputError` if it holds anything but letters, digits, '_', '-' and '.'.
     """
     if not re.fullmatch(r"[\w.-]+", name):
         raise InputError(f"effect {name!r}: a name has letters, digits, '_', '-' and '.' only")

@@ -9,30 +9,15 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Step:
-    """One step from a parent model to its child.
+    """One step from a parent model to its child."""
 
-    Parameters
-    ----------
-    command : str
-        What was run.
-    date : str
-        When, ISO 8601.
-    parent_sha256 : str
-        Of the parent's model file.
-    recordings : dict of str to str
-        SHA-256 of each recording by its name.
-    measured : dict of str to str
-        SHA-256 of what was measured in each, which a replay or another copy has as well.
-    added : str
-        `law@component` of the effect that the step added; empty for none.
-    """
-
-    command: str
-    date: str
-    parent_sha256: str
-    recordings: Mapping[str, str]
+    command: str  # what was run
+    date: str  # when, ISO 8601
+    parent_sha256: str  # of the parent's model file
+    recordings: Mapping[str, str]  # SHA-256 of each recording by its name
+    # SHA-256 of what was measured in each, which a replay or another copy has as well
     measured: Mapping[str, str] = field(default_factory=dict)
-    added: str = ""
+    added: str = ""  # `law@component` of the effect that the step added; empty for none
 
     def as_values(self) -> dict[str, Any]:
         """Return the step as the model file holds it."""

@@ -14,19 +14,9 @@ from wrist_stiffness.mechanism.components import Array
 def play(values: Array, half_width: Array | float, start: Array) -> Array:
     """Follow a value with lost motion: y_i = clip(y_{i-1}, u_i - h, u_i + h).
 
-    Parameters
-    ----------
-    values : (n, ...) float
-        u, the driving value.
-    half_width : float or (n, ...) float
-        h, not negative.
-    start : (...) float
-        y before the first sample.
-
-    Returns
-    -------
-    (n, ...) float
-        y, exact to the bit in any split of the samples.
+    `values` (n, ...): u, the driving value; `half_width` float or (n, ...): h, not negative;
+    `start` (...): y before the first sample.  Gives (n, ...): y, exact to the bit in any split of
+    the samples.
     """
     low, high = values - half_width, values + half_width
     step = 1
@@ -43,21 +33,9 @@ def play(values: Array, half_width: Array | float, start: Array) -> Array:
 def lag(values: Array, interval: Array, time_constant: float, before: Array, start: Array) -> Array:
     """Follow a value with a first-order lag, exact for the mean of neighbouring samples held.
 
-    Parameters
-    ----------
-    values : (n, k) float
-        u, the driving value.
-    interval : (n,) float
-        Time since the sample before [s]; the first one since the block before.
-    time_constant : float
-        [s], above 0.
-    before, start : (k,) float
-        u and x of the sample before the block.
-
-    Returns
-    -------
-    (n, k) float
-        x with x' = (u - x) / time_constant.
+    `values` (n, k): u, the driving value.  `interval` (n,): time since the sample before [s]; the
+    first one since the block before.  `time_constant` [s], above 0.  `before`, `start` (k,): u and
+    x of the sample before the block.  Gives (n, k): x with x' = (u - x) / time_constant.
     """
     decay = np.exp(-interval / time_constant)[:, None]
     earlier = np.concatenate([before[None], values[:-1]])

@@ -180,10 +180,7 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
 def file_sha256(path: str | Path) -> str:
     """Return the SHA-256 of a file, by which a child names its parent.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
+    Raises `InputError` if the file cannot be read.
     """
     try:
         with open_input(path, InputError) as stream:

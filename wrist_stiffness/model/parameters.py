@@ -39,15 +39,8 @@ def has_unit(key: str) -> bool:
 def si_factor(key: str) -> float:
     """Return the SI size of the unit that a parameter's name ends in.
 
-    Parameters
-    ----------
-    key : str
-        `clearance_um`, `slope_um_per_N`; a name without a known unit is dimensionless.
-
-    Returns
-    -------
-    float
-        1e-6 for `clearance_um`, 1 where there is no unit.
+    `key`: `clearance_um`, `slope_um_per_N`; a name without a known unit is dimensionless.  Gives
+    1e-6 for `clearance_um`, 1 where there is no unit.
     """
     words = key.split("_")
     if len(words) >= 4 and words[-2] == "per" and words[-3] in UNITS and words[-1] in UNITS:

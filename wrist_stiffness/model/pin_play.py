@@ -38,29 +38,14 @@ MAX_STEPS, MAX_HALVINGS, ARMIJO = 30, 40, 1e-4
 
 @dataclass(frozen=True)
 class Play:
-    """Pins of one joint at n samples.
+    """Pins of one joint at n samples."""
 
-    Parameters
-    ----------
-    radial : float
-        How far an end may move from the middle [m], above 0.
-    force : (n, 4) float
-        Radial force on the upper and the lower end with all flanges open [N].
-    gap : (n, m) float
-        Openings of the flange sectors with the pin in the middle [m].
-    opening : (n, m, 4) float
-        B, what the ends' displacements open.
-    approach : (n, m, m) float
-        A, flexibility of the flanges [m/N].
-    small_force : float
-        An end that carries less does not reach its wall altogether [N].
-    """
-
-    radial: float
-    force: Array
-    gap: Array
-    opening: Array
-    approach: Array
+    radial: float  # how far an end may move from the middle [m], above 0
+    force: Array  # (n, 4), radial force on the upper and the lower end with all flanges open [N]
+    gap: Array  # (n, m), openings of the flange sectors with the pin in the middle [m]
+    opening: Array  # (n, m, 4), B, what the ends' displacements open
+    approach: Array  # (n, m, m), A, flexibility of the flanges [m/N]
+    # an end that carries less does not reach its wall altogether [N]
     small_force: float = field(default=SMALL_FORCE, kw_only=True)
 
     def resting(self, near: Array | None = None) -> Array:

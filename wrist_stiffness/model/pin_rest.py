@@ -27,17 +27,12 @@ any blocks give the same."""
 
 @dataclass(frozen=True)
 class Rest:
-    """Where a pin rested at n samples.
+    """Where a pin rested at n samples."""
 
-    Parameters
-    ----------
-    ends : (n, 4) float
-        Of the pin with nothing that rubs, in units of the play; where a search may begin.
-    feet : (PASSES, j, 2) float, optional
-        Where the bristles of j joints that rub stand after the last sample, in each pass [m].
-    """
-
+    # (n, 4), of the pin with nothing that rubs, in units of the play; where a search may begin
     ends: Array
+    # (PASSES, j, 2), where the bristles of j joints that rub stand after the last sample, in each
+    # pass [m]
     feet: Array | None = None
 
     @property
@@ -52,24 +47,12 @@ class Rest:
 
 @dataclass(frozen=True)
 class HeldPlay(Play):
-    """Pins that cannot move without j joints that rub.
+    """Pins that cannot move without j joints that rub."""
 
-    Parameters
-    ----------
-    bent : (n, j, 2) float
-        From the bristles' feet to the surface, with the pin in the middle [m].
-    drag : (n, j, 2, 4) float
-        What the ends' displacements add to it.
-    compliance : (n, j, 2) float
-        Of the bristles [m/N].
-    budget : (n, j) float
-        Their largest force [N].
-    """
-
-    bent: Array
-    drag: Array
-    compliance: Array
-    budget: Array
+    bent: Array  # (n, j, 2), from the bristles' feet to the surface, with the pin in the middle [m]
+    drag: Array  # (n, j, 2, 4), what the ends' displacements add to it
+    compliance: Array  # (n, j, 2), of the bristles [m/N]
+    budget: Array  # (n, j), their largest force [N]
 
     def held(self, x: Array) -> tuple[Array, Array, Array]:
         """Return energy (n, j), forces (n, j, 2), stiffness (n, j, 2, 2) of the bristles."""
@@ -95,22 +78,12 @@ class HeldPlay(Play):
 
 @dataclass(frozen=True, eq=False)
 class Pin:
-    """A pin with play in a situation.
+    """A pin with play in a situation."""
 
-    Parameters
-    ----------
-    at : Situation
-        n samples.
-    radial : float
-        How far an end may move from the middle [m], above 0.
-    small_force : float
-        With less an end does not reach its wall altogether [N].
-    """
-
-    at: Situation
+    at: Situation  # n samples
     place: str
-    radial: float
-    small_force: float = SMALL_FORCE
+    radial: float  # how far an end may move from the middle [m], above 0
+    small_force: float = SMALL_FORCE  # with less an end does not reach its wall altogether [N]
 
     def rest(self, before: Rest | None) -> tuple[Contribution, Rest]:
         """Return what the play adds, and where the pin rests.

@@ -15,14 +15,9 @@ def mass_columns(
 ) -> tuple[Column, ...]:
     """Return columns of a mass and of its first moment along x, y and z.
 
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        Among them `mass_g`, `x_mm`, `y_mm` and `z_mm`.
-    at : dict of str to float
-        Values of all other parameters in the trials; the first moment counts from its place.
-    arm_mm : float
-        By how much the trials move the mass.
+    `parameters`: among them `mass_g`, `x_mm`, `y_mm` and `z_mm`.  `at`: values of all other
+    parameters in the trials; the first moment counts from its place.  `arm_mm`: by how much the
+    trials move the mass.
     """
     own = {each.key: each for each in parameters}
     heavy = at | {"mass_g": mass_g}

@@ -18,34 +18,19 @@ from wrist_stiffness.model.contribution import LEFT_OUT
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted pose error of the platform, T_err = exp(twist).
+    """Predicted pose error of the platform, T_err = exp(twist)."""
 
-    Parameters
-    ----------
-    twist : (6,) float
-        At O in F, own weight included [m, rad].
-    active : (m,) bool
-        Flange sectors in contact.
-    of_table : callable
-        Configuration and twist -> covariance (6, 6) of what the table says.
-    sensor : pair of (6,) float
-        X and Y of the pose sensor in F [m, rad]; None for nothing.
-    of_parameters : callable, optional
-        Returns the covariance (6, 6) from the effects' parameters.
-    added_covariance : (6, 6) float, optional
-        Covariance beyond the model: of the load.
-    warnings : tuple of str
-        Effects that were left out or have left first order.
-    """
-
-    twist: Array
+    twist: Array  # (6,), at O in F, own weight included [m, rad]
     configuration: Configuration
-    active: NDArray[np.bool_]
+    active: NDArray[np.bool_]  # (m,), flange sectors in contact
+    # configuration and twist -> covariance (6, 6) of what the table says
     of_table: Callable[[Configuration, Array], Array] = field(repr=False)
+    # pair of (6,), X and Y of the pose sensor in F [m, rad]; None for nothing
     sensor: tuple[Array | None, Array | None] = (None, None)
+    # returns the covariance (6, 6) from the effects' parameters
     of_parameters: Callable[[], Array] | None = field(default=None, repr=False)
-    added_covariance: Array | None = None
-    warnings: tuple[str, ...] = ()
+    added_covariance: Array | None = None  # (6, 6), covariance beyond the model: of the load
+    warnings: tuple[str, ...] = ()  # effects that were left out or have left first order
 
     @cached_property
     def covariance(self) -> Array:
@@ -80,28 +65,16 @@ class Prediction:
 
 @dataclass(frozen=True)
 class BlockPrediction:
-    """Predicted pose errors of n samples.
+    """Predicted pose errors of n samples."""
 
-    Parameters
-    ----------
-    twist : (n, 6) float
-        At O in F, own weight included [m, rad]; NaN where refused.
-    measured : (n, 6) float
-        What the pose sensor would say [m, rad].
-    accepted : (n,) bool
-        False where a sample is outside the table's domain or load range or not finite; the effects'
-        memory passes over such samples as a node does.
-    warnings : tuple of str
-        Each once.
-    guesses : tuple of dict
-        Where the first model's pins came to rest, chunk by chunk: where another prediction of the
-        same block may begin to look.
-    """
-
-    twist: Array
-    measured: Array
+    twist: Array  # (n, 6), at O in F, own weight included [m, rad]; NaN where refused
+    measured: Array  # (n, 6), what the pose sensor would say [m, rad]
+    # (n,), False where a sample is outside the table's domain or load range or not finite; the
+    # effects' memory passes over such samples as a node does
     accepted: NDArray[np.bool_]
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  # each once
+    # where the first model's pins came to rest, chunk by chunk: where another prediction of the
+    # same block may begin to look
     guesses: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)
 
     def lacks(self, effect: str) -> str:

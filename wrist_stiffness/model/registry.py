@@ -70,10 +70,7 @@ def unknown_effect(name: str, known: Iterable[str], page: str) -> InputError:
 def effect_named(name: str) -> Effect:
     """Return the effect of the catalogue that `NAME@COMPONENT` names, with its usual values.
 
-    Raises
-    ------
-    InputError
-        If it is no such name, or there is no such law.
+    Raises `InputError` if it is no such name, or there is no such law.
     """
     law, component = at_component(name)
     return Effect(find_law(law), component)
@@ -82,10 +79,7 @@ def effect_named(name: str) -> Effect:
 def at_component(text: str) -> tuple[str, str]:
     """Split `NAME@COMPONENT`.
 
-    Raises
-    ------
-    InputError
-        If one of them is missing.
+    Raises `InputError` if one of them is missing.
     """
     name, _, component = text.rpartition("@")
     if not name or not component:
@@ -112,10 +106,7 @@ def laws_in(module: object) -> list[Law]:
 def law_of(found: object, place: str) -> Law:
     """Return an instance of a law class.
 
-    Raises
-    ------
-    InputError
-        If it is no complete law, or its id cannot be one.
+    Raises `InputError` if it is no complete law, or its id cannot be one.
     """
     if not (inspect.isclass(found) and issubclass(found, Law)):
         raise InputError(f"{place}: {found!r} is not a class derived from Law")
@@ -167,22 +158,8 @@ def _begin(law: Law, component: str) -> None:
 def law_from_file(reference: str, folder: Path) -> Law:
     """Return a user's own law from a Python file, which is executed.
 
-    Parameters
-    ----------
-    reference : str
-        `FILE.py:CLASS`, relative to `folder`.
-    folder : path
-        Of the model file.
-
-    Returns
-    -------
-    Law
-        An instance.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be run or has no such law.
+    `reference`: `FILE.py:CLASS`, relative to `folder`; `folder`: of the model file.  Gives `Law`:
+    an instance.  Raises `InputError` if the file cannot be run or has no such law.
     """
     file, _, name = reference.rpartition(":")
     path = folder / file

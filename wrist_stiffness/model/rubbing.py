@@ -23,49 +23,24 @@ the next one would change nothing beyond rounding."""
 
 @dataclass(frozen=True, eq=False)
 class Bristles:
-    """The bristles of a joint at n samples; two directions: round the axis, along it.
+    """The bristles of a joint at n samples; two directions: round the axis, along it."""
 
-    Parameters
-    ----------
-    moved : (n, 2) float
-        Where the surface would go without friction [m].
-    compliance : (n, 2) float
-        Of bristle and limb in series [m/N].
-    budget : (n,) float
-        Largest force [N].
-    """
-
-    moved: Array
-    compliance: Array
-    budget: Array
+    moved: Array  # (n, 2), where the surface would go without friction [m]
+    compliance: Array  # (n, 2), of bristle and limb in series [m/N]
+    budget: Array  # (n,), largest force [N]
 
 
 @dataclass(frozen=True, eq=False)
 class Rubbing:
-    """Friction of a joint.
+    """Friction of a joint."""
 
-    Parameters
-    ----------
-    joint : str
-        Passive joint.
-    coefficient : float
-        Budget over pressing forces [-].
-    preload : float
-        Further pressing force [N].
-    presliding : float
-        Distance by which the bristle bends under the budget [m].
-    bristle : float
-        By which it bends besides for a unit force [m/N].
-    force : (n, 2) float or 0
-        With which it drags the bristles along in the situation that it is asked about, round the
-        axis and along it [N].
-    """
-
-    joint: str
-    coefficient: float
-    preload: float
-    presliding: float
-    bristle: float
+    joint: str  # passive joint
+    coefficient: float  # budget over pressing forces [-]
+    preload: float  # further pressing force [N]
+    presliding: float  # distance by which the bristle bends under the budget [m]
+    bristle: float  # by which it bends besides for a unit force [m/N]
+    # (n, 2) or 0, with which it drags the bristles along in the situation that it is asked about,
+    # round the axis and along it [N]
     force: Array | float = 0.0
 
     def bristles(self, at: Situation) -> Bristles:
@@ -108,21 +83,10 @@ def slip(bristles: Bristles, foot: Array, give: Array | None = None) -> tuple[Ar
 
     A bristle that is dragged lies in the direction of its slip.
 
-    Parameters
-    ----------
-    bristles : Bristles
-        At n samples.
-    foot : (2,) float
-        Where they stand at first [m].
-    give : (n, 2, 2) float, optional
-        By which the surface gives way to a unit force, besides the compliance [m/N].
-
-    Returns
-    -------
-    force : (n, 2) float
-        With which they are dragged along [N].
-    feet : (n + 1, 2) float
-        Where they stand before each sample, and after the last one [m].
+    `bristles`: at n samples; `foot` (2,): where they stand at first [m]; `give` (n, 2, 2): by which
+    the surface gives way to a unit force, besides the compliance [m/N].  Gives `force` (n, 2): with
+    which they are dragged along [N], and `feet` (n + 1, 2): where they stand before each sample,
+    and after the last one [m].
     """
     n = len(bristles.moved)
     force, feet = np.empty((n, 2)), np.empty((n + 1, 2))
@@ -166,23 +130,9 @@ def dragged(bent: Array, compliance: Array, budget: Array) -> tuple[Array, Array
 
     Slip included it is convex: the least over all places where the feet may go.
 
-    Parameters
-    ----------
-    bent : (..., 2) float
-        From the foot to the surface [m].
-    compliance : (..., 2) float
-        [m/N].
-    budget : (...) float
-        Largest force [N].
-
-    Returns
-    -------
-    energy : (...) float
-        [J].
-    force : (..., 2) float
-        Its gradient [N].
-    stiffness : (..., 2, 2) float
-        Its second derivative [N/m].
+    `bent` (..., 2): from the foot to the surface [m]; `compliance` (..., 2) [m/N]; `budget` (...):
+    largest force [N].  Gives `energy` (...) [J], and `force` (..., 2): its gradient [N], and
+    `stiffness` (..., 2, 2): its second derivative [N/m].
     """
     force = bent / compliance
     size, more = lengths(force), np.zeros_like(budget)

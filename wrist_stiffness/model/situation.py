@@ -26,26 +26,14 @@ from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 @dataclass(frozen=True)
 class Situation:
-    """A block at its configurations; everything that a law may ask for.
+    """A block at its configurations; everything that a law may ask for."""
 
-    Parameters
-    ----------
-    statics : BlockStatics
-        Samples, configurations, and what the table says of them with the model's elastic parts.
-    constants : Constants
-        Sum of what the model's constant effects add.
-    given : Contribution
-        Sum of what its other effects added in earlier stages.
-    guess : (m,) or (n, m) bool or None
-        First guess of the contact state.
-    wrist : (CompiledWrist, Configuration), optional
-        Of one sample alone: its pose, and the compiled formulas with the model's constants.
-    """
-
+    # samples, configurations, and what the table says of them with the model's elastic parts
     statics: BlockStatics
-    constants: Constants = Constants()
-    given: Contribution = NOTHING
-    guess: NDArray[np.bool_] | None = None
+    constants: Constants = Constants()  # sum of what the model's constant effects add
+    given: Contribution = NOTHING  # sum of what its other effects added in earlier stages
+    guess: NDArray[np.bool_] | None = None  # (m,) or (n, m), first guess of the contact state
+    # of one sample alone: its pose, and the compiled formulas with the model's constants
     wrist: tuple[CompiledWrist, Configuration] | None = None
 
     @property
@@ -289,19 +277,9 @@ class Situation:
     def with_contact(self, twist: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
         """Return what a carried contribution does where the closed sectors hold: the tangent.
 
-        Parameters
-        ----------
-        twist : (n, 6) float
-            Carried with slides free [m, rad].
-        gap : (n, m) float
-            Opening that the sectors do not let happen [m].
-        closed : (n, m) bool
-            Contact state.
-
-        Returns
-        -------
-        (n, 6) float
-            Twist of the platform [m, rad].
+        `twist` (n, 6): carried with slides free [m, rad]; `gap` (n, m): opening that the sectors do
+        not let happen [m]; `closed` (n, m): contact state.  Gives (n, 6): twist of the platform [m,
+        rad].
         """
         force = forces_of(self.operators.approach, gap, closed)
         return twist + (self.operators.force_twist @ force[..., None])[..., 0]

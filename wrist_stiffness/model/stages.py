@@ -47,50 +47,25 @@ NO_GUESSES: Guesses = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Memory:
-    """What an evaluation leaves for the next block.
+    """What an evaluation leaves for the next block."""
 
-    Parameters
-    ----------
-    states : tuple
-        State of each effect.
-    time : float
-        Of the last sample [s].
-    theta : (2,) float
-        Its motor angles [rad].
-    active : (m,) bool
-        Its contact state.
-    """
-
-    states: tuple[Any, ...]
-    time: float
-    theta: Array
-    active: NDArray[np.bool_]
+    states: tuple[Any, ...]  # state of each effect
+    time: float  # of the last sample [s]
+    theta: Array  # (2,), its motor angles [rad]
+    active: NDArray[np.bool_]  # (m,), its contact state
 
 
 @dataclass(frozen=True, eq=False)
 class Advanced:
-    """What one effect did at a block.
+    """What one effect did at a block."""
 
-    Parameters
-    ----------
-    effect : Effect
-        Which one.
-    at : Situation
-        What it saw.
-    before, after : object
-        Its state.
-    added : Contribution
-        What it added.
-    warnings : tuple of str
-        That it lacks a signal, or that it is past first order.
-    """
-
-    effect: Effect
-    at: Situation
+    effect: Effect  # which one
+    at: Situation  # what it saw
+    # `before`, `after`: its state
     before: Any
-    added: Contribution
+    added: Contribution  # what it added
     after: Any
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  # that it lacks a signal, or that it is past first order
 
     @property
     def left(self) -> Any:
@@ -101,21 +76,12 @@ class Advanced:
 
 @dataclass(frozen=True, eq=False)
 class Staged:
-    """A model's effects at a block after all stages; what they do to the platform is still open.
+    """A model's effects at a block after all stages; what they do to the platform is still open."""
 
-    Parameters
-    ----------
-    situations : tuple of Situation
-        Before the first stage, and after each one.
-    advanced : tuple of Advanced or None
-        Of each effect; None for constant ones, which were put together before.
-    warnings : tuple of str
-        Of all effects.
-    """
-
-    situations: tuple[Situation, ...]
+    situations: tuple[Situation, ...]  # before the first stage, and after each one
+    # of each effect; None for constant ones, which were put together before
     advanced: tuple[Advanced | None, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  # of all effects
 
     @property
     def last(self) -> Situation:
@@ -153,18 +119,10 @@ def staged(
 ) -> Staged:
     """Carry a model's effects through the stages.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Effects, and what the constant ones add together.
-    start : Situation
-        The block with what the constant effects add.
-    memory : Memory or None
-        What the block before left, None at the start.
-    like : Staged, optional
-        Another model at the same block.
-    near : dict of str to state, optional
-        Where effects whose states are guesses ended at this block before, by their names.
+    `model`: effects, and what the constant ones add together; `start`: the block with what the
+    constant effects add; `memory`: what the block before left, None at the start; `like`: another
+    model at the same block; `near`: where effects whose states are guesses ended at this block
+    before, by their names.
     """
     near = near if like is None else like.guesses
     states = memory.states if memory else (None,) * len(model.effects)

@@ -28,26 +28,9 @@ def unused(place: str, signals: frozenset[str]) -> tuple[str, ...]:
 def warmth(at: Situation, place: str, values: Mapping[str, float], state: Any) -> tuple[Array, Any]:
     """Return the temperature of a part above reference.
 
-    Parameters
-    ----------
-    at : Situation
-        n samples.
-    place : str
-        The part; its own thermometer is believed as it is.
-    values : dict of str to float
-        With `WARMTH`, in SI units.
-    state : object
-        What the call before returned.
-
-    Returns
-    -------
-    (n,) float
-        [K]
-
-    Raises
-    ------
-    MissingSignalError
-        If neither the part nor what it follows has a thermometer.
+    `at`: n samples.  `place`: the part; its own thermometer is believed as it is.  `values`: with
+    `WARMTH`, in SI units.  `state`: what the call before returned.  Gives (n,) [K].  Raises
+    `MissingSignalError` if neither the part nor what it follows has a thermometer.
     """
     if place in at.block.temperatures:
         return at.temperature(place), None

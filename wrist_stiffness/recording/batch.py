@@ -35,22 +35,12 @@ _MAX_LAYOUTS = 8
 
 @dataclass(frozen=True)
 class Batch:
-    """Messages that differ in their numbers only.
+    """Messages that differ in their numbers only."""
 
-    Attributes
-    ----------
-    indices : (m,) int array
-        Which of the payloads, increasing.
-    first : Message
-        The first of them, decoded; its texts and lengths are those of all.
-    columns : dict[str, array]
-        The numbers by dotted attribute path: (m,) for a scalar, (m, k) for a sequence of k numbers,
-        elements of other sequences by position (``poses.0.position.x``); times in integer
-        nanoseconds.
-    """
-
-    indices: NDArray[np.intp]
-    first: Message
+    indices: NDArray[np.intp]  # (m,) array, which of the payloads, increasing
+    first: Message  # the first of them, decoded; its texts and lengths are those of all
+    # the numbers by dotted attribute path: (m,) for a scalar, (m, k) for a sequence of k numbers,
+    # elements of other sequences by position (``poses.0.position.x``); times in integer nanoseconds
     columns: dict[str, NDArray[Any]]
 
 
@@ -115,26 +105,16 @@ class Leaf:
 class Layout:
     """Where the numbers are in a payload, and which bytes say that they are there.
 
-    Parameters
-    ----------
-    byte_order : str
-        ``<`` or ``>``.
-    size : int
-        Of the payload.
-
-    Attributes
-    ----------
-    fixed : (size,) bool array
-        Bytes of the encapsulation, of texts and of lengths; the others are numbers or padding.
-    leaves : list[Leaf]
-        The numbers in the order of the wire.
+    `byte_order`: ``<`` or ``>``; `size`: of the payload.
     """
 
     def __init__(self, byte_order: ByteOrder, size: int):
         self.byte_order = byte_order
+        # (size,) array, bytes of the encapsulation, of texts and of lengths; the others are numbers
+        # or padding
         self.fixed = np.zeros(size, dtype=bool)
         self.fixed[:ENCAPSULATION_SIZE] = True
-        self.leaves: list[Leaf] = []
+        self.leaves: list[Leaf] = []  # the numbers in the order of the wire
 
     def columns(self, rows: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
         """Return the numbers of payloads (m, size) by path."""

@@ -55,21 +55,10 @@ Writer = Callable[[bytearray, Any], None]
 def encode(message: Message) -> bytes:
     """Return a message as little-endian CDR.
 
-    Parameters
-    ----------
-    message : Message
-        Any class of `wrist_stiffness.recording.messages`; sequences may be NumPy arrays.
-
-    Returns
-    -------
-    bytes
-        The payload that ``rclpy.serialization.serialize_message`` gives, with zeros for padding:
-        Fast CDR leaves those bytes undefined.
-
-    Raises
-    ------
-    RecordingError
-        If a field holds something that its type cannot hold.
+    `message`: any class of `wrist_stiffness.recording.messages`; sequences may be NumPy arrays.
+    Gives the payload that ``rclpy.serialization.serialize_message`` gives, with zeros for padding:
+    Fast CDR leaves those bytes undefined.  Raises `RecordingError` if a field holds something that
+    its type cannot hold.
     """
     out = bytearray()
     try:
@@ -145,20 +134,8 @@ def encode_in_steps(message: Message) -> Generator[None, None, bytes]:
 def byte_order_of(message_type: type[Message], payload: bytes) -> ByteOrder:
     """Return the byte order that the encapsulation states, as `struct` writes it.
 
-    Parameters
-    ----------
-    message_type : type[Message]
-        Class of the message, for the error's text.
-
-    Returns
-    -------
-    str
-        ``<`` or ``>``.
-
-    Raises
-    ------
-    RecordingError
-        If the payload is shorter than an encapsulation or is not plain CDR.
+    `message_type`: class of the message, for the error's text.  Gives ``<`` or ``>``.  Raises
+    `RecordingError` if the payload is shorter than an encapsulation or is not plain CDR.
     """
     if len(payload) >= ENCAPSULATION_SIZE:
         if payload[:2] == LITTLE_ENDIAN:

@@ -11,30 +11,14 @@ from wrist_stiffness.recording.schema import definition_text, type_hash
 
 @dataclass(frozen=True)
 class Channel:
-    """Topic, type and encodings, as an MCAP channel and its schema state them.
+    """Topic, type and encodings, as an MCAP channel and its schema state them."""
 
-    Attributes
-    ----------
-    topic : str
-        Absolute topic name.
-    ros_type : str
-        ``package/msg/Type``.
-    message_encoding : str
-        ``cdr`` for everything that ROS 2 writes.
-    schema_encoding : str
-        ``ros2msg`` or ``ros2idl``.
-    schema_text : bytes
-        The type's definition in that encoding.
-    type_hash : str
-        RIHS01 hash, empty where the recording does not state it.
-    """
-
-    topic: str
-    ros_type: str
-    message_encoding: str
-    schema_encoding: str
-    schema_text: bytes
-    type_hash: str
+    topic: str  # absolute topic name
+    ros_type: str  # ``package/msg/Type``
+    message_encoding: str  # ``cdr`` for everything that ROS 2 writes
+    schema_encoding: str  # ``ros2msg`` or ``ros2idl``
+    schema_text: bytes  # the type's definition in that encoding
+    type_hash: str  # RIHS01 hash, empty where the recording does not state it
 
     @property
     def message_type(self) -> type[Message] | None:
@@ -45,10 +29,7 @@ class Channel:
 def channel_of(topic: str, message_type: type[Message]) -> Channel:
     """Return the channel of a topic that carries one of this project's messages.
 
-    Returns
-    -------
-    Channel
-        With the official definition and its hash.
+    Gives `Channel`: with the official definition and its hash.
     """
     return _channel_of(topic, message_type.ros_type)
 

@@ -54,16 +54,10 @@ Packing = tuple[Future[tuple[bytes, int]], int, Integers, Integers, Integers]
 
 
 class Messages:
-    """Messages of many channels, gathered in any order and written in one.
-
-    Attributes
-    ----------
-    count : int
-        How many there are.
-    """
+    """Messages of many channels, gathered in any order and written in one."""
 
     def __init__(self) -> None:
-        self.count = 0
+        self.count = 0  # how many there are
         self._groups: list[tuple[int, Integers, Integers, Any]] = []
 
     def add(
@@ -75,14 +69,8 @@ class Messages:
     ) -> None:
         """Add messages of a channel.
 
-        Parameters
-        ----------
-        order : (k,) int
-            Their places among all messages; no two are the same.
-        log_time_ns : (k,) int
-            [ns].
-        payloads : (k, size) uint8, or k bytes
-            Of one size, or of any.
+        `order` (k,): their places among all messages; no two are the same.  `log_time_ns` (k,)
+        [ns].  `payloads` (k, size) uint8, or k bytes: of one size, or of any.
         """
         if len(order):
             self.count += len(order)
@@ -137,19 +125,7 @@ def _at_each_byte(out: NDArray[np.uint8], size: int) -> NDArray[np.void]:
 class ChunkWriter:
     """Writes one MCAP file in chunks with their indexes, checksums and a summary.
 
-    Parameters
-    ----------
-    stream : binary file
-        To write to; its place is the file's.
-    chunk_bytes : int
-        Of messages before compression.
-
-    Attributes
-    ----------
-    counts : Counter
-        Messages by channel, of all chunks written.
-    times_ns : (int, int)
-        First and last log time of these [ns].
+    `stream`: to write to; its place is the file's.  `chunk_bytes`: of messages before compression.
     """
 
     def __init__(self, stream: BinaryIO, chunk_bytes: int) -> None:
@@ -164,8 +140,8 @@ class ChunkWriter:
         self._channels: list[Channel] = []
         self._indexes = bytearray()
         self._chunks = 0
-        self.counts: Counter[int] = Counter()
-        self.times_ns = 0, 0
+        self.counts: Counter[int] = Counter()  # messages by channel, of all chunks written
+        self.times_ns = 0, 0  # first and last log time of these [ns]
         self._open = BytesIO()
         self._messages: list[tuple[int, int, int]] = []
 

@@ -59,15 +59,8 @@ def _xyz(prefix: str) -> tuple[str, ...]:
 def joint_rows(joints: tuple[str, ...]) -> Extract:
     """Return the extraction of named joints from joint states, in the order of the names.
 
-    Parameters
-    ----------
-    joints : tuple[str, ...]
-        Names; other joints are ignored.
-
-    Returns
-    -------
-    Extract
-        Gives position, velocity and effort, each (m, number of joints).
+    `joints`: names; other joints are ignored.  Its rows have position, velocity and
+    effort, each (m, number of joints).
     """
 
     def extract(batch: Batch) -> Rows | str:
@@ -162,29 +155,15 @@ def text_rows(batch: Batch) -> Rows:
 
 @dataclass
 class Collector:
-    """Rows and faults of one topic.
+    """Rows and faults of one topic."""
 
-    Attributes
-    ----------
-    topic : str
-        Name in the recording.
-    message_type : type[Message]
-        Class of its messages.
-    extract : Extract
-        Makes rows of a batch.
-    finite : tuple[str, ...]
-        Columns in which NaN is a fault; a lost marker or an absent velocity is none.
-    blocks : list[Rows]
-        Rows so far.
-    counts : dict[str, list[int]]
-        Log times [ns] of the messages that gave no row, by kind of fault.
-    """
-
-    topic: str
-    message_type: type[Message]
-    extract: Extract
+    topic: str  # name in the recording
+    message_type: type[Message]  # class of its messages
+    extract: Extract  # makes rows of a batch
+    # columns in which NaN is a fault; a lost marker or an absent velocity is none
     finite: tuple[str, ...]
-    blocks: list[Rows] = field(default_factory=list)
+    blocks: list[Rows] = field(default_factory=list)  # rows so far
+    # log times [ns] of the messages that gave no row, by kind of fault
     counts: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, times: TimeArray, payloads: Payloads) -> None:

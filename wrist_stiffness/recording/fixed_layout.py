@@ -32,10 +32,7 @@ class FixedLayout:
 
     Numbers come in the order of the wire; a time is two of them, seconds and nanoseconds.
 
-    Parameters
-    ----------
-    payload : bytes
-        A CDR payload that `cdr.decode` accepts, in either byte order.
+    `payload`: a CDR payload that `cdr.decode` accepts, in either byte order.
     """
 
     def __init__(self, message_type: type[Message], payload: bytes) -> None:

@@ -48,28 +48,17 @@ Payloads = Sequence[bytes] | NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Chunk:
-    """A chunk record, or a run of message records that stand outside of any chunk.
+    """A chunk record, or a run of message records that stand outside of any chunk."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    offset, size : int
-        Where the stored bytes begin in the file, and how many they are.
-    compression : str
-        Empty, ``zstd`` or ``lz4``.
-    uncompressed_size, crc : int
-        Size and CRC-32 after decompression; CRC 0 = not stated.
-    start_ns, end_ns : int
-        First and last log time.
-    """
-
-    path: Path
+    path: Path  # the file
+    # `offset`, `size`: where the stored bytes begin in the file, and how many they are
     offset: int
     size: int
-    compression: str
+    compression: str  # empty, ``zstd`` or ``lz4``
+    # `uncompressed_size`, `crc`: size and CRC-32 after decompression; CRC 0 = not stated
     uncompressed_size: int
     crc: int
+    # `start_ns`, `end_ns`: first and last log time
     start_ns: int
     end_ns: int
 
@@ -102,24 +91,12 @@ Spans = dict[int, Span]
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """A chunk, unpacked and checked.
+    """A chunk, unpacked and checked."""
 
-    Attributes
-    ----------
-    buffer : bytes
-        Its records.
-    begins : (m,) int array
-        Where its messages begin.
-    heads : (m,) array of `MESSAGE`
-        How they begin.
-    others : list of (int, bytes)
-        Opcode and content of its other records.
-    """
-
-    buffer: bytes
-    begins: Places
-    heads: NDArray[np.void]
-    others: list[tuple[int, bytes]]
+    buffer: bytes  # its records
+    begins: Places  # (m,) array, where its messages begin
+    heads: NDArray[np.void]  # (m,) of `MESSAGE`, how they begin
+    others: list[tuple[int, bytes]]  # opcode and content of its other records
 
     @cached_property
     def spans(self) -> Spans:

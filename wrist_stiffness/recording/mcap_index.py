@@ -64,25 +64,14 @@ _MOST_FLAWS = 100
 
 @dataclass(frozen=True)
 class McapIndex:
-    """Contents of one MCAP file.
+    """Contents of one MCAP file."""
 
-    Attributes
-    ----------
-    chunks, chunk_spans : list of Chunk, list of Spans
-        In the order of the file.
-    definitions : Definitions
-        Channels and schemas as the file has them.
-    channels : dict[int, Channel]
-        By channel id.
-    flaws : list of str
-        What is wrong with it, as far as the walk sees.
-    """
-
+    # `chunks`, `chunk_spans`: in the order of the file
     chunks: list[Chunk]
     chunk_spans: list[Spans]
-    definitions: Definitions
-    channels: dict[int, Channel]
-    flaws: list[str]
+    definitions: Definitions  # channels and schemas as the file has them
+    channels: dict[int, Channel]  # by channel id
+    flaws: list[str]  # what is wrong with it, as far as the walk sees
 
     @property
     def spans(self) -> Spans:

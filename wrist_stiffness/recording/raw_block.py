@@ -35,26 +35,13 @@ class RawMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class RawBlock:
-    """n stored messages.
+    """n stored messages."""
 
-    Attributes
-    ----------
-    buffer : bytes
-        Holds their payloads.
-    channels : tuple of Channel
-        Of the file or files.
-    channel : (n,) int
-        Place of each message's channel among them.
-    time_ns : (n,) int
-        Log times, not falling [ns].
-    begin, size : (n,) int
-        Where each payload is in the buffer.
-    """
-
-    buffer: bytes
-    channels: tuple[Channel, ...]
-    channel: Integers
-    time_ns: Integers
+    buffer: bytes  # holds their payloads
+    channels: tuple[Channel, ...]  # of the file or files
+    channel: Integers  # (n,), place of each message's channel among them
+    time_ns: Integers  # (n,), log times, not falling [ns]
+    # `begin`, `size`: (n,), where each payload is in the buffer
     begin: Integers
     size: Integers
 

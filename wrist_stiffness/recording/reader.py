@@ -47,11 +47,6 @@ class Recording:
     """An opened recording; made by `open_recording`.
 
     No file stays open between two reads, and any number of iterations may run side by side.
-
-    Attributes
-    ----------
-    topics : tuple[TopicInfo, ...]
-        By name; also those that cannot be decoded.
     """
 
     def __init__(self, path: Path, indices: list[McapIndex], bag: Bag):
@@ -61,7 +56,7 @@ class Recording:
         self._flaws: dict[str, None] = {}
         self._undecodable: Counter[str] = Counter()
         self._recent: dict[Chunk, Contents] = {}
-        self.topics = topics_of(indices)
+        self.topics = topics_of(indices)  # by name; also those that cannot be decoded
         flaws = [flaw for index in indices for flaw in index.flaws]
         for flaw in [*bag.flaws, *flaws, *_check_counts(self.topics, bag.counts)]:
             self._flaws[flaw] = None
@@ -132,15 +127,8 @@ class Recording:
     def decoded(self, block: RawBlock, rows: Integers) -> tuple[list[Message], Integers]:
         """Decode messages of a block one by one, of types that are known.
 
-        Parameters
-        ----------
-        rows : (k,) int
-            Which ones.
-
-        Returns
-        -------
-        list of Message, (l,) int
-            Those that can be decoded, and which they are; the others count as damage.
+        `rows` (k,): which ones.  Gives list of Message, (l,): those that can be decoded, and which
+        they are; the others count as damage.
         """
         messages, places = [], []
         for place, payload in zip(rows.tolist(), block.payloads(rows), strict=True):
@@ -248,20 +236,9 @@ class Recording:
 def open_recording(path: str | PathLike[str]) -> Recording:
     """Open a recording for reading.
 
-    Parameters
-    ----------
-    path : str or PathLike
-        A rosbag2 folder or an MCAP file.
-
-    Returns
-    -------
-    Recording
-        Its topics are known; messages are read when asked for.
-
-    Raises
-    ------
-    RecordingError
-        If the path is missing, empty, no recording, or of a storage other than MCAP.
+    `path`: a rosbag2 folder or an MCAP file.  Gives `Recording`: its topics are known; messages are
+    read when asked for.  Raises `RecordingError` if the path is missing, empty, no recording, or of
+    a storage other than MCAP.
     """
     path = Path(path)
     # Unlike Path.exists, this one takes a name that is too long or has a zero byte.

@@ -37,27 +37,13 @@ _LINE = re.compile(r"(?P<element>[\w/]+)(?P<bracket>\[(?P<count>\d*)\])? (?P<nam
 
 @dataclass(frozen=True)
 class Field:
-    """One field of a message type.
+    """One field of a message type."""
 
-    Attributes
-    ----------
-    name : str
-        Name in ROS.
-    attribute : str
-        Name of the dataclass attribute.
-    element : str
-        Primitive type, or ``package/msg/Type``.
-    is_sequence : bool
-        Whether the field is an unbounded sequence.
-    count : int
-        Number of elements of a fixed-size array, 0 for anything else.
-    """
-
-    name: str
-    attribute: str
-    element: str
-    is_sequence: bool = False
-    count: int = 0
+    name: str  # name in ROS
+    attribute: str  # name of the dataclass attribute
+    element: str  # primitive type, or ``package/msg/Type``
+    is_sequence: bool = False  # whether the field is an unbounded sequence
+    count: int = 0  # number of elements of a fixed-size array, 0 for anything else
 
 
 @cache
@@ -117,15 +103,8 @@ def _nested_types(ros_type: str) -> list[str]:
 def definition_text(ros_type: str) -> str:
     """Return the ``ros2msg`` schema: the definition and, behind separators, what it uses.
 
-    Parameters
-    ----------
-    ros_type : str
-        Full name of a type in `wrist_stiffness.recording.messages`.
-
-    Returns
-    -------
-    str
-        Text as rosbag2 writes it into a recording, comments left out.
+    `ros_type`: full name of a type in `wrist_stiffness.recording.messages`.  Gives text as rosbag2
+    writes it into a recording, comments left out.
     """
     parts = ["\n".join(_lines_of(ros_type)) + "\n"]
     for name in _nested_types(ros_type):
@@ -161,15 +140,8 @@ def _description(ros_type: str) -> dict[str, Any]:
 def type_hash(ros_type: str) -> str:
     """Return the type hash that ROS 2 compares at discovery (REP-2016, version RIHS01).
 
-    Parameters
-    ----------
-    ros_type : str
-        Full name of a type in `wrist_stiffness.recording.messages`.
-
-    Returns
-    -------
-    str
-        ``RIHS01_`` and the SHA-256 of the type description in canonical JSON.
+    `ros_type`: full name of a type in `wrist_stiffness.recording.messages`.  Gives ``RIHS01_`` and
+    the SHA-256 of the type description in canonical JSON.
     """
     canonical = json.dumps(
         {

@@ -10,26 +10,16 @@ from wrist_stiffness.recording.mcap_index import McapIndex
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """One topic of a recording.
+    """One topic of a recording."""
 
-    Attributes
-    ----------
-    name, ros_type : str
-        Topic and ``package/msg/Type``.
-    count : int
-        Number of messages.
-    first_ns, last_ns : int or None
-        Log time of the first and last message; None without messages.
-    is_readable : bool
-        Whether the type is one that this project decodes.
-    """
-
+    # `name`, `ros_type`: topic and ``package/msg/Type``
     name: str
     ros_type: str
-    count: int
+    count: int  # number of messages
+    # `first_ns`, `last_ns`: log time of the first and last message; None without messages
     first_ns: int | None
     last_ns: int | None
-    is_readable: bool
+    is_readable: bool  # whether the type is one that this project decodes
 
 
 def topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:

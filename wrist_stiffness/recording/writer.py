@@ -122,18 +122,10 @@ class RecordingWriter:
     def write(self, topic: str, message: Message, log_time_ns: int) -> None:
         """Append a message.
 
-        Parameters
-        ----------
-        message : Message
-            Class of `wrist_stiffness.recording.messages`; one class for each topic.
-        log_time_ns : int
-            Time of reception [ns]; need not increase.
-
-        Raises
-        ------
-        RecordingError
-            If the message cannot be encoded, the topic has another type, the time is out of range
-            or the disk refuses.
+        `message`: class of `wrist_stiffness.recording.messages`; one class for each topic.
+        `log_time_ns`: time of reception [ns]; need not increase.  Raises `RecordingError` if the
+        message cannot be encoded, the topic has another type, the time is out of range or the disk
+        refuses.
         """
         self.write_raw(channel_of(topic, type(message)), encode(message), log_time_ns)
 

@@ -6,21 +6,13 @@ from __future__ import annotations
 class AnswerCount:
     """Answers of one node, heard in the order of the samples.
 
-    Parameters
-    ----------
-    first : int
-        Number of the first sample that the node was asked.
-
-    Attributes
-    ----------
-    last : int
-        Number of the newest sample that was answered.
+    `first`: number of the first sample that the node was asked.
     """
 
     def __init__(self, first: int) -> None:
         self._first = first
         self._silence = self._heard = 0
-        self.last = first - 1
+        self.last = first - 1  # number of the newest sample that was answered
 
     def hear(self, number: int) -> None:
         """Count the answer to a sample by its number."""

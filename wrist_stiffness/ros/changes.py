@@ -24,18 +24,10 @@ LONGEST_ANSWER_S = 3.0
 
 @dataclass(frozen=True)
 class Change:
-    """What a node is ready to do.
+    """What a node is ready to do."""
 
-    Parameters
-    ----------
-    said : str
-        What to tell who asked for it.
-    make : callable
-        Makes the change; returns what undoes it.
-    """
-
-    said: str
-    make: Callable[[], Callable[[], None]]
+    said: str  # what to tell who asked for it
+    make: Callable[[], Callable[[], None]]  # makes the change; returns what undoes it
 
 
 class PreparedChange:

@@ -121,12 +121,7 @@ WITH_INFO = Subscription.CallbackType.WithMessageInfo
 class Waiting:
     """A wait set of all that can wake an executor.
 
-    Parameters
-    ----------
-    executor : StreamExecutor
-        With its nodes as they are now.
-    data : sequence of Subscription
-        What is no reason to stop serving data.
+    `executor`: with its nodes as they are now; `data`: what is no reason to stop serving data.
     """
 
     def __init__(self, executor: StreamExecutor, data: Sequence[Subscription]) -> None:

@@ -33,19 +33,13 @@ class GuardedNode(LifecycleNode):
 
     What they raise is counted, logged and told in the status; the node goes on, and a service
     answers with it.
-
-    Attributes
-    ----------
-    health : Health
-        Counts of good samples and faults.
-    sent_ns : int
-        When the message in hand was sent, by its sender's clock [ns].
     """
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
+        # counts of good samples and faults
         self.health = Health(self.get_fully_qualified_name().lstrip("/"))
-        self.sent_ns = 0
+        self.sent_ns = 0  # when the message in hand was sent, by its sender's clock [ns]
         self._data_group = DataGroup()
         # Services may wait for each other, those of this node included.
         self._service_group = ReentrantCallbackGroup()

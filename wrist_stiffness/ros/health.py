@@ -42,21 +42,10 @@ class Health:
     def report(self, facts: Mapping[str, str], missing: str, restriction: str) -> DiagnosticStatus:
         """Return the state since the last report.
 
-        Parameters
-        ----------
-        facts : mapping of str to str
-            What else to say.
-        missing : str
-            What the node cannot work without, where that is missing: an error.
-        restriction : str
-            What keeps it from its full work, a warning; empty for nothing.
-
-        Returns
-        -------
-        DiagnosticStatus
-            ERROR where something is missing, WARN where samples were refused or work is
-            restricted, STALE where none
-            came, else OK.
+        `facts`: what else to say.  `missing`: what the node cannot work without, where that is
+        missing: an error.  `restriction`: what keeps it from its full work, a warning; empty for
+        nothing.  Gives `DiagnosticStatus`: ERROR where something is missing, WARN where samples
+        were refused or work is restricted, STALE where none came, else OK.
         """
         good = self._good - self._good_before
         faults = self.faults - self._faults_before

@@ -20,32 +20,17 @@ from wrist_stiffness.model.block import Load
 
 @dataclass(frozen=True)
 class Tare:
-    """A zero of the load.
+    """A zero of the load."""
 
-    Parameters
-    ----------
-    zero : Zero
-        What is taken off every load.
-    time_s : float
-        When it was taken, by the system's clock [s].
-    frames : str
-        The parameter `frames` of that time: under another one it is no zero.
-    """
-
-    zero: Zero
-    time_s: float
-    frames: str
+    zero: Zero  # what is taken off every load
+    time_s: float  # when it was taken, by the system's clock [s]
+    frames: str  # the parameter `frames` of that time: under another one it is no zero
 
 
 class KeptTare:
     """The file of one node.
 
-    Parameters
-    ----------
-    folder : str
-        Where it lies; empty to keep nothing.
-    node : str
-        Full name of the node.
+    `folder`: where it lies; empty to keep nothing.  `node`: full name of the node.
     """
 
     def __init__(self, folder: str, node: str) -> None:
@@ -79,24 +64,9 @@ class KeptTare:
     def read(self, now_s: float, longest_s: float, frames: str) -> Tare | None:
         """Return the tare that is kept.
 
-        Parameters
-        ----------
-        now_s : float
-            The system's clock [s].
-        longest_s : float
-            Oldest tare that counts [s].
-        frames : str
-            The parameter `frames` of now.
-
-        Returns
-        -------
-        Tare or None
-            None where none is kept, or it is too old, of the future or of other frames.
-
-        Raises
-        ------
-        InputError
-            If the file is none of ours.
+        `now_s`: the system's clock [s]; `longest_s`: oldest tare that counts [s]; `frames`: the
+        parameter `frames` of now.  Gives None where none is kept, or it is too old, of the future
+        or of other frames.  Raises `InputError` if the file is none of ours.
         """
         if self.path is None or not self.path.is_file():
             return None

@@ -15,12 +15,7 @@ class LoadWait:
     A joint state is ready when a load with its own or a later stamp has arrived, for then no other
     load can belong to it, or when it has waited for long enough.
 
-    Parameters
-    ----------
-    limit_s : float
-        Longest wait [s].
-    clock_ns : callable
-        A clock that never jumps [ns].
+    `limit_s`: longest wait [s]; `clock_ns`: a clock that never jumps [ns].
     """
 
     def __init__(self, limit_s: float, clock_ns: Callable[[], int]) -> None:

@@ -20,12 +20,8 @@ LOOK_EVERY_S = 0.1
 class Loading:
     """One model on its way, in a thread that dies with the process.
 
-    Parameters
-    ----------
-    limit_s : float
-        Longest time that may take [s].
-    allow_python_laws : bool
-        Run the Python files that the model names.
+    `limit_s`: longest time that may take [s]; `allow_python_laws`: run the Python files that the
+    model names.
     """
 
     def __init__(self, path: Path, limit_s: float, allow_python_laws: bool = False) -> None:

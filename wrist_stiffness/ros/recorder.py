@@ -80,12 +80,8 @@ class Recorder(Node):
 
     When the disk is full it ends, and says under which name it kept what it had written.
 
-    Raises
-    ------
-    InputError
-        If no output is named.
-    RecordingError
-        If the output exists or cannot be written.
+    Raises `InputError` if no output is named; `RecordingError` if the output exists or cannot be
+    written.
     """
 
     def __init__(self, **options: Any) -> None:

@@ -23,12 +23,7 @@ MOST_WAITING = 8
 class SlicedWork:
     """A queue of generators, each run a little at a time, in the order in which they came.
 
-    Parameters
-    ----------
-    node : Node
-        Runs them by a timer.
-    on_fault : callable
-        Takes what one of them raises.
+    `node`: runs them by a timer; `on_fault`: takes what one of them raises.
     """
 
     def __init__(self, node: Node, on_fault: Callable[[Exception], None]) -> None:

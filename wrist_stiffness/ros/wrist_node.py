@@ -58,19 +58,8 @@ class WristNode(GuardedNode, ABC):
     Unconfigured it has no model and knows nothing; inactive it takes in loads and slow signals;
     active it answers.
 
-    Attributes
-    ----------
-    base_frame : str
-        Name of F on topics.
-    left_out : tuple of str
-        Effects that the model left out of its last prediction, and why.
-
-    Raises
-    ------
-    InputError
-        If a parameter cannot be used.
-    rclpy.exceptions.ParameterException
-        If a parameter has another type or is out of range.
+    Raises `InputError` if a parameter cannot be used; `rclpy.exceptions.ParameterException` if a
+    parameter has another type or is out of range.
     """
 
     stream: Stream
@@ -80,7 +69,8 @@ class WristNode(GuardedNode, ABC):
         self._entries = (*COMMON, *entries)
         declare(self, self._entries)
         self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
-        self.base_frame = self.stream.settings.frames.prefix + BASE_FRAME
+        self.base_frame = self.stream.settings.frames.prefix + BASE_FRAME  # name of F on topics
+        # effects that the model left out of its last prediction, and why
         self.left_out: tuple[str, ...] = ()
         self._fault = ""
         self._load_heard_s: float | None = None

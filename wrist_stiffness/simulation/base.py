@@ -28,20 +28,10 @@ LOAD_SCALE = 0.03
 def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
     """Return the laws by which the true wrist departs from its table before any effect.
 
-    Parameters
-    ----------
-    name : str
-        `exact` (none) or `wrong`: stiffness of every part, every joint axis, both registrations of
-        the pose sensor and the scale of the load sensor.
-    seed : int
-        Draws how wrong it is.
-    session : int
-        Sessions of one wrist differ in the registrations of the pose sensor.
-
-    Raises
-    ------
-    InputError
-        If there is no such base.
+    `name`: `exact` (none) or `wrong`: stiffness of every part, every joint axis, both registrations
+    of the pose sensor and the scale of the load sensor; `seed`: draws how wrong it is; `session`:
+    sessions of one wrist differ in the registrations of the pose sensor.  Raises `InputError` if
+    there is no such base.
     """
     if name not in BASES:
         raise InputError(f"base {name!r} is not one of {', '.join(BASES)}")

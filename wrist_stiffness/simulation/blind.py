@@ -21,18 +21,10 @@ ATTEMPTS = 20
 
 @dataclass(frozen=True)
 class Secret:
-    """What a seed hides.
+    """What a seed hides."""
 
-    Parameters
-    ----------
-    hidden : HiddenEffect
-        With its magnitude.
-    size : float
-        In units of one sample's noise.
-    """
-
-    hidden: HiddenEffect
-    size: float
+    hidden: HiddenEffect  # with its magnitude
+    size: float  # in units of one sample's noise
 
 
 def draw(
@@ -48,23 +40,10 @@ def draw(
     Every effect of the catalogue is as likely as any other, then every place of it.  A drawn size
     that its effect cannot have on a wrist that still works is drawn again with all the rest.
 
-    Parameters
-    ----------
-    seed : int
-        Not negative.
-    settings : CellSettings
-        The size holds for this experiment.
-    seconds : float
-        Duration of the experiment [s].
-    tell : callable
-        Is told before every run of the experiment; not what is tried.
-    without : collection of str
-        Effects that are not drawn, such as those that every session sets up anew.
-
-    Raises
-    ------
-    InputError
-        If the seed is negative or nothing fits after many draws.
+    `seed`: not negative.  `settings`: the size holds for this experiment.  `seconds`: duration of
+    the experiment [s].  `tell`: is told before every run of the experiment; not what is tried.
+    `without`: effects that are not drawn, such as those that every session sets up anew.  Raises
+    `InputError` if the seed is negative or nothing fits after many draws.
     """
     if seed < 0:
         raise InputError(f"blind seed {seed} is negative")

@@ -13,27 +13,14 @@ from wrist_stiffness.simulation.heat import HEATED
 
 @dataclass(frozen=True)
 class Block:
-    """A run of n samples in the order of time.
+    """A run of n samples in the order of time."""
 
-    Parameters
-    ----------
-    time_s : (n,) float
-        Time since the start [s].
-    configuration : Configuration
-        The rigid wrist at the true angles of the links that the motors turn.
-    load : (n, 6) float
-        Wrench on the platform at O in F, own weight aside [N, N m].
-    flexibility : (n, 8, 6, 6) float
-        Of each elastic component at O in F.
-    temperature : (n, 7) float
-        Of each of `HEATED` above the reference temperature [K].
-    """
-
-    time_s: Array
+    time_s: Array  # (n,), time since the start [s]
+    # the rigid wrist at the true angles of the links that the motors turn
     configuration: Configuration
-    load: Array
-    flexibility: Array
-    temperature: Array
+    load: Array  # (n, 6), wrench on the platform at O in F, own weight aside [N, N m]
+    flexibility: Array  # (n, 8, 6, 6), of each elastic component at O in F
+    temperature: Array  # (n, 7), of each of `HEATED` above the reference temperature [K]
 
     def __getitem__(self, rows: slice) -> Block:
         """Return some of the samples."""

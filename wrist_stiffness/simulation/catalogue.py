@@ -16,21 +16,13 @@ from wrist_stiffness.simulation.strangers import makers as strange
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """One hidden effect: everything that is needed to make its law again.
-
-    Parameters
-    ----------
-    magnitude : float
-        In the unit of the catalogue's entry (SI).
-    shape_seed : int
-        Draws directions, phases and time constants.
-    """
+    """One hidden effect: everything that is needed to make its law again."""
 
     effect: str
     component: str
     form: str
-    magnitude: float
-    shape_seed: int
+    magnitude: float  # in the unit of the catalogue's entry (SI)
+    shape_seed: int  # draws directions, phases and time constants
 
 
 CATALOGUE = {name: each for name, each in vars(makers).items() if isinstance(each, Entry)}
@@ -61,15 +53,8 @@ def is_plausible(hidden: HiddenEffect) -> bool:
 def build(hidden: HiddenEffect, table: Table) -> Law:
     """Make the law of a hidden effect.
 
-    Returns
-    -------
-    Law
-        With a history of its own: one law for one run.
-
-    Raises
-    ------
-    InputError
-        If effect, place or form is not in the catalogue, or the magnitude beyond its limit.
+    Gives `Law`: with a history of its own: one law for one run.  Raises `InputError` if effect,
+    place or form is not in the catalogue, or the magnitude beyond its limit.
     """
     entry = ALL.get(hidden.effect)
     if entry is None:

@@ -36,53 +36,25 @@ TRUTHS = ("fast", "exact")
 class CellSettings:
     """What the cell does and with which sensors; the seed of its noise is not part of it.
 
-    Parameters
-    ----------
-    rate_hz : float
-        Samples per second.
-    program_seconds : float
-        About how long the program takes before it repeats [s].
-    program_seed : int
-        Chooses poses and loads of the program.
-    experiment : str
-        Design of the program, one of `experiment.EXPERIMENTS`.
-    instrument : str
-        Pose sensor: `interferometer`, `tracker`, `cmm` or `ideal`.
-    sees : str
-        What of the pose it measures, one of `pose_view.VIEWS`.
-    lost_beams : float
-        Share of its samples that are missing or wild.
-    load_sensor : LoadSensor
-        Noise of the load estimate.
-    hidden : tuple of HiddenEffect
-        What the true wrist has besides its base.
-    base, base_seed : str, int
-        `exact`, or `wrong` as the seed draws it.
-    session : int
-        Number of the session: registrations of a wrong base differ between them.
-    truth : str
-        `fast`, or `exact`: at the rests where a static instrument measures, the equilibrium of all
-        bodies at once.  It leaves out laws that need motion.
-
-    Raises
-    ------
-    InputError
-        If the rate or the duration is not positive, the instrument or its view not known, or the
-        truth not to be had with this instrument.
+    Raises `InputError` if the rate or the duration is not positive, the instrument or its view not
+    known, or the truth not to be had with this instrument.
     """
 
-    rate_hz: float = 100.0
-    program_seconds: float = 120.0
-    program_seed: int = 0
-    experiment: str = "rich"
-    instrument: str = "interferometer"
-    sees: str = "pose"
-    lost_beams: float = 0.0
-    load_sensor: LoadSensor = LoadSensor()
-    hidden: tuple[HiddenEffect, ...] = ()
+    rate_hz: float = 100.0  # samples per second
+    program_seconds: float = 120.0  # about how long the program takes before it repeats [s]
+    program_seed: int = 0  # chooses poses and loads of the program
+    experiment: str = "rich"  # design of the program, one of `experiment.EXPERIMENTS`
+    instrument: str = "interferometer"  # pose sensor: `interferometer`, `tracker`, `cmm` or `ideal`
+    sees: str = "pose"  # what of the pose it measures, one of `pose_view.VIEWS`
+    lost_beams: float = 0.0  # share of its samples that are missing or wild
+    load_sensor: LoadSensor = LoadSensor()  # noise of the load estimate
+    hidden: tuple[HiddenEffect, ...] = ()  # what the true wrist has besides its base
+    # `base`, `base_seed`: `exact`, or `wrong` as the seed draws it
     base: str = "exact"
     base_seed: int = 0
-    session: int = 0
+    session: int = 0  # number of the session: registrations of a wrong base differ between them
+    # `fast`, or `exact`: at the rests where a static instrument measures, the equilibrium of all
+    # bodies at once.  It leaves out laws that need motion
     truth: str = "fast"
 
     def __post_init__(self) -> None:
@@ -104,36 +76,16 @@ class CellSettings:
 
 @dataclass(frozen=True)
 class CellSample:
-    """What happened and what the sensors said, for one sample or n of them.
+    """What happened and what the sensors said, for one sample or n of them."""
 
-    Parameters
-    ----------
-    encoder : (..., 2) float
-        Motor angles as measured [rad].
-    speed : (..., 2) float
-        Motor speeds as the drives tell them [rad/s].
-    wrench : (..., 6) float
-        Load on the platform at O in F as measured [N, N m].
-    pose_rotation : (..., 3, 3) float
-        True rotation U -> F of the platform.
-    pose_shift : (..., 3) float
-        True position of the platform's point O in F [m].
-    measured_rotation : (..., 3, 3) float
-        Rotation as measured; NaN where it is not.
-    measured_shift : (..., 3) float
-        Position as measured [m]; NaN where it is not.
-    temperature : (..., 8) float
-        Of `SENSED` [degC].
-    """
-
-    encoder: Array
-    speed: Array
-    wrench: Array
-    pose_rotation: Array
-    pose_shift: Array
-    measured_rotation: Array
-    measured_shift: Array
-    temperature: Array
+    encoder: Array  # (..., 2), motor angles as measured [rad]
+    speed: Array  # (..., 2), motor speeds as the drives tell them [rad/s]
+    wrench: Array  # (..., 6), load on the platform at O in F as measured [N, N m]
+    pose_rotation: Array  # (..., 3, 3), True rotation U -> F of the platform
+    pose_shift: Array  # (..., 3), True position of the platform's point O in F [m]
+    measured_rotation: Array  # (..., 3, 3), rotation as measured; NaN where it is not
+    measured_shift: Array  # (..., 3), position as measured [m]; NaN where it is not
+    temperature: Array  # (..., 8), of `SENSED` [degC]
 
     def __getitem__(self, place: int) -> CellSample:
         """Return one sample of a block."""
@@ -171,14 +123,8 @@ def at_rests(wrist: ExactWrist, state: TrueState, rests: NDArray[np.bool_]) -> T
 class VirtualCell:
     """A wrist at work.
 
-    Parameters
-    ----------
-    table : Table
-        Its elastic base: what the true wrist is made of.
-    settings : CellSettings
-        Program and sensors.
-    rng : numpy.random.Generator
-        All noise comes from it; the same state gives the same samples to the bit.
+    `table`: its elastic base: what the true wrist is made of.  `settings`: program and sensors.
+    `rng`: all noise comes from it; the same state gives the same samples to the bit.
     """
 
     def __init__(self, table: Table, settings: CellSettings, rng: np.random.Generator) -> None:
@@ -212,44 +158,19 @@ class VirtualCell:
     def step(self, time_s: float, sent: Array) -> CellSample:
         """Advance to a time.
 
-        Parameters
-        ----------
-        time_s : float
-            Time since the start, later than that of the step before [s].
-        sent : (2,) float
-            Motor angles that the motors are to follow [rad].
-
-        Returns
-        -------
-        CellSample
-            Arrays without a leading axis.
-
-        Raises
-        ------
-        UnreachablePoseError
-            If an angle is beyond the end stops, or the loop does not close.
+        `time_s`: time since the start, later than that of the step before [s]; `sent` (2,): motor
+        angles that the motors are to follow [rad].  Gives `CellSample`: arrays without a leading
+        axis.  Raises `UnreachablePoseError` if an angle is beyond the end stops, or the loop does
+        not close.
         """
         return self.run(np.array([time_s]), np.asarray(sent, dtype=float)[None])[0]
 
     def run(self, time_s: Array, sent: Array) -> CellSample:
         """Advance through a block of samples; as `step` one by one, and faster.
 
-        Parameters
-        ----------
-        time_s : (n,) float
-            Increasing times since the start [s].
-        sent : (n, 2) float
-            Motor angles that the motors are to follow [rad].
-
-        Returns
-        -------
-        CellSample
-            Arrays with a leading axis of n.
-
-        Raises
-        ------
-        UnreachablePoseError
-            If an angle is beyond the end stops, or the loop does not close.
+        `time_s` (n,): increasing times since the start [s]; `sent` (n, 2): motor angles that the
+        motors are to follow [rad].  Gives `CellSample`: arrays with a leading axis of n.  Raises
+        `UnreachablePoseError` if an angle is beyond the end stops, or the loop does not close.
         """
         self._stop_at_ends(sent)
         shaft = self._drive.shaft(time_s, sent)

@@ -13,12 +13,7 @@ class Drive:
     A loop is satisfied as soon as the shaft lies within half a count of what was sent: where it
     stops there differs from move to move, and no encoder shows it.
 
-    Parameters
-    ----------
-    step : float
-        Encoder step [rad].
-    rng : numpy.random.Generator
-        Belongs to the drive alone.
+    `step`: encoder step [rad]; `rng`: belongs to the drive alone.
     """
 
     SETTLING_S = 0.1

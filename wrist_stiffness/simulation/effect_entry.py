@@ -48,31 +48,16 @@ class Draw:
 
 @dataclass(frozen=True)
 class Entry:
-    """One effect.
+    """One effect."""
 
-    Parameters
-    ----------
-    components, forms : tuple of str
-        Places, and functional forms of the law.
-    unit : str
-        Of the magnitude.
-    plausible : float
-        Magnitude that an ordinary wrist may have.
-    largest : float
-        Magnitude beyond which no wrist still works.
-    limit : float
-        Largest magnitude that can be simulated.
-    make : callable
-        Law of a draw.
-    """
-
+    # `components`, `forms`: places, and functional forms of the law
     components: tuple[str, ...]
     forms: tuple[str, ...]
-    unit: str
-    plausible: float
-    largest: float
-    limit: float
-    make: Callable[[Draw], Law]
+    unit: str  # of the magnitude
+    plausible: float  # magnitude that an ordinary wrist may have
+    largest: float  # magnitude beyond which no wrist still works
+    limit: float  # largest magnitude that can be simulated
+    make: Callable[[Draw], Law]  # law of a draw
 
 
 def effect(

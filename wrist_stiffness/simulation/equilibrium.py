@@ -52,27 +52,14 @@ ROUNDING = 1e-11
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Solution of a block of n samples.
+    """Solution of a block of n samples."""
 
-    Parameters
-    ----------
-    twist : (n, 6) float
-        Of the platform at O in F [m, rad].
-    through : (n, 8, 6) float
-        Wrench through each component at O in F [N, N m].
-    slips : (n, 3, 2) float
-        Slide [m] and small turn [rad] of joint_2 to joint_4 besides the rigid motion.
-    force : (n, m) float
-        Of each flange sector [N].
-    closed : (n, m) bool
-        Sectors in contact.
-    """
-
-    twist: Array
-    through: Array
+    twist: Array  # (n, 6), of the platform at O in F [m, rad]
+    through: Array  # (n, 8, 6), wrench through each component at O in F [N, N m]
+    # (n, 3, 2), slide [m] and small turn [rad] of joint_2 to joint_4 besides the rigid motion
     slips: Array
-    force: Array
-    closed: NDArray[np.bool_]
+    force: Array  # (n, m), of each flange sector [N]
+    closed: NDArray[np.bool_]  # (n, m), sectors in contact
 
     @staticmethod
     def joined(parts: Sequence[Equilibrium]) -> Equilibrium:
@@ -86,14 +73,7 @@ class Equilibrium:
 class Pose:
     """The elastic wrist at a block of poses, ready to be loaded.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        Of n samples.
-    parts : ElasticComponents
-        Of the true wrist.
-    gravity : (3,) float
-        In F [m/s^2].
+    `configuration`: of n samples; `parts`: of the true wrist; `gravity` (3,): in F [m/s^2].
     """
 
     def __init__(
@@ -298,21 +278,9 @@ def solve_contacts(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Solve the contact problems of n samples at once by block principal pivoting.
 
-    Parameters
-    ----------
-    approach : (n, m, m) float
-        Symmetric positive definite [m/N].
-    gap : (n, m) float
-        Opening without forces [m].
-    closed : (n, m) bool
-        First guess.
-
-    Returns
-    -------
-    force : (n, m) float
-        Not negative [N].
-    closed : (n, m) bool
-        Sectors in contact.
+    `approach` (n, m, m): symmetric positive definite [m/N]; `gap` (n, m): opening without forces
+    [m]; `closed` (n, m): first guess.  Gives `force` (n, m): not negative [N], and `closed` (n, m):
+    sectors in contact.
     """
     closed = closed | (gap < 0.0) if not closed.any() else closed.copy()
     force = np.zeros_like(gap)

@@ -69,27 +69,14 @@ FULL_STEPS, SHORT_STEPS = 40, 100
 
 @dataclass(frozen=True)
 class ExactState:
-    """Solution of one pose.
+    """Solution of one pose."""
 
-    Parameters
-    ----------
-    rotation : (3, 3) float
-        U -> F of the platform.
-    shift : (3,) float
-        Position of the platform's point O in F [m].
-    through : (8, 6) float
-        Wrench through each component, in the axes of its displaced motor side [N, N m].
-    slip : (3, 2) float
-        Slide [m] and small turn [rad] of each pair from the rigid pose.
-    force : (m,) float
-        Flange forces [N].
-    """
-
-    rotation: Array
-    shift: Array
+    rotation: Array  # (3, 3), U -> F of the platform
+    shift: Array  # (3,), position of the platform's point O in F [m]
+    # (8, 6), wrench through each component, in the axes of its displaced motor side [N, N m]
     through: Array
-    slip: Array
-    force: Array
+    slip: Array  # (3, 2), slide [m] and small turn [rad] of each pair from the rigid pose
+    force: Array  # (m,), flange forces [N]
 
 
 def number(frame: str) -> int:
@@ -100,10 +87,7 @@ def number(frame: str) -> int:
 class ExactWrist:
     """A wrist with hidden laws, pose by pose; friction remembers the pose before.
 
-    Parameters
-    ----------
-    laws : sequence of Law
-        Hidden; sensor laws, motor laws and creep are not looked at.
+    `laws`: hidden; sensor laws, motor laws and creep are not looked at.
     """
 
     def __init__(self, table: Table, laws: Sequence[Law]) -> None:
@@ -116,19 +100,9 @@ class ExactWrist:
     def solve(self, theta: Array, load: Array, kelvin: Array | None = None) -> ExactState:
         """Find the equilibrium of the next pose.
 
-        Parameters
-        ----------
-        theta : (2,) float
-            True motor angles [rad].
-        load : (6,) float
-            Wrench on the platform at O in F [N, N m].
-        kelvin : (7,) float, optional
-            Temperatures of `HEATED` above the reference [K].
-
-        Raises
-        ------
-        InputError
-            If the iteration does not end.
+        `theta` (2,): True motor angles [rad]; `load` (6,): wrench on the platform at O in F [N, N
+        m]; `kelvin` (7,): temperatures of `HEATED` above the reference [K].  Raises `InputError` if
+        the iteration does not end.
         """
         configuration = self._mechanism.forward(theta[None])
         warm = np.zeros((1, len(HEATED))) if kelvin is None else kelvin[None]

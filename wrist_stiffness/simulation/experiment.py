@@ -51,15 +51,8 @@ def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Prog
     Every fifth dwell returns to a reference pose without load, every fourth re-approaches and
     re-loads the dwell before (a replicate), every eleventh is a hold of 15 s; the room drifts.
 
-    Parameters
-    ----------
-    seconds : float
-        About how long the program takes [s].
-
-    Returns
-    -------
-    Program
-        Closed: it ends where it begins.
+    `seconds`: about how long the program takes [s].  Gives `Program`: closed: it ends where it
+    begins.
     """
     reference = random_pose(workspace, rng)
     schedule = Schedule(reference)

@@ -64,19 +64,8 @@ class HeatNetwork:
     def run(self, time_s: Array, angles: Array, room: Array) -> Array:
         """Return the temperatures above the reference at the next n times.
 
-        Parameters
-        ----------
-        time_s : (n,) float
-            Increasing [s].
-        angles : (n, 2) float
-            Motor angles [rad].
-        room : (n,) float
-            Temperature of the room above the reference [K].
-
-        Returns
-        -------
-        (n, 7) float
-            In the order of `HEATED` [K].
+        `time_s` (n,): increasing [s]; `angles` (n, 2): motor angles [rad]; `room` (n,): temperature
+        of the room above the reference [K].  Gives (n, 7): in the order of `HEATED` [K].
         """
         out = np.empty((len(time_s), len(HEATED)))
         for i, now in enumerate(time_s):

@@ -12,37 +12,23 @@ from wrist_stiffness.mechanism.components import Array
 
 @dataclass(frozen=True)
 class Noise:
-    """White noise and a slow wander on three components (a stationary Gauss-Markov process).
+    """White noise and a slow wander on three components (a stationary Gauss-Markov process)."""
 
-    Parameters
-    ----------
-    white, wander : float
-        Standard deviations of one component, in the unit of the signal.
-    wander_time_s : float
-        Correlation time of the wander [s].
-    """
-
+    # `white`, `wander`: standard deviations of one component, in the unit of the signal
     white: float
     wander: float
-    wander_time_s: float = 60.0
+    wander_time_s: float = 60.0  # correlation time of the wander [s]
 
 
 @dataclass(frozen=True)
 class PoseInstrument:
-    """What measures the platform's pose.
-
-    Parameters
-    ----------
-    shift, rotation : Noise
-        On each component [m], [rad].
-    static : bool
-        Measures once at the end of each rest, not all the time.
-    """
+    """What measures the platform's pose."""
 
     name: str
+    # `shift`, `rotation`: on each component [m], [rad]
     shift: Noise
     rotation: Noise
-    static: bool = False
+    static: bool = False  # measures once at the end of each rest, not all the time
 
     @property
     def sigma(self) -> Array:
@@ -53,14 +39,9 @@ class PoseInstrument:
 
 @dataclass(frozen=True)
 class LoadSensor:
-    """What measures the load.
+    """What measures the load."""
 
-    Parameters
-    ----------
-    force, moment : Noise
-        On each component [N], [N m].
-    """
-
+    # `force`, `moment`: on each component [N], [N m]
     force: Noise = field(default_factory=lambda: Noise(2e-3, 1e-3))
     moment: Noise = field(default_factory=lambda: Noise(5e-5, 2e-5))
 
@@ -96,12 +77,8 @@ def instrument(name: str) -> PoseInstrument:
 class NoiseSource:
     """Noise of a six-component sensor, sample after sample.
 
-    Parameters
-    ----------
-    first, second : Noise
-        Of the first and of the last three components.
-    rng : numpy.random.Generator
-        Belongs to this source alone.
+    `first`, `second`: of the first and of the last three components; `rng`: belongs to this source
+    alone.
     """
 
     def __init__(self, first: Noise, second: Noise, rng: np.random.Generator) -> None:

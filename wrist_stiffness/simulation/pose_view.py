@@ -23,19 +23,8 @@ class PoseView:
 
     Of the lost beams one half leave no reading and the other half a wild one.
 
-    Parameters
-    ----------
-    sees : str
-        One of `VIEWS`.
-    lost_beams : float
-        Share of the samples.
-    rng : numpy.random.Generator
-        Belongs to this view alone.
-
-    Raises
-    ------
-    InputError
-        If there is no such view, or the share is not in 0 to `MOST_LOST`.
+    `sees`: one of `VIEWS`; `lost_beams`: share of the samples; `rng`: belongs to this view alone.
+    Raises `InputError` if there is no such view, or the share is not in 0 to `MOST_LOST`.
     """
 
     def __init__(self, sees: str, lost_beams: float, rng: np.random.Generator) -> None:

@@ -19,21 +19,11 @@ class Track:
 
     Two equal values in a row are a rest.
 
-    Parameters
-    ----------
-    time_s : (m,) float
-        Increasing, beginning with 0 [s].
-    values : (m, d) float
-        Value at each knot.
-
-    Raises
-    ------
-    InputError
-        If the knots do not increase from zero.
+    Raises `InputError` if the knots do not increase from zero.
     """
 
-    time_s: Array
-    values: Array
+    time_s: Array  # (m,), increasing, beginning with 0 [s]
+    values: Array  # (m, d), value at each knot
 
     def __post_init__(self) -> None:
         """Check the knots."""
@@ -54,24 +44,12 @@ class Track:
 
 @dataclass(frozen=True)
 class Program:
-    """Motor angles, load and ambient temperature of one experiment; repeats when it is over.
+    """Motor angles, load and ambient temperature of one experiment; repeats when it is over."""
 
-    Parameters
-    ----------
-    angles : Track
-        Nominal motor angles, d = 2 [rad].
-    load : Track
-        Wrench on the platform at O in F, d = 6 [N, N m].
-    ambient : Track
-        Temperature of the room above the reference temperature, d = 1 [K].
-    duration_s : float
-        After this time the program begins again [s].
-    """
-
-    angles: Track
-    load: Track
-    ambient: Track
-    duration_s: float
+    angles: Track  # nominal motor angles, d = 2 [rad]
+    load: Track  # wrench on the platform at O in F, d = 6 [N, N m]
+    ambient: Track  # temperature of the room above the reference temperature, d = 1 [K]
+    duration_s: float  # after this time the program begins again [s]
 
     def phase(self, time_s: Array) -> Array:
         """Return the time since the current repetition began (...) [s]."""
@@ -90,10 +68,7 @@ class Program:
 class Schedule:
     """Builds a program move by move.
 
-    Parameters
-    ----------
-    theta : (2,) float
-        Motor angles at the start [rad].
+    `theta` (2,): motor angles at the start [rad].
     """
 
     def __init__(self, theta: Array) -> None:

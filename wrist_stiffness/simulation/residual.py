@@ -27,17 +27,8 @@ class BasePose:
 def base_pose(table: Table, encoder: Array, wrench: Array) -> BasePose:
     """Return where the platform would be by the base alone.
 
-    Parameters
-    ----------
-    encoder : (n, 2) float
-        Motor angles [rad].
-    wrench : (n, 6) float
-        Load on the platform at O in F [N, N m].
-
-    Returns
-    -------
-    BasePose
-        Of n samples.
+    `encoder` (n, 2): motor angles [rad]; `wrench` (n, 6): load on the platform at O in F [N, N m].
+    Gives `BasePose`: of n samples.
     """
     rotations, shifts = [], []
     for first in range(0, len(encoder), CHUNK):

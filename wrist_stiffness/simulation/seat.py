@@ -14,20 +14,11 @@ from wrist_stiffness.mechanism.vectors import block_diagonal, skew
 
 @dataclass(frozen=True)
 class Seat:
-    """Where a bushing sits in its carrier, with the wrist at home.
+    """Where a bushing sits in its carrier, with the wrist at home."""
 
-    Parameters
-    ----------
-    axis : (3,) float
-        Joint axis, unit vector in F.
-    centre : (3,) float
-        Bushing centre from O in F [m].
-    length, radius : float
-        Of the sleeve's bore [m].
-    """
-
-    axis: Array
-    centre: Array
+    axis: Array  # (3,), joint axis, unit vector in F
+    centre: Array  # (3,), bushing centre from O in F [m]
+    # `length`, `radius`: of the sleeve's bore [m]
     length: float
     radius: float
 

@@ -49,20 +49,10 @@ def sample_covariance(table: Table, theta: Array, name: str) -> Array:
 class Scale:
     """Measures sizes of effects in one experiment.
 
-    Parameters
-    ----------
-    settings : CellSettings
-        Experiment, rate and instrument; other hidden effects in it act in both runs.
-    seconds : float
-        Duration of the experiment [s].
-    tell : callable
-        Is told before every run of the experiment, of which a size takes several; not of which
-        effect.
-
-    Raises
-    ------
-    InputError
-        If the instrument has no noise to measure in.
+    `settings`: experiment, rate and instrument; other hidden effects in it act in both runs.
+    `seconds`: duration of the experiment [s].  `tell`: is told before every run of the experiment,
+    of which a size takes several; not of which effect.  Raises `InputError` if the instrument has
+    no noise to measure in.
     """
 
     def __init__(
@@ -134,24 +124,10 @@ class Scale:
     ) -> HiddenEffect:
         """Return the effect with the magnitude that has a size.
 
-        Parameters
-        ----------
-        hidden : HiddenEffect
-            Its magnitude is where the search begins.
-        size : float
-            Wanted.
-        largest : float, optional
-            Magnitude to stay below; that which can be simulated if None.
-
-        Returns
-        -------
-        HiddenEffect
-            Of that size within `SIZE_TOLERANCE`.
-
-        Raises
-        ------
-        InputError
-            If no magnitude up to the largest has this size.
+        `hidden`: its magnitude is where the search begins.  `size`: wanted.  `largest`: magnitude
+        to stay below; that which can be simulated if None.  Gives `HiddenEffect`: of that size
+        within `SIZE_TOLERANCE`.  Raises `InputError` if no magnitude up to the largest has this
+        size.
         """
         entry = ALL[hidden.effect]
         limit = entry.limit if largest is None else largest

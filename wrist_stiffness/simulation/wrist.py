@@ -40,24 +40,12 @@ TWIST_SCALE = 1e-3
 
 @dataclass(frozen=True)
 class TrueState:
-    """What truly happened in a block of n samples.
+    """What truly happened in a block of n samples."""
 
-    Parameters
-    ----------
-    block : Block
-        Angles, load, temperatures.
-    equilibrium : Equilibrium
-        Forces and slides inside the wrist.
-    rotation : (n, 3, 3) float
-        U -> F of the platform.
-    shift : (n, 3) float
-        Position of the platform's point O in F [m].
-    """
-
-    block: Block
-    equilibrium: Equilibrium
-    rotation: Array
-    shift: Array
+    block: Block  # angles, load, temperatures
+    equilibrium: Equilibrium  # forces and slides inside the wrist
+    rotation: Array  # (n, 3, 3), U -> F of the platform
+    shift: Array  # (n, 3), position of the platform's point O in F [m]
 
 
 class TrueWrist:
@@ -74,16 +62,9 @@ class TrueWrist:
     def run(self, time_s: Array, shaft: Array, load: Array, room: Array) -> TrueState:
         """Advance through a block.
 
-        Parameters
-        ----------
-        time_s : (n,) float
-            Increasing times [s].
-        shaft : (n, 2) float
-            Motor angles that error-free encoders would show [rad].
-        load : (n, 6) float
-            Wrench on the platform at O in F [N, N m].
-        room : (n,) float
-            Temperature of the room above the reference [K].
+        `time_s` (n,): increasing times [s]; `shaft` (n, 2): motor angles that error-free encoders
+        would show [rad]; `load` (n, 6): wrench on the platform at O in F [N, N m]; `room` (n,):
+        temperature of the room above the reference [K].
         """
         angles = shaft + sum((law.turn(time_s, shaft) for law in self._laws), np.zeros_like(shaft))
         return self.at(time_s, angles, load, self._heat.run(time_s, angles, room))
@@ -91,16 +72,9 @@ class TrueWrist:
     def at(self, time_s: Array, angles: Array, load: Array, kelvin: Array) -> TrueState:
         """Advance through a block whose true angles and temperatures are known.
 
-        Parameters
-        ----------
-        time_s : (n,) float
-            Increasing times [s].
-        angles : (n, 2) float
-            True angles of the driven links [rad].
-        load : (n, 6) float
-            Wrench on the platform at O in F [N, N m].
-        kelvin : (n, 7) float
-            Temperatures of `heat.HEATED` above the reference [K].
+        `time_s` (n,): increasing times [s]; `angles` (n, 2): True angles of the driven links [rad];
+        `load` (n, 6): wrench on the platform at O in F [N, N m]; `kelvin` (n, 7): temperatures of
+        `heat.HEATED` above the reference [K].
         """
         configuration = self._mechanism.forward(angles)
         pose = Pose(configuration, self.parts, self.gravity)

@@ -55,23 +55,12 @@ Changes = dict[str, Any]
 
 @dataclass(frozen=True)
 class Row:
-    """A version as the page lists it.
+    """A version as the page lists it."""
 
-    Parameters
-    ----------
-    name : str
-        Of the version.
-    held_out : dict of str to float
-        Error on unseen data by the key of the quantity.
-    warnings : tuple of str
-        What speaks against it.
-    parameters : dict of str to (float, float)
-        Of the effect that was added: value and one standard uncertainty.
-    """
-
-    name: str
-    held_out: Mapping[str, float]
-    warnings: tuple[str, ...]
+    name: str  # of the version
+    held_out: Mapping[str, float]  # error on unseen data by the key of the quantity
+    warnings: tuple[str, ...]  # what speaks against it
+    # of the effect that was added: value and one standard uncertainty
     parameters: Mapping[str, tuple[float, float]]
 
     def titled(self, place: int) -> str:
@@ -81,79 +70,48 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a candidate would explain.
+    """What a candidate would explain."""
 
-    Parameters
-    ----------
-    name, sentence, check : str
-        `law@component`, what it does, and what to check on the machine.
-    change : (u, 6) float
-        What it takes away of each unit [m, rad].
-    parameters : dict of str to float
-        As fitted.
-    """
-
+    # `name`, `sentence`, `check`: `law@component`, what it does, and what to check on the machine
     name: str
     sentence: str
     check: str
-    change: Array
-    parameters: Mapping[str, float]
+    change: Array  # (u, 6), what it takes away of each unit [m, rad]
+    parameters: Mapping[str, float]  # as fitted
 
 
 @dataclass(frozen=True)
 class Offer:
-    """A law that is proposed where no effect of the catalogue explains the error.
+    """A law that is proposed where no effect of the catalogue explains the error."""
 
-    Parameters
-    ----------
-    sentence, formula, component, way : str
-        What it does, and the same as `extend --formula` takes it.
-    probability : float
-        That it is the one, beside what stands before it.
-    role : str
-        The law itself, another beside it, or one in place of the first: only the first and those
-        in its place exclude each other, and only their probabilities add up to at most 1.
-    """
-
+    # `sentence`, `formula`, `component`, `way`: what it does, and the same as `extend --formula`
+    # takes it
     sentence: str
     formula: str
     component: str
     way: str
-    probability: float
+    probability: float  # that it is the one, beside what stands before it
+    # the law itself, another beside it, or one in place of the first: only the first and those in
+    # its place exclude each other, and only their probabilities add up to at most 1
     role: str
 
 
 @dataclass(frozen=True, eq=False)
 class Depends:
-    """On what the rest of a version depends.
+    """On what the rest of a version depends."""
 
-    Parameters
-    ----------
-    sentences : tuple of str
-        For a technician.
-    curves : dict of str to Curve
-        By condition.
-    not_varied : tuple of str
-        Conditions of which nothing can be said.
-    mistake : str
-        A sentence on a sign, unit or name that may be wrong in the recordings; empty for none.
-    """
-
-    sentences: tuple[str, ...]
-    curves: Mapping[str, Curve]
-    not_varied: tuple[str, ...]
+    sentences: tuple[str, ...]  # for a technician
+    curves: Mapping[str, Curve]  # by condition
+    not_varied: tuple[str, ...]  # conditions of which nothing can be said
+    # a sentence on a sign, unit or name that may be wrong in the recordings; empty for none
     mistake: str
 
 
 class Bench:
     """The analysis behind one tab.
 
-    Parameters
-    ----------
-    folder : Path
-        Workspace.
-    tell, progress : callable
-        Told in words what is being done, and steps done and in all; they may raise to end it.
+    `folder`: workspace.  `tell`, `progress`: told in words what is being done, and steps done and
+    in all; they may raise to end it.
     """
 
     def __init__(

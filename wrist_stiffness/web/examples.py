@@ -15,30 +15,16 @@ RATE_HZ, SEED = 10.0, 21
 
 @dataclass(frozen=True)
 class Example:
-    """A wrist that hides something.
-
-    Parameters
-    ----------
-    hidden : str
-        `law@component:form`.
-    size : float
-        In units of one sample's noise.
-    days : int
-        Recordings; the last one judges.
-    seconds : float
-        Duration of each [s].
-    instrument : str
-        Pose sensor.
-    """
+    """A wrist that hides something."""
 
     name: str
     title: str
     story: str
-    hidden: str
-    size: float
-    days: int = 2
-    seconds: float = 120.0
-    instrument: str = "interferometer"
+    hidden: str  # `law@component:form`
+    size: float  # in units of one sample's noise
+    days: int = 2  # recordings; the last one judges
+    seconds: float = 120.0  # duration of each [s]
+    instrument: str = "interferometer"  # pose sensor
 
 
 EXAMPLES = (

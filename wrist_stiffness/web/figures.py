@@ -42,36 +42,17 @@ BREAK_MIN = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What every picture of a tab shows.
+    """What every picture of a tab shows."""
 
-    Parameters
-    ----------
-    view : View
-        Of the version that is looked at.
-    after : (u, 6) float or None
-        What would be left with the chosen candidate, or what another version leaves [m, rad].
-    name : str
-        Of that, empty for none.
-    quantity : Quantity
-        Shift or rotation.
-    axis : int
-        Component of it for pictures over time and condition.
-    scale : float
-        End of the scale of colours, in the unit of the quantity.
-    chosen : (u,) bool or None
-        Units that are selected.
-    moment : int
-        Unit that is looked at.
-    """
-
-    view: View
+    view: View  # of the version that is looked at
+    # (u, 6), what would be left with the chosen candidate, or what another version leaves [m, rad]
     after: Array | None
-    name: str
-    quantity: Quantity
-    axis: int
-    scale: float
-    chosen: Mask | None
-    moment: int
+    name: str  # of that, empty for none
+    quantity: Quantity  # shift or rotation
+    axis: int  # component of it for pictures over time and condition
+    scale: float  # end of the scale of colours, in the unit of the quantity
+    chosen: Mask | None  # (u,), units that are selected
+    moment: int  # unit that is looked at
 
     @property
     def unit(self) -> str:

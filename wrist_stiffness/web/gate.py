@@ -23,14 +23,8 @@ class Gate:
     Without a token only the names of this machine are answered, so that no page of another site
     reaches the workbench by a name of its own; a socket is opened for our own page only.
 
-    Parameters
-    ----------
-    app : callable
-        What is guarded (ASGI).
-    token : str
-        Secret of the address, empty for none.
-    largest : int
-        Of one request [bytes].
+    `app`: what is guarded (ASGI); `token`: secret of the address, empty for none; `largest`: of one
+    request [bytes].
     """
 
     def __init__(self, app: App, token: str, largest: int) -> None:

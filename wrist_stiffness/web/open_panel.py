@@ -27,10 +27,7 @@ UPLOAD = """
 class OpenPanel:
     """The panel of one tab.
 
-    Parameters
-    ----------
-    largest : int
-        Of an upload [bytes].
+    `largest`: of an upload [bytes].
     """
 
     def __init__(self, tab: Tab, largest: int) -> None:

@@ -47,20 +47,8 @@ def write_result(
 
     Their names are returned with what each is.
 
-    Parameters
-    ----------
-    workspace : Workspace
-        Where to.
-    model : ErrorModel
-        To write.
-    lines : sequence of str
-        Commands.
-    parent : Path
-        Model with which it began.
-    recordings : sequence of Path
-        That were opened.
-    answer : WristDiagnosis, optional
-        What was found last.
+    `workspace`: where to; `model`: to write; `lines`: commands; `parent`: model with which it
+    began; `recordings`: that were opened; `answer`: what was found last.
     """
     name = workspace.free("wrist")
     files = [(f"{name}.yaml", "model"), (f"{name}.txt", "commands that do the same")]

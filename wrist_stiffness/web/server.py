@@ -20,22 +20,12 @@ PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class Served:
-    """What is served, and where.
+    """What is served, and where."""
 
-    Parameters
-    ----------
-    folder : str
-        Workspace.
-    host : str
-        Address; beyond this machine it needs a token, which is drawn.
-    largest_mb : int
-        Of an upload [MB].
-    """
-
-    folder: str
-    host: str
+    folder: str  # workspace
+    host: str  # address; beyond this machine it needs a token, which is drawn
     port: int
-    largest_mb: int
+    largest_mb: int  # of an upload [MB]
     browser: bool
 
 

@@ -25,10 +25,7 @@ NAME = re.compile(r"[\w][\w .+-]{0,99}")
 class Workspace:
     """A folder, beyond which no name from a page leads.
 
-    Parameters
-    ----------
-    folder : path
-        Made where it is not there.
+    `folder`: made where it is not there.
     """
 
     def __init__(self, folder: str | Path) -> None:

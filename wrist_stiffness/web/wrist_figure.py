@@ -34,21 +34,10 @@ def wrist_figure(
 ) -> tuple[Figure, float]:
     """Return the bodies at a pose: bent by the load, coloured by their share of what bends.
 
-    Parameters
-    ----------
-    theta : (2,) float
-        Motor angles [rad].
-    load : (6,) float
-        Wrench at O in F [N, N m].
-    measured : (6,) float
-        Error of the platform that was measured [m, rad]; NaN = not.
-    exaggeration : float or None
-        Factor on every displacement [-]; None for one that is seen well.
-
-    Raises
-    ------
-    UnreachablePoseError, SingularPoseError, LoadRangeError
-        If the pose or the load is out of range.
+    `theta` (2,): motor angles [rad].  `load` (6,): wrench at O in F [N, N m].  `measured` (6,):
+    error of the platform that was measured [m, rad]; NaN = not.  `exaggeration`: factor on every
+    displacement [-]; None for one that is seen well.  Raises `UnreachablePoseError`,
+    `SingularPoseError` or `LoadRangeError` if the pose or the load is out of range.
     """
     push = Push(load[:3], load[3:], np.zeros(3))
     shapes = bent_shapes(table, theta, push)

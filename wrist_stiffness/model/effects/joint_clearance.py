@@ -23,12 +23,8 @@ class JointClearance(Law):
     opposite ones tilt it.  A flange that touches pushes the pin back within its play, and a joint
     that rubs holds it.
 
-    Parameters
-    ----------
-    small_force : float
-        With less an end does not reach its wall altogether [N].
-    sharp : JointClearance, optional
-        The law of which this one has rounded walls.
+    `small_force`: with less an end does not reach its wall altogether [N]; `sharp`: the law of
+    which this one has rounded walls.
     """
 
     id = "joint_clearance"

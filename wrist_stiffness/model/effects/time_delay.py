@@ -22,17 +22,10 @@ STAGE: dict[str, Stage] = {
 
 
 class Motion(NamedTuple):
-    """Motor angles and speeds at moments in the order of time.
+    """Motor angles and speeds at moments in the order of time."""
 
-    Parameters
-    ----------
-    time : (n,) float
-        [s].
-    theta, speed : (n, 2) float
-        [rad], [rad/s].
-    """
-
-    time: Array
+    time: Array  # (n,) [s]
+    # `theta`, `speed`: (n, 2) [rad], [rad/s]
     theta: Array
     speed: Array
 

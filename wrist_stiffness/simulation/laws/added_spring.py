@@ -15,16 +15,10 @@ from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Bending, Law
 
 @dataclass(frozen=True)
 class MountSpring(Law):
-    """A spring in the frame in series with a motor: its bracket, or its gears and coupling.
-
-    Parameters
-    ----------
-    flexibility : (6, 6) float
-        At O in F, positive semi-definite.
-    """
+    """A spring in the frame in series with a motor: its bracket, or its gears and coupling."""
 
     motor: str
-    flexibility: Array
+    flexibility: Array  # (6, 6), at O in F, positive semi-definite
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Add it to the bushing of the driven joint, which sits in the frame as well."""
@@ -35,18 +29,10 @@ class MountSpring(Law):
 
 @dataclass(frozen=True)
 class _Drive(Bending):
-    """Gears and coupling of a motor.
+    """Gears and coupling of a motor."""
 
-    Parameters
-    ----------
-    component : str
-        Driven joint.
-    axis : (3,) float
-        Motor axis in F.
-    """
-
-    component: str
-    axis: Array
+    component: str  # driven joint
+    axis: Array  # (3,), motor axis in F
 
     @property
     def column(self) -> Array:
@@ -56,18 +42,10 @@ class _Drive(Bending):
 
 @dataclass(frozen=True)
 class StiffeningDrive(_Drive):
-    """Gears whose teeth touch more fully under torque: soft at first, then stiff.
+    """Gears whose teeth touch more fully under torque: soft at first, then stiff."""
 
-    Parameters
-    ----------
-    softness : float
-        Turn per torque at rest [rad/(N m)].
-    torque : float
-        Torque at which the softness has halved [N m].
-    """
-
-    softness: float
-    torque: float
+    softness: float  # turn per torque at rest [rad/(N m)]
+    torque: float  # torque at which the softness has halved [N m]
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Turn by a saturating logarithm of the torque."""
@@ -80,15 +58,9 @@ class StiffeningDrive(_Drive):
 
 @dataclass(frozen=True)
 class OneSidedDrive(_Drive):
-    """Gears of which one flank is worn: softer one way than the other.
+    """Gears of which one flank is worn: softer one way than the other."""
 
-    Parameters
-    ----------
-    softness : (float, float)
-        Turn per torque, of torques above 0 and below [rad/(N m)].
-    """
-
-    softness: tuple[float, float]
+    softness: tuple[float, float]  # turn per torque, of torques above 0 and below [rad/(N m)]
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Turn by the softness of the flank that is loaded."""
@@ -101,18 +73,11 @@ class OneSidedDrive(_Drive):
 
 @dataclass(frozen=True)
 class OuterSpring(Law):
-    """A spring under both limbs (frame), or between platform and tool (platform).
+    """A spring under both limbs (frame), or between platform and tool (platform)."""
 
-    Parameters
-    ----------
-    flexibility : (6, 6) float
-        At O, in F or in U.
-    on_platform : bool
-        Whether it turns with the platform and carries the load alone; the frame's carries all
-        weights as well.
-    """
-
-    flexibility: Array
+    flexibility: Array  # (6, 6), at O, in F or in U
+    # whether it turns with the platform and carries the load alone; the frame's carries all weights
+    # as well
     on_platform: bool
 
     def twist(self, block: Block, state: Equilibrium) -> Array:

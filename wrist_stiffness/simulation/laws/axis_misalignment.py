@@ -14,18 +14,10 @@ from wrist_stiffness.simulation.laws.law import Law, at_component
 
 @dataclass(frozen=True)
 class AxisMisalignment(Law):
-    """A constant small screw in the body on the motor's side of a joint.
+    """A constant small screw in the body on the motor's side of a joint."""
 
-    Parameters
-    ----------
-    joint : str
-        Which one.
-    screw : (6,) float
-        At O with the wrist at home [m, rad].
-    """
-
-    joint: str
-    screw: Array
+    joint: str  # which one
+    screw: Array  # (6,), at O with the wrist at home [m, rad]
 
     def screws(self, block: Block) -> Array:
         """Turn it with its body."""

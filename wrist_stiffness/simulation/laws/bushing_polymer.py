@@ -13,23 +13,14 @@ from wrist_stiffness.simulation.laws.law import Bending
 
 @dataclass(frozen=True)
 class BushingHardening(Bending):
-    """Stiffening with load: the complementary energy grows slower than the square of the load.
-
-    Parameters
-    ----------
-    fall : float
-        How much of the flexibility is gone at high load (`saturating`, up to 0.65), or the power
-        by which it falls (`power`, up to 0.5) [-].
-    energy : float
-        Complementary energy at which the fall sets in [J].
-    form : str
-        `saturating` or `power`.
-    """
+    """Stiffening with load: the complementary energy grows slower than the square of the load."""
 
     component: str
+    # how much of the flexibility is gone at high load (`saturating`, up to 0.65), or the power by
+    # which it falls (`power`, up to 0.5) [-]
     fall: float
-    energy: float
-    form: str
+    energy: float  # complementary energy at which the fall sets in [J]
+    form: str  # `saturating` or `power`
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Take back a part of the elastic screw; the tangent follows from the energy."""
@@ -50,21 +41,12 @@ class BushingHardening(Bending):
 
 @dataclass(frozen=True)
 class ThermalSoftening(Bending):
-    """The modulus falls with the temperature of the bodies that the bushing joins.
-
-    Parameters
-    ----------
-    bodies : tuple of str
-        Whose mean temperature the bushing has.
-    rate : float
-        Fall of the modulus [1/K].
-    form : str
-        `exponential`, or `glassy`: little at first, then a drop around 10 K above the reference.
-    """
+    """The modulus falls with the temperature of the bodies that the bushing joins."""
 
     component: str
-    bodies: tuple[str, str]
-    rate: float
+    bodies: tuple[str, str]  # whose mean temperature the bushing has
+    rate: float  # fall of the modulus [1/K]
+    # `exponential`, or `glassy`: little at first, then a drop around 10 K above the reference
     form: str
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:

@@ -16,16 +16,8 @@ class CableWrench(Law):
     Its pull is a spring force of its length and the friction of its strands, which follows the
     length by Dahl's law dF/dL = sigma (1 - F/Fc sign(dL)).
 
-    Parameters
-    ----------
-    frame_anchor, platform_anchor : (3,) float
-        In F, and in U [m].
-    stiffness : float
-        [N/m].
-    slack : float
-        Length at which the pull ends [m].
-    rub : float
-        Friction force over the pull of 1 cm [-].
+    `frame_anchor`, `platform_anchor` (3,): in F, and in U [m]; `stiffness` [N/m]; `slack`: length
+    at which the pull ends [m]; `rub`: friction force over the pull of 1 cm [-].
     """
 
     def __init__(

@@ -15,15 +15,9 @@ class Creep(Flowing):
 
         dx_i/dt = (share_i C w - x_i) / tau_i        screw = sum_i x_i
 
-    Parameters
-    ----------
-    joint : str
-        Whose bushing.
-    shares : sequence of float
-        Flexibility of each element over the elastic one [-].
-    times_s : sequence of float
-        Time constants [s]; one is the standard linear solid, a geometric row of them is nearly
-        the power law of creep.
+    `joint`: whose bushing.  `shares`: flexibility of each element over the elastic one [-].
+    `times_s`: time constants [s]; one is the standard linear solid, a geometric row of them is
+    nearly the power law of creep.
     """
 
     def __init__(self, joint: str, shares: Array, times_s: Array) -> None:

@@ -11,18 +11,10 @@ from wrist_stiffness.simulation.laws.law import Law
 
 @dataclass(frozen=True)
 class FlangeGap(Law):
-    """Another axial gap at the flanges of a passive joint.
+    """Another axial gap at the flanges of a passive joint."""
 
-    Parameters
-    ----------
-    joint : str
-        Passive joint with flanges.
-    change : float
-        Of the gap [m]; negative presses the flange on.
-    """
-
-    joint: str
-    change: float
+    joint: str  # passive joint with flanges
+    change: float  # of the gap [m]; negative presses the flange on
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Move the flange.

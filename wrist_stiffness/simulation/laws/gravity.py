@@ -14,21 +14,11 @@ from wrist_stiffness.simulation.laws.law import Law
 
 @dataclass(frozen=True)
 class AddedMass(Law):
-    """A payload or fitting, fixed to the platform or to a link.
+    """A payload or fitting, fixed to the platform or to a link."""
 
-    Parameters
-    ----------
-    component : str
-        `platform` or a link.
-    mass : float
-        [kg].
-    place : (3,) float
-        Centre of gravity from O with the wrist at home [m].
-    """
-
-    component: str
-    mass: float
-    place: Array
+    component: str  # `platform` or a link
+    mass: float  # [kg]
+    place: Array  # (3,), centre of gravity from O with the wrist at home [m]
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Add its weight; a link's is held by the bore on the platform's side."""
@@ -42,15 +32,9 @@ class AddedMass(Law):
 
 @dataclass(frozen=True)
 class MountingTilt(Law):
-    """The wrist stands askew: gravity has another direction in F.
+    """The wrist stands askew: gravity has another direction in F."""
 
-    Parameters
-    ----------
-    lean : (3,) float
-        Rotation vector of the wrist against the vertical [rad].
-    """
-
-    lean: Array
+    lean: Array  # (3,), rotation vector of the wrist against the vertical [rad]
 
     def gravity(self, gravity: Array) -> Array:
         """Turn gravity the other way."""

@@ -13,14 +13,8 @@ from wrist_stiffness.simulation.laws.law import Law
 class Inertia(Law):
     """Newton's and Euler's forces of platform and tool in the motion that the motors make.
 
-    Parameters
-    ----------
-    mass : float
-        [kg].
-    place : (3,) float
-        Centre of gravity in U [m].
-    gyration : float
-        Radius of gyration about it [m].
+    `mass` [kg]; `place` (3,): centre of gravity in U [m]; `gyration`: radius of gyration about it
+    [m].
     """
 
     def __init__(self, mass: float, place: Array, gyration: float) -> None:

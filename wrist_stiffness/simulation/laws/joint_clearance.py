@@ -18,22 +18,13 @@ class JointClearance(Bending):
 
     An end at which the reaction F pushes lies at the radial distance (c/2) g(|F|/F0): it has
     crossed the gap when F is well above the little force F0 that squeezes the contact shut.
-
-    Parameters
-    ----------
-    clearance : float
-        Diametral [m].
-    squeeze : float
-        F0, the force that takes up the rough contact [N].
-    form : str
-        `algebraic`, g = x/sqrt(1+x^2), or `exponential`, g = 1-exp(-x) with a rounded tip.
     """
 
     component: str
     seat: Seat
-    clearance: float
-    squeeze: float
-    form: str
+    clearance: float  # diametral [m]
+    squeeze: float  # F0, the force that takes up the rough contact [N]
+    form: str  # `algebraic`, g = x/sqrt(1+x^2), or `exponential`, g = 1-exp(-x) with a rounded tip
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Push both ends of the pin against the bore."""

@@ -29,18 +29,9 @@ class JointFriction(Rubbing):
     ends of the bushing; from then on they are dragged along.  A joint that turns therefore has
     little friction left along its axis; one at rest locks its slide.
 
-    Parameters
-    ----------
-    joint : str
-        Passive joint.
-    mu : float
-        Coefficient of friction [-].
-    preload : float
-        p0, the budget of the unloaded joint [N].
-    stiffness : float
-        sigma, of the bristles [N/m].
-    stribeck : float
-        How much more the budget is at rest than in motion [-].
+    `joint`: passive joint; `mu`: coefficient of friction [-]; `preload`: p0, the budget of the
+    unloaded joint [N]; `stiffness`: sigma, of the bristles [N/m]; `stribeck`: how much more the
+    budget is at rest than in motion [-].
     """
 
     STRIBECK_SPEED = 5e-5

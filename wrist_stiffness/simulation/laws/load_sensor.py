@@ -18,18 +18,10 @@ from wrist_stiffness.simulation.laws.law import Law
 
 @dataclass(frozen=True)
 class LoadBias(Law):
-    """A zero that is wrong, or that settles after switching on.
+    """A zero that is wrong, or that settles after switching on."""
 
-    Parameters
-    ----------
-    bias : (6,) float
-        At O in F [N, N m].
-    warm_up_s : float
-        Time constant with which it appears [s]; 0 = it is there from the start.
-    """
-
-    bias: Array
-    warm_up_s: float
+    bias: Array  # (6,), at O in F [N, N m]
+    warm_up_s: float  # time constant with which it appears [s]; 0 = it is there from the start
 
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Add it."""
@@ -39,15 +31,9 @@ class LoadBias(Law):
 
 @dataclass(frozen=True)
 class LoadMatrix(Law):
-    """A wrong calibration matrix.
+    """A wrong calibration matrix."""
 
-    Parameters
-    ----------
-    matrix : (6, 6) float
-        Reading per wrench: a scale, cross-talk or a turned sensor.
-    """
-
-    matrix: Array
+    matrix: Array  # (6, 6), reading per wrench: a scale, cross-talk or a turned sensor
 
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Apply it."""
@@ -61,18 +47,10 @@ def turned_sensor(turn: Array) -> Array:
 
 @dataclass(frozen=True)
 class LoadPoint(Law):
-    """The moment is reported about a point beside O.
+    """The moment is reported about a point beside O."""
 
-    Parameters
-    ----------
-    point : (3,) float
-        From O, in F or in U [m].
-    on_platform : bool
-        Whether the point turns with the platform.
-    """
-
-    point: Array
-    on_platform: bool
+    point: Array  # (3,), from O, in F or in U [m]
+    on_platform: bool  # whether the point turns with the platform
 
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Change the moment by lever arm times force."""

@@ -13,11 +13,8 @@ from wrist_stiffness.simulation.laws.law import MOTOR, Law
 class Backlash(Law):
     """Lost motion: the link is dragged by the flanks of its gear or coupling.
 
-    Parameters
-    ----------
-    widths : (k,) float
-        Full widths of k play operators in parallel [rad]; one is a single pair of teeth, several
-        (Prandtl-Ishlinskii) a train whose teeth take hold one after the other.
+    `widths` (k,): full widths of k play operators in parallel [rad]; one is a single pair of teeth,
+    several (Prandtl-Ishlinskii) a train whose teeth take hold one after the other.
     """
 
     def __init__(self, motor: str, widths: Array) -> None:
@@ -39,16 +36,10 @@ class Backlash(Law):
 
 @dataclass(frozen=True)
 class EncoderOffset(Law):
-    """A zero that is wrong.
-
-    Parameters
-    ----------
-    offset : float
-        Link ahead of the reading [rad].
-    """
+    """A zero that is wrong."""
 
     motor: str
-    offset: float
+    offset: float  # link ahead of the reading [rad]
 
     def turn(self, time_s: Array, shaft: Array) -> Array:
         """Turn by the offset."""
@@ -59,22 +50,12 @@ class EncoderOffset(Law):
 
 @dataclass(frozen=True)
 class EccentricEncoder(Law):
-    """A graduated disc off its axis, read by one head: exact geometry, not its first harmonic.
-
-    Parameters
-    ----------
-    eccentricity : float
-        Offset of the disc's centre over its radius [-].
-    phase : float
-        Direction of the offset [rad].
-    lobes : int
-        1, or 2 where the disc was pressed oval.
-    """
+    """A graduated disc off its axis, read by one head: exact geometry, not its first harmonic."""
 
     motor: str
-    eccentricity: float
-    phase: float
-    lobes: int
+    eccentricity: float  # offset of the disc's centre over its radius [-]
+    phase: float  # direction of the offset [rad]
+    lobes: int  # 1, or 2 where the disc was pressed oval
 
     def turn(self, time_s: Array, shaft: Array) -> Array:
         """Return the true angle less the read one."""
@@ -88,25 +69,13 @@ class EccentricEncoder(Law):
 
 @dataclass(frozen=True)
 class TransmissionError(Law):
-    """Gear errors of high order, modulated once a turn by the gear's own run-out.
-
-    Parameters
-    ----------
-    amplitude : float
-        [rad].
-    orders : (k,) float
-        Waves per turn.
-    phases : (k,) float
-        [rad].
-    modulation : float
-        Share by which the amplitude varies once a turn [-].
-    """
+    """Gear errors of high order, modulated once a turn by the gear's own run-out."""
 
     motor: str
-    amplitude: float
-    orders: Array
-    phases: Array
-    modulation: float
+    amplitude: float  # [rad]
+    orders: Array  # (k,), waves per turn
+    phases: Array  # (k,) [rad]
+    modulation: float  # share by which the amplitude varies once a turn [-]
 
     def turn(self, time_s: Array, shaft: Array) -> Array:
         """Sum the waves; each is half as high as the one before."""

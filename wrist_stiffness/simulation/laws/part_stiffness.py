@@ -13,18 +13,10 @@ from wrist_stiffness.simulation.laws.law import Law
 
 @dataclass(frozen=True)
 class UniformSoftness(Law):
-    """Another modulus: all of a part's flexibility, its flanges included, grows alike.
+    """Another modulus: all of a part's flexibility, its flanges included, grows alike."""
 
-    Parameters
-    ----------
-    component : str
-        Link or joint.
-    fraction : float
-        Extra flexibility over that of the base, > -1 [-].
-    """
-
-    component: str
-    fraction: float
+    component: str  # link or joint
+    fraction: float  # extra flexibility over that of the base, > -1 [-]
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Scale flexibility and flanges."""
@@ -45,21 +37,11 @@ class UniformSoftness(Law):
 
 @dataclass(frozen=True)
 class EndHinge(Law):
-    """A cracked or badly pressed bore: a link bends more at one end, about all axes there.
+    """A cracked or badly pressed bore: a link bends more at one end, about all axes there."""
 
-    Parameters
-    ----------
-    component : str
-        Link.
-    fraction : float
-        Extra flexibility at the end over the base's mean rotational one [-].
-    end : (3,) float
-        Centre of that bore from O with the wrist at home [m].
-    """
-
-    component: str
-    fraction: float
-    end: Array
+    component: str  # link
+    fraction: float  # extra flexibility at the end over the base's mean rotational one [-]
+    end: Array  # (3,), centre of that bore from O with the wrist at home [m]
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Add a rotational spring in series."""

@@ -14,15 +14,9 @@ from wrist_stiffness.simulation.laws.law import Law
 
 @dataclass(frozen=True)
 class MeasurementFrame(Law):
-    """The sensor's frame is not F: T_seen = X T.
+    """The sensor's frame is not F: T_seen = X T."""
 
-    Parameters
-    ----------
-    motion : (6,) float
-        X = exp(motion) [m, rad].
-    """
-
-    motion: Array
+    motion: Array  # (6,), X = exp(motion) [m, rad]
 
     def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
         """Move everything by X."""
@@ -32,15 +26,9 @@ class MeasurementFrame(Law):
 
 @dataclass(frozen=True)
 class TargetMounting(Law):
-    """The target is not at its place on the platform: T_seen = T Y.
+    """The target is not at its place on the platform: T_seen = T Y."""
 
-    Parameters
-    ----------
-    motion : (6,) float
-        Y = exp(motion), in U [m, rad].
-    """
-
-    motion: Array
+    motion: Array  # (6,), Y = exp(motion), in U [m, rad]
 
     def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
         """Move the target by Y on the platform."""
@@ -50,21 +38,11 @@ class TargetMounting(Law):
 
 @dataclass(frozen=True)
 class Drift(Law):
-    """The sensor's frame wanders slowly.
+    """The sensor's frame wanders slowly."""
 
-    Parameters
-    ----------
-    motion : (6,) float
-        After the time `reach_s` [m, rad].
-    reach_s : float
-        [s].
-    form : str
-        `linear`, `settling` (exponential) or `daily` (a wave of four times the reach).
-    """
-
-    motion: Array
-    reach_s: float
-    form: str
+    motion: Array  # (6,), after the time `reach_s` [m, rad]
+    reach_s: float  # [s]
+    form: str  # `linear`, `settling` (exponential) or `daily` (a wave of four times the reach)
 
     def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
         """Move everything by the drift so far."""

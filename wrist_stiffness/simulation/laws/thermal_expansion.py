@@ -17,23 +17,12 @@ Spot = tuple[str, Array]
 
 @dataclass(frozen=True)
 class ThermalExpansion(Law):
-    """Uniform growth of one body; its bores and bearings move apart.
+    """Uniform growth of one body; its bores and bearings move apart."""
 
-    Parameters
-    ----------
-    body : str
-        link_1, link_2, frame or platform.
-    expansion : float
-        Coefficient [1/K].
-    spots : tuple of Spot
-        Where the growth enters the limbs.
-    quadratic : float
-        Growth of the coefficient itself [1/K]; polymers and composites are not linear.
-    """
-
-    body: str
-    expansion: float
-    spots: tuple[Spot, ...]
+    body: str  # link_1, link_2, frame or platform
+    expansion: float  # coefficient [1/K]
+    spots: tuple[Spot, ...]  # where the growth enters the limbs
+    # growth of the coefficient itself [1/K]; polymers and composites are not linear
     quadratic: float
 
     def screws(self, block: Block) -> Array:

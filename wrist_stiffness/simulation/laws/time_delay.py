@@ -21,10 +21,7 @@ from wrist_stiffness.simulation.program import Program
 class DelayLine:
     """Signals some time ago, by linear interpolation between the samples that were.
 
-    Parameters
-    ----------
-    delay_s : float
-        [s].
+    `delay_s` [s].
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -54,14 +51,8 @@ class DelayLine:
 class TimeDelay(Law):
     """A late stamp on pose, load or one motor angle.
 
-    Parameters
-    ----------
-    component : str
-        pose_sensor, load_sensor, motor_1 or motor_2.
-    delay_s : float
-        [s].
-    mechanism : Mechanism
-        Turns the platform with the motors.
+    `component`: pose_sensor, load_sensor, motor_1 or motor_2; `delay_s` [s]; `mechanism`: turns the
+    platform with the motors.
     """
 
     _program: Program

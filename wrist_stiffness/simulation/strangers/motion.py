@@ -16,14 +16,9 @@ from wrist_stiffness.simulation.seat import Seat
 class Resonance(Law):
     """The tool lags behind fast moves and rings after them, as a weakly damped oscillator does.
 
-    Parameters
-    ----------
-    share : float
-        How much of the oscillator's motion reaches the target [-].
-    place : (3,) float
-        Centre of gravity of what swings, in U [m].
-    frequency_hz, damping : float
-        Natural frequency and damping ratio.
+    `share`: how much of the oscillator's motion reaches the target [-]; `place` (3,): centre of
+    gravity of what swings, in U [m]; `frequency_hz`, `damping`: natural frequency and damping
+    ratio.
     """
 
     def __init__(self, share: float, place: Array, frequency_hz: float, damping: float) -> None:
@@ -67,14 +62,8 @@ class Resonance(Law):
 class OilFilm(Law):
     """A turning pin floats up on its lubricant, away from the groove that feeds it.
 
-    Parameters
-    ----------
-    joint : str
-        Passive joint.
-    lift : (3,) float
-        Greatest lift, across the axis with the wrist at home [m].
-    speed : float
-        Turning speed at which three quarters of it are there [rad/s].
+    `joint`: passive joint; `lift` (3,): greatest lift, across the axis with the wrist at home [m];
+    `speed`: turning speed at which three quarters of it are there [rad/s].
     """
 
     def __init__(self, joint: str, seat: Seat, lift: Array, speed: float) -> None:
@@ -105,10 +94,7 @@ class SpinningTool(Law):
 
     A spindle in the tool runs steadily; turning its angular momentum takes a moment.
 
-    Parameters
-    ----------
-    momentum : (3,) float
-        Angular momentum of the rotor, in U [kg m^2/s].
+    `momentum` (3,): angular momentum of the rotor, in U [kg m^2/s].
     """
 
     def __init__(self, momentum: Array) -> None:

@@ -16,24 +16,12 @@ from wrist_stiffness.simulation.seat import Seat
 
 @dataclass(frozen=True)
 class CableStop(Law):
-    """Beyond a tilt to one side something soft touches the platform's rim.
+    """Beyond a tilt to one side something soft touches the platform's rim."""
 
-    Parameters
-    ----------
-    stiffness : float
-        [N/m].
-    rim : (3,) float
-        Point of the rim in U that is touched [m].
-    side : (3,) float
-        Direction in F out of the stop, unit vector.
-    depth : float
-        Coordinate of the rim along `side` below which it is touched [m].
-    """
-
-    stiffness: float
-    rim: Array
-    side: Array
-    depth: float
+    stiffness: float  # [N/m]
+    rim: Array  # (3,), point of the rim in U that is touched [m]
+    side: Array  # (3,), direction in F out of the stop, unit vector
+    depth: float  # coordinate of the rim along `side` below which it is touched [m]
 
     def wrench(self, block: Block) -> Array:
         """Push along `side`, more and more as the cable bunches."""
@@ -45,21 +33,12 @@ class CableStop(Law):
 
 @dataclass(frozen=True)
 class Dent(Law):
-    """A dent or a chip lifts the pin over a few degrees of a passive joint's turn.
+    """A dent or a chip lifts the pin over a few degrees of a passive joint's turn."""
 
-    Parameters
-    ----------
-    joint : str
-        Passive joint.
-    lift : (3,) float
-        Radial and tilting motion, as a translation at the outer ring [m].
-    at, width : float
-        Place and width on the turn from home [rad].
-    """
-
-    joint: str
+    joint: str  # passive joint
     seat: Seat
-    lift: Array
+    lift: Array  # (3,), radial and tilting motion, as a translation at the outer ring [m]
+    # `at`, `width`: place and width on the turn from home [rad]
     at: float
     width: float
 
@@ -77,25 +56,13 @@ class WornSector(Bending):
     """Motor's gear: soft under torque only at the motor angles where its teeth are worn.
 
     Thinner teeth bend more; the link turns on with the torque through its driven joint.
-
-    Parameters
-    ----------
-    component : str
-        The driven joint.
-    column : int
-        Number of its motor.
-    axis : (3,) float
-        Motor axis in F.
-    softness : float
-        Turn per torque in the middle of the worn sector [rad/(N m)].
-    at, width : float
-        Place and width of the sector on the motor's angle [rad].
     """
 
-    component: str
-    column: int
-    axis: Array
-    softness: float
+    component: str  # the driven joint
+    column: int  # number of its motor
+    axis: Array  # (3,), motor axis in F
+    softness: float  # turn per torque in the middle of the worn sector [rad/(N m)]
+    # `at`, `width`: place and width of the sector on the motor's angle [rad]
     at: float
     width: float
 

@@ -17,23 +17,12 @@ class OverloadRing(Law):
     """The load sensor reads too little of a side force beyond a limit: its overload ring touches.
 
     Chips fill most of the gap; what then goes through the ring goes past the strain gauges.
-
-    Parameters
-    ----------
-    share : float
-        Of the side force beyond the limit that goes through the ring [-].
-    normal : (3,) float
-        Platform's normal in U; side forces are across it.
-    centre : (3,) float
-        Of the ring, in U [m].
-    limit : float
-        Side force at which it touches [N].
     """
 
-    share: float
-    normal: Array
-    centre: Array
-    limit: float
+    share: float  # of the side force beyond the limit that goes through the ring [-]
+    normal: Array  # (3,), platform's normal in U; side forces are across it
+    centre: Array  # (3,), of the ring, in U [m]
+    limit: float  # side force at which it touches [N]
 
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Take away what goes through the ring."""
@@ -52,20 +41,11 @@ class PrismIncidence(Law):
 
     Light that enters the glass at an angle takes another way than its distance constant says:
     depth * (n - sqrt(n^2 - sin^2 angle)) too short, as the prism turns with the platform.
-
-    Parameters
-    ----------
-    depth : float
-        Of the glass that the sensor's settings leave out [m].
-    beam : (3,) float
-        Direction in F from target to sensor, unit vector.
-    face : (3,) float
-        Normal of the prism's face in U, unit vector.
     """
 
-    depth: float
-    beam: Array
-    face: Array
+    depth: float  # of the glass that the sensor's settings leave out [m]
+    beam: Array  # (3,), direction in F from target to sensor, unit vector
+    face: Array  # (3,), normal of the prism's face in U, unit vector
 
     GLASS = 1.52
     """Refractive index of the prism, n."""

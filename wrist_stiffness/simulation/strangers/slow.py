@@ -17,15 +17,9 @@ from wrist_stiffness.simulation.seat import Seat
 
 @dataclass(frozen=True)
 class ThermalBow(Law):
-    """The frame bows by the square of the difference in temperature between its two motors.
+    """The frame bows by the square of the difference in temperature between its two motors."""
 
-    Parameters
-    ----------
-    twist_per_kelvin : (6,) float
-        Of the platform at a difference of 1 K [m, rad].
-    """
-
-    twist_per_kelvin: Array
+    twist_per_kelvin: Array  # (6,), of the platform at a difference of 1 K [m, rad]
 
     def twist(self, block: Block, state: Equilibrium) -> Array:
         """Move the platform with the frame."""
@@ -35,24 +29,12 @@ class ThermalBow(Law):
 
 @dataclass(frozen=True)
 class FloorTilt(Law):
-    """The carrier sways: the platform's weight has a direction that wanders.
+    """The carrier sways: the platform's weight has a direction that wanders."""
 
-    Parameters
-    ----------
-    weight : float
-        Of platform and tool [N].
-    place : (3,) float
-        Centre of gravity in U [m].
-    sway : (2, 3) float
-        Two rotation vectors of the sway [rad].
-    periods_s : (2,) float
-        [s].
-    """
-
-    weight: float
-    place: Array
-    sway: Array
-    periods_s: Array
+    weight: float  # of platform and tool [N]
+    place: Array  # (3,), centre of gravity in U [m]
+    sway: Array  # (2, 3), two rotation vectors of the sway [rad]
+    periods_s: Array  # (2,) [s]
 
     def wrench(self, block: Block) -> Array:
         """Return the change of the weight."""
@@ -65,18 +47,11 @@ class FloorTilt(Law):
 
 @dataclass(frozen=True)
 class Swelling(Law):
-    """A bushing swells and dries with a humidity that nobody records.
-
-    Parameters
-    ----------
-    screw : (6,) float
-        At O with the wrist at home at 1 [m, rad].
-    periods_s, phases : (k,) float
-        Of the humidity's waves [s], [rad].
-    """
+    """A bushing swells and dries with a humidity that nobody records."""
 
     joint: str
-    screw: Array
+    screw: Array  # (6,), at O with the wrist at home at 1 [m, rad]
+    # `periods_s`, `phases`: (k,), of the humidity's waves [s], [rad]
     periods_s: Array
     phases: Array
 
@@ -93,12 +68,8 @@ class LooseningScrew(Bending):
 
     The gears shake it, and it never tightens again.
 
-    Parameters
-    ----------
-    flexibility : (6, 6) float
-        Of the open clamp, at O with the wrist at home [m/N, rad/N, rad/(N m)].
-    path : float
-        Sum of both motors' motion after which 63 % of it are there [rad].
+    `flexibility` (6, 6): of the open clamp, at O with the wrist at home [m/N, rad/N, rad/(N m)];
+    `path`: sum of both motors' motion after which 63 % of it are there [rad].
     """
 
     def __init__(self, link: str, flexibility: Array, path: float) -> None:
@@ -128,16 +99,9 @@ class SqueezeFilm(Flowing):
 
     The force squeezes the lubricant out of the gap, the faster the larger it is.
 
-    Parameters
-    ----------
-    joint : str
-        Passive joint.
-    gap : float
-        Radial gap, the farthest that the pin sinks [m].
-    time_s : float
-        Time constant of sinking under 1 N [s].
-    turn : float
-        Turn of the joint that draws 63 % of the lubricant in again [rad].
+    `joint`: passive joint; `gap`: radial gap, the farthest that the pin sinks [m]; `time_s`: time
+    constant of sinking under 1 N [s]; `turn`: turn of the joint that draws 63 % of the lubricant in
+    again [rad].
     """
 
     def __init__(self, joint: str, seat: Seat, gap: float, time_s: float, turn: float) -> None:

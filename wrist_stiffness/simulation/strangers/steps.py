@@ -31,14 +31,8 @@ class _Switch:
 class LooseSeat(Law):
     """The tool's seat has two places; a moment beyond a threshold throws it into the other.
 
-    Parameters
-    ----------
-    jump : (6,) float
-        Twist between the two, in U [m, rad].
-    lever : (3,) float
-        Direction of the moment in U that throws it.
-    threshold : float
-        [N m].
+    `jump` (6,): twist between the two, in U [m, rad]; `lever` (3,): direction of the moment in U
+    that throws it; `threshold` [N m].
     """
 
     def __init__(self, jump: Array, lever: Array, threshold: float) -> None:
@@ -56,14 +50,8 @@ class LooseSeat(Law):
 class PlasticSet(Flowing):
     """A part yields a little whenever a load is larger than all before, and stays bent.
 
-    Parameters
-    ----------
-    direction : (6,) float
-        Of screw and wrench at O with the wrist at home; unit in force.
-    per_newton : float
-        Set per force beyond the yield point [m/N].
-    yielding : float
-        Yield point [N].
+    `direction` (6,): of screw and wrench at O with the wrist at home; unit in force.  `per_newton`:
+    set per force beyond the yield point [m/N].  `yielding`: yield point [N].
     """
 
     def __init__(
@@ -89,14 +77,9 @@ class PlasticSet(Flowing):
 class HeadChange(Law):
     """The tracker sees the target with one of two heads, which do not quite agree.
 
-    Parameters
-    ----------
-    twist : (6,) float
-        Of the second head against the first [m, rad].
-    side : (3,) float
-        Direction in F to which the platform's normal leans when the second takes over.
-    normal : (3,) float
-        Platform's normal in U.
+    `twist` (6,): of the second head against the first [m, rad]; `side` (3,): direction in F to
+    which the platform's normal leans when the second takes over; `normal` (3,): platform's normal
+    in U.
     """
 
     def __init__(self, twist: Array, side: Array, normal: Array) -> None:
