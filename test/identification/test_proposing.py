@@ -122,7 +122,11 @@ def test_what_pulls_at_the_platform_is_a_wrench_that_the_sensor_does_not_say(mod
 def test_beside_an_effect_that_is_named_a_law_is_proposed_for_the_rest(model, day, monkeypatch):
     # Of all others the answer would be the same, a minute later.
     asked = [(find_law("backlash"), place) for place in ("motor_1", "motor_2")]
-    monkeypatch.setattr(wrist_problem, "searched", lambda absent: asked)
+    monkeypatch.setattr(
+        wrist_problem,
+        "searched",
+        lambda absent: [each for each in asked if f"{each[0].id}@{each[1]}" not in absent],
+    )
     play = effect_at(find_law("backlash"), "motor_2", {"width_mdeg": 70.0})
     both = planted(
         model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * clamp_bar", play, lift_um=2.0

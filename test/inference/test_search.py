@@ -224,3 +224,30 @@ def test_of_walls_slopes_tell_nothing_so_the_law_that_leads_is_asked_everywhere(
     search = Search(Walled(rng), most_effects=1)
     search.run()
     assert search.best.names == {"play@true"}
+
+
+def test_what_either_first_order_promises_is_fitted_whole(rng):
+    """About a strained base the slopes tell it, though beside its own law all else falls short."""
+    cause = rng.normal(size=ROWS)
+
+    class Strained(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            self.left = 6.0 * cause + rng.normal(size=ROWS)
+            for name, share in (("near@place", 0.5), ("true@place", 1.0)):
+                own = share * cause + np.sqrt(1.0 - share**2) * rng.normal(size=ROWS)
+                self.slopes[name] = self.whole[name] = own[:, None]
+            self.slopes = {name: self.slopes[name] for name in ("near@place", "true@place")}
+
+        def tangent(self, fit, ranked):
+            name, point = ranked.trial.name, fit.point
+            columns, varied = -self.slopes[name], self.slopes[name] * ranked.z
+            left = point.left + columns @ ranked.z
+            if name == "true@place":
+                left = point.left.copy()
+                columns = 0.0 * columns
+            return point.with_effect(name, left, columns, ranked.z, varied, 0.0)
+
+    search = Search(Strained(rng), most_effects=1)
+    search.run()
+    assert search.best.names == {"true@place"}

@@ -142,19 +142,27 @@ class WristFit:
         for place, own in self.sized.items():
             unknown = base.problem.unknowns[place]
             z[place] = (unknown.mean + base.z[place] * unknown.step - own.mean) / own.scale
-        effects = {
-            name: np.array([place for place in places if place in self.sized], dtype=np.intp)
-            for name, places in self.places.items()
-        }
+        weight = base.problem.weights.copy()
+        effects, sizing = {}, {}
+        for name, places in self.places.items():
+            known = [place for place in places.tolist() if place in self.sized]
+            if not known:
+                continue
+            weight[known] = 1.0
+            effect = base.problem.free[base.problem.unknowns[known[0]].free].effect
+            keys = effect.law.sized_by(effect.component)
+            effects[name] = np.array(known, dtype=np.intp)
+            sizing[name] = np.array([n for n in known if self.sized[n].key in keys], dtype=np.intp)
         return Point(
             table.whiten(base.residual),
             table.whiten(base.columns * self.ratio),
             z,
-            base.problem.weights.copy(),
-            {name: places for name, places in effects.items() if len(places)},
+            weight,
+            effects,
             np.concatenate(inexact, axis=1),
             varied,
             self.gives,
+            sizing=sizing,
         )
 
     @cached_property

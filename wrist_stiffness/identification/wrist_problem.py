@@ -122,6 +122,7 @@ class WristProblem:
         if candidate.law.smooth:
             z, columns = ranked.z, candidate.at(ranked.shape) * candidate.usual
             change, (lower, upper) = columns @ z, candidate.bounds
+            sizing = None
         else:
             idle = candidate.recipe.idle
             asked = [p for p in start.parameters if p.key not in idle and np.isfinite(p.scale)]
@@ -129,12 +130,14 @@ class WristProblem:
             known = [(start.estimates[p.key].value, p.lower, p.upper) for p in asked]
             mean, scale = np.array([(p.mean, p.scale) for p in asked]).T
             z, lower, upper = (np.array(known).T - mean) / scale
+            keys = candidate.law.sized_by(candidate.place)
+            sizing = np.array([p.key in keys for p in asked])
         held = (z < lower + NOTHING) | (z > upper - NOTHING)
         left = fit.point.left - self.table.whiten(change)
         own = -self.table.whiten(columns) * ~held
         varied = self.table.varied(change)
         return fit.point.with_effect(
-            candidate.name, left, own, z, varied, candidate.law.inexactness
+            candidate.name, left, own, z, varied, candidate.law.inexactness, sizing
         )
 
     def _begun(

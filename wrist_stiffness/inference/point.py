@@ -167,7 +167,7 @@ class Point:
     weight : (p,) float
         Weights of the Gaussian priors of set-up and tolerances, nearly 0 where there is none.
     effects : dict of str to (k,) int
-        Places of the unknowns of each effect, which have the prior of effects.
+        Places of the unknowns of each effect.
     inexact : (N, l) float
         What the laws of the effects may leave because no law is exact; first those that give.
     varied : dict of str to (N, l) float
@@ -178,6 +178,9 @@ class Point:
         Whether the slopes hold everywhere: then the unknowns follow the amplitudes.
     numbers : int
         Numbers that were measured, where the rows only sum them up; 0 where each is a row.
+    sizing : dict of str to (k,) int
+        Places of those that say how large an effect is, where not all do: these have a size in
+        common, of which little is known; the others lie within their typical magnitudes.
     """
 
     left: Array
@@ -190,7 +193,13 @@ class Point:
     gives: tuple[Give, ...] = ()
     linear: bool = False
     numbers: int = 0
+    sizing: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
     _beside: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def sized(self) -> dict[str, NDArray[np.intp]]:
+        """Places of the unknowns that say how large each effect is."""
+        return {**self.effects, **self.sizing}
 
     @property
     def count(self) -> int:
@@ -202,7 +211,14 @@ class Point:
         return replace(self, left=self.left + self.columns @ step, z=self.z + step)
 
     def with_effect(
-        self, name: str, left: Array, columns: Array, z: Array, varied: Array, inexactness: float
+        self,
+        name: str,
+        left: Array,
+        columns: Array,
+        z: Array,
+        varied: Array,
+        inexactness: float,
+        sizing: NDArray[np.bool_] | None = None,
     ) -> Point:
         """Return the point with one effect more, everything followed to first order.
 
@@ -220,8 +236,11 @@ class Point:
             What it would add if its size changed with the conditions by its own size.
         inexactness : float
             Share of that by which its law may be wrong.
+        sizing : (k,) bool, optional
+            Which of its unknowns say how large it is; by default all.
         """
         places = np.arange(len(self.z), len(self.z) + len(z))
+        sized = places if sizing is None else places[sizing]
         return replace(
             self,
             left=left,
@@ -231,6 +250,7 @@ class Point:
             effects={**self.effects, name: places},
             inexact=np.hstack([self.inexact, inexactness * varied]),
             varied={**self.varied, name: varied},
+            sizing={**self.sizing, name: sized},
             linear=True,
             _beside={},
         )

@@ -350,6 +350,8 @@ class Search:
             if point is not None:
                 log = evidence(point, self._problem.background, state.evidence).log
                 log -= _of_shape(each.shape, point)
+                # Beside flanges that a strained base closed either may fall short.
+                log = max(log, state.evidence.log + each.gain)
                 if not state.names:
                     self.promised[each.trial.name] = log - state.evidence.log
             found.append((log, each))

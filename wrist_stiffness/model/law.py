@@ -90,6 +90,15 @@ class Law(ABC):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the parameters that the law has at a place."""
 
+    def sized_by(self, place: str) -> tuple[str, ...]:
+        """Return the parameters that say how large the effect is: the linear ones, or the first.
+
+        Faults are small or large over decades.  Where and how they act, which the others say, lies
+        within what is usual, however large they are.
+        """
+        parameters = self.parameters(place)
+        return tuple(each.key for each in parameters if each.linear) or (parameters[0].key,)
+
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return how the law becomes columns, and where a fit of it begins.
 

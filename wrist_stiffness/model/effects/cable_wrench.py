@@ -13,14 +13,15 @@ from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.vector_keys import axis_keys
 
-FORCE, MOMENT = "f{}_{}_N_per_rad", "m{}_{}_Nmm_per_rad"
+PATTERNS = (
+    ("f{}_N", "m{}_Nmm"),
+    *((f"f{{}}_{motor}_N_per_rad", f"m{{}}_{motor}_Nmm_per_rad") for motor in (1, 2)),
+)
+"""Force and moment at zero angles, and by each motor's angle."""
 
 
 class CableWrench(Law):
-    """Wrench in F at O, linear in both motor angles, which it follows with lost motion.
-
-    Its value at zero angles is the load sensor's bias by another name and left to `load_bias`.
-    """
+    """Wrench in F at O, linear in both motor angles, which it follows with lost motion."""
 
     id = "cable_wrench"
     stage = "load"
@@ -31,12 +32,15 @@ class CableWrench(Law):
     smooth = False
 
     def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return twelve slopes and the width of the hysteresis."""
-        slopes = (
+        """Return the wrench at zero angles, twelve slopes and the width of the hysteresis."""
+        linear = (
             symmetric(key, 50.0 if key.startswith("f") else 2000.0, 0.2 if key[0] == "f" else 5.0)
             for key in _keys()
         )
-        return (*slopes, Parameter("hysteresis_deg", 0.0, 60.0, 3.0, linear=False, grid=(0.0, 5.0)))
+        return (
+            *linear,
+            Parameter("hysteresis_deg", 0.0, 60.0, 10.0, linear=False, grid=(0.0, 5.0)),
+        )
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
@@ -46,15 +50,10 @@ class CableWrench(Law):
         followed = play(
             angles, 0.5 * values["hysteresis_deg"], angles[0] if state is None else state
         )
-        slopes = np.array([values[key] for key in _keys()]).reshape(2, 6)
-        return Contribution(wrench=followed @ slopes), followed[-1]
+        constant, *slopes = np.array([values[key] for key in _keys()]).reshape(3, 6)
+        return Contribution(wrench=constant + followed @ np.array(slopes)), followed[-1]
 
 
 def _keys() -> list[str]:
-    """Keys of motor 1 and then of motor 2: force, moment."""
-    return [
-        key
-        for motor in (1, 2)
-        for pattern in (FORCE, MOMENT)
-        for key in axis_keys(pattern.format("{}", motor))
-    ]
+    """Keys at zero angles, of motor 1 and of motor 2: force, moment."""
+    return [key for pair in PATTERNS for pattern in pair for key in axis_keys(pattern)]
