@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wrist_stiffness.inference.point import EXPECTED, OUTSIDE
 from wrist_stiffness.inference.search import Names, Search, State
 
 SCHEMA = 2
@@ -20,12 +21,6 @@ MEMBER = 0.05
 
 MOST_MEMBERS = 8
 """A class of more effects names nothing."""
-
-OUTSIDE = 0.2
-"""Prior odds that what is missing is outside the catalogue, against inside it (assumed)."""
-
-SECOND = 0.2
-"""Prior probability that beside an effect something else is missing (assumed)."""
 
 LEAST_REST = 1e-3
 """Least share of an effect's energy that something else beside it may have: its logarithm is evenly
@@ -173,11 +168,11 @@ def stands_in(rest: float) -> float:
     rest : float
         Share that is left in its shape, 0 where it is no more than noise.
     """
-    rest = min(rest, 1.0)
+    rest, outside = min(rest, 1.0), OUTSIDE / EXPECTED
     if rest <= LEAST_REST:
-        return OUTSIDE * LEAST_REST / (OUTSIDE * LEAST_REST + 1.0)
-    there = SECOND / (rest * -np.log(LEAST_REST))
-    return float(OUTSIDE / (OUTSIDE + there))
+        return outside * LEAST_REST / (outside * LEAST_REST + 1.0)
+    there = EXPECTED / (rest * -np.log(LEAST_REST))
+    return float(outside / (outside + there))
 
 
 def read(search: Search, naming: float = NAMING) -> Reading:

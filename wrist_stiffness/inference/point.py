@@ -14,6 +14,10 @@ from wrist_stiffness.inference.giving import Give
 
 Array = NDArray[np.float64]
 
+EXPECTED = 0.5
+"""Effects of the catalogue that are missing in a model, on average, wherever they are (assumed):
+their number is Poisson's, so that so many more are missing beside one that was found."""
+
 OUTSIDE = 0.2
 """Prior probability that a model is wrong in a way that no effect of the catalogue is (assumed),
 spread evenly over the groups of the discrepancy."""

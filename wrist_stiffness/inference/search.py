@@ -17,7 +17,7 @@ import numpy as np
 from wrist_stiffness.inference.amplitudes import ENOUGH, evidence
 from wrist_stiffness.inference.evidence import Array, Evidence
 from wrist_stiffness.inference.giving import GIVES, WAYS
-from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.point import EXPECTED, Background, Point
 
 LEADERS = 6
 """Candidates of each ranking that are fitted whole."""
@@ -238,8 +238,8 @@ class Search:
 
     @property
     def price(self) -> float:
-        """Log prior odds against one effect: about one is missing in all, anywhere."""
-        return float(np.log(max(self._catalogue, 1)))
+        """Log prior odds against one effect."""
+        return float(np.log(max(self._catalogue, 1) / EXPECTED))
 
     @property
     def best(self) -> State:
