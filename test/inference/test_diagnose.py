@@ -17,6 +17,7 @@ from wrist_stiffness.inference import (
     diagnose,
     load_predictor,
 )
+from wrist_stiffness.inference.answer import AS_MUCH
 
 NOISE = np.eye(2)
 
@@ -257,6 +258,15 @@ def test_what_is_not_excited_is_listed_with_what_to_record(rng):
     result = diagnose(planted(units), (*LAWS, sag), (ZERO,))
     assert ("sag", "two loads") in [(each.effect, each.needs) for each in result.not_excited]
     assert "play" not in [each.effect for each in result.not_excited]
+
+
+def test_a_rival_that_explains_as_much_is_told_though_its_size_is_unusual(rng):
+    """Only what is usual speaks against it: a technician rules it out on the machine."""
+    tiny = law("tiny", lambda c: c["x"] * c["z"], plausible=0.03)
+    result = diagnose(planted(table(rng), (CROSS, 4.0)), (*LAWS, tiny), (ZERO,))
+    assert named(result) == {"cross@part"}
+    why = {each.name: each.why_not for each in result.standings}
+    assert [name for name, reason in why.items() if reason == AS_MUCH] == ["tiny@part"]
 
 
 @settings(max_examples=8)

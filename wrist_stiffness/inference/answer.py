@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wrist_stiffness.inference.point import EXPECTED, OUTSIDE
-from wrist_stiffness.inference.search import Names, Search, State
+from wrist_stiffness.inference.search import NEGLIGIBLE, Names, Search, State
 
 SCHEMA = 2
 
@@ -28,6 +28,9 @@ spread from there to 1 (assumed)."""
 
 CHANCE = 1.0
 """Gain of log evidence below which a candidate explains no more than chance would (assumed)."""
+
+AS_MUCH = "explains as much, with less usual values"
+"""Why something is not named that only what is usual speaks against."""
 
 DETECTABLE = 3.0
 """Standard deviations that an effect of typical size must leave beyond the rest to be seen."""
@@ -272,17 +275,34 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         for name in names:
             gain = state.evidence.log - nominal
             fitted[name] = max(gain, fitted.get(name, gain))
+    alike = _as_good(search)
     found = []
     for name in {**fitted, **search.promised}:
         gain = fitted[name] if name in fitted else search.promised[name]
         probability = chance.get(name, 0.0) * itself.get(name, 1.0)
         why = "" if name in named else _why_not(gain, probability, name in fitted)
+        if why and name in alike:
+            why = AS_MUCH
         if name in refuted:
             why = "makes the held-out error grow"
         if name not in fitted and gain >= CHANCE and not search.in_time:
             why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))
     return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
+
+
+def _as_good(search: Search) -> set[str]:
+    """Return the effects of sets that leave no more than the most probable one, but for noise."""
+    best = search.best.evidence
+    most = best.square + 2.0 * NEGLIGIBLE * best.excess
+    return {
+        name
+        for names, state in search.states.items()
+        if len(names) == len(search.best.names)
+        and state.evidence.unexplained <= best.unexplained
+        and state.evidence.square <= most
+        for name in names - search.best.names
+    }
 
 
 def _why_not(gain: float, probability: float, fitted: bool) -> str:

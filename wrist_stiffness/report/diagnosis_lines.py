@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.inference.answer import AS_MUCH
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.parts import TITLES, plus_minus
 
@@ -27,6 +28,8 @@ def diagnosis_lines(found: Diagnosed) -> list[str]:
     out += [*found.proposed(), "", *_table(result)]
     for place, finding in enumerate(result.findings, 1):
         out += ["", *_finding_lines(f"{place}. ", finding)]
+    if alike := [each.name for each in result.standings if each.why_not == AS_MUCH]:
+        out += ["", f"would explain as much, with less usual values: {', '.join(alike)}"]
     if result.suspects:
         why = {each.name: each.why_not for each in result.standings}
         out += ["", "not named:"]
