@@ -110,15 +110,8 @@ COMMANDS: tuple[CommandModule, ...] = (
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
     """Return the parser of all commands.
 
-    Parameters
-    ----------
-    commands
-        Modules in the order in which the help lists them.
-
-    Returns
-    -------
-    OneLineParser
-        Its result has the attribute `run`, a function of the parsed arguments.
+    `commands`: modules in the order in which the help lists them.  Gives `OneLineParser`: its
+    result has the attribute `run`, a function of the parsed arguments.
     """
     parser = OneLineParser(
         prog=PROG,
@@ -142,22 +135,10 @@ def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
 def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | None = None) -> int:
     """Run one command.
 
-    Parameters
-    ----------
-    argv
-        Arguments without the program name; those of the process if None.
-    commands
-        The commands on offer; those of the package if None.
-
-    Returns
-    -------
-    int
-        0 done, 1 the answer is no, 2 bad input, 130 interrupted, 141 the reader of stdout left.
-
-    Raises
-    ------
-    SystemExit
-        From argparse: 0 after `--help` and `--version`, 2 on wrong use; 143 after SIGTERM.
+    `argv`: arguments without the program name; those of the process if None.  `commands`: the
+    commands on offer; those of the package if None.  Gives 0 done, 1 the answer is no, 2 bad input,
+    130 interrupted, 141 the reader of stdout left.  Raises `SystemExit` from argparse: 0 after
+    `--help` and `--version`, 2 on wrong use; 143 after SIGTERM.
     """
     _show_every_name()
     arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)

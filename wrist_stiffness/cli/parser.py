@@ -105,16 +105,9 @@ def add_command(
 ) -> OneLineParser:
     """Return the parser of a command that is new.
 
-    Parameters
-    ----------
-    name, what
-        The command, and what it does in a line.
-    texts
-        What its help says before and after the options.
-    run
-        Runs it and returns the exit code.
-    json
-        Whether it gives its result to programs as well.
+    `name`, `what`: the command, and what it does in a line; `texts`: what its help says before and
+    after the options; `run`: runs it and returns the exit code; `json`: whether it gives its result
+    to programs as well.
     """
     description, epilog = texts
     parser = commands.add_parser(

@@ -22,19 +22,12 @@ PER_AXIS = 41
 
 @dataclass(frozen=True)
 class Push:
-    """A load in fixed axes of F at a point of the platform.
+    """A load in fixed axes of F at a point of the platform."""
 
-    Parameters
-    ----------
-    force, moment : (3,) float
-        In F [N, N m].
-    point : (3,) float
-        Where the force acts, in U [m].
-    """
-
+    # `force`, `moment`: (3,), in F [N, N m]
     force: Array
     moment: Array
-    point: Array
+    point: Array  # (3,), where the force acts, in U [m]
 
     @classmethod
     def rated(cls, table: Table) -> Push:
@@ -71,23 +64,12 @@ class Push:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a load alone does at poses on a grid over the map domain.
+    """What a load alone does at poses on a grid over the map domain."""
 
-    Parameters
-    ----------
-    theta : (n, 2) float
-        Motor angles [rad].
-    operative : (n,) bool
-        Poses in the operative workspace.
-    twist : (n, 6) float
-        Of the platform, own weight left out [m, rad].
-    shares : (n, 8) float
-        Part of the strain energy by component, in the order of `ELASTIC`; rows add up to 1.
-    """
-
-    theta: Array
-    operative: NDArray[np.bool_]
-    twist: Array
+    theta: Array  # (n, 2), motor angles [rad]
+    operative: NDArray[np.bool_]  # (n,), poses in the operative workspace
+    twist: Array  # (n, 6), of the platform, own weight left out [m, rad]
+    # (n, 8), part of the strain energy by component, in the order of `ELASTIC`; rows add up to 1
     shares: Array
 
 

@@ -28,20 +28,12 @@ from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """A calibration and what it was made from.
-
-    Parameters
-    ----------
-    sessions : tuple of MeasuredSession
-        What was measured, in the order of time.
-    mistake : str
-        Of signs, units or names, where one explains most of what is left; else empty.
-    """
+    """A calibration and what it was made from."""
 
     calibration: Calibration
-    sessions: tuple[MeasuredSession, ...]
+    sessions: tuple[MeasuredSession, ...]  # what was measured, in the order of time
     output: Path
-    mistake: str
+    mistake: str  # of signs, units or names, where one explains most of what is left; else empty
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""

@@ -44,12 +44,8 @@ Mask = NDArray[np.bool_]
 class CellMessages:
     """Loads, commands, joint states and measured poses of a recording.
 
-    Parameters
-    ----------
-    writer : RecordingWriter
-        Open.
-    whole : bool
-        Whether the sensor sees position and rotation; else a huge variance says which it does not.
+    `writer`: open.  `whole`: whether the sensor sees position and rotation; else a huge variance
+    says which it does not.
     """
 
     def __init__(self, writer: RecordingWriter, whole: bool) -> None:
@@ -64,16 +60,9 @@ class CellMessages:
     def write(self, stamps_ns: Iterable[int], sent: Array, block: CellSample, warmth: Mask) -> None:
         """Write n samples; a load goes first, so that it has arrived with its joint state.
 
-        Parameters
-        ----------
-        stamps_ns : iterable of int
-            n stamps [ns].
-        sent : (n, 2) float
-            Motor commands [rad].
-        block : CellSample
-            What the sensors said; a pose of which they measured nothing is not written.
-        warmth : (n,) bool
-            At which samples the thermometers speak.
+        `stamps_ns`: n stamps [ns].  `sent` (n, 2): motor commands [rad].  `block`: what the sensors
+        said; a pose of which they measured nothing is not written.  `warmth` (n,): at which samples
+        the thermometers speak.
         """
         states = np.concatenate([block.encoder, block.speed], axis=1)
         moved, turned = _known(block.measured_shift), _known(block.measured_rotation)

@@ -27,25 +27,13 @@ from wrist_stiffness.progress import Progress, silent
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A comparison and what it was made from.
-
-    Parameters
-    ----------
-    border : (b, 2) float
-        Motor angles on the border of the operative workspace [rad].
-    remarks : tuple of str
-        What could not be used of the recordings.
-    fitted_here : tuple of str
-        Models that were fitted to one of these very recordings.
-    as_drawn : bool
-        Whether the last model was never fitted to any recording.
-    """
+    """A comparison and what it was made from."""
 
     comparison: Comparison
-    border: Array
-    remarks: tuple[str, ...]
-    fitted_here: tuple[str, ...]
-    as_drawn: bool
+    border: Array  # (b, 2), motor angles on the border of the operative workspace [rad]
+    remarks: tuple[str, ...]  # what could not be used of the recordings
+    fitted_here: tuple[str, ...]  # models that were fitted to one of these very recordings
+    as_drawn: bool  # whether the last model was never fitted to any recording
     provenance: Provenance
 
     def worst(self, model: ComparedModel) -> tuple[WorstPose, ...]:
@@ -103,22 +91,9 @@ def compare(
 ) -> Compared:
     """Compare models with recordings of one wrist.
 
-    Parameters
-    ----------
-    models : sequence of path
-        Model files, the one to be improved upon first.
-    progress : callable
-        From a label to a function that is told steps done and in all.
-
-    Returns
-    -------
-    Compared
-        Errors, on what they depend, worst poses.
-
-    Raises
-    ------
-    WristError
-        If a model or a recording cannot be used.
+    `models`: model files, the one to be improved upon first; `progress`: from a label to a function
+    that is told steps done and in all.  Gives `Compared`: errors, on what they depend, worst poses.
+    Raises `WristError` if a model or a recording cannot be used.
     """
     names = unique_names(models)
     loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]

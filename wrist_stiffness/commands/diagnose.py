@@ -38,27 +38,15 @@ FAR_FROM_DRAWN = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """A diagnosis and what it was made from.
-
-    Parameters
-    ----------
-    recordings : tuple of str
-        Names of the sessions.
-    mistake : str
-        Of signs, units or names, where one explains most of the error; else empty.
-    remarks : tuple of str
-        What could not be used of the recordings.
-    paths : tuple of str
-        Recordings as they were named.
-    """
+    """A diagnosis and what it was made from."""
 
     answer: WristDiagnosis
-    recordings: tuple[str, ...]
-    mistake: str
-    remarks: tuple[str, ...]
+    recordings: tuple[str, ...]  # names of the sessions
+    mistake: str  # of signs, units or names, where one explains most of the error; else empty
+    remarks: tuple[str, ...]  # what could not be used of the recordings
     provenance: Provenance
     model: str = "MODEL"
-    paths: tuple[str, ...] = ("RECORDING",)
+    paths: tuple[str, ...] = ("RECORDING",)  # recordings as they were named
 
     @property
     def result(self) -> Diagnosis:
@@ -119,21 +107,10 @@ def diagnose_recordings(
 ) -> Diagnosed:
     """Find the effects that a model misses in recordings of one wrist.
 
-    Parameters
-    ----------
-    recordings : Recordings
-        Each a session; the last one judges what the others show.
-    progress : callable
-        From a label to a function that is told steps done and in all.
-    naming : float
-        Probability from which an effect is named.
-    seconds : float
-        Time after which no further fit is begun.
-
-    Raises
-    ------
-    WristError
-        If the model or a recording cannot be used.
+    `recordings`: each a session; the last one judges what the others show.  `progress`: from a
+    label to a function that is told steps done and in all.  `naming`: probability from which an
+    effect is named.  `seconds`: time after which no further fit is begun.  Raises `WristError` if
+    the model or a recording cannot be used.
     """
     loaded = load_model(model)
     sessions = read_sessions(recordings, [loaded], progress("reading"))

@@ -33,31 +33,16 @@ WITHIN = 2.0
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the explanation.
+    """One line of the explanation."""
 
-    Parameters
-    ----------
-    name : str
-        Component, effect, or what is left.
-    kind : str
-        `elastic`, `effect`, `second order` or `rest`.
-    twist : (6,) float
-        At O in F [m, rad].
-    along : (2,) float
-        Its part along the total shift and about the total rotation axis: these add up to s and phi
-        [m, rad].
-    sigma : (2,) float
-        One standard uncertainty of `along` [m, rad].
-    meaning : str
-        What it is, for a technician; empty for elastic parts.
-    """
-
-    name: str
-    kind: str
-    twist: Array
+    name: str  # component, effect, or what is left
+    kind: str  # `elastic`, `effect`, `second order` or `rest`
+    twist: Array  # (6,), at O in F [m, rad]
+    # (2,), its part along the total shift and about the total rotation axis: these add up to s and
+    # phi [m, rad]
     along: Array
-    sigma: Array
-    meaning: str
+    sigma: Array  # (2,), one standard uncertainty of `along` [m, rad]
+    meaning: str  # what it is, for a technician; empty for elastic parts
 
     def as_values(self) -> dict[str, Any]:
         """Return what people and programs read, with units in the names."""
@@ -76,27 +61,16 @@ class Row:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A pose error and where it comes from.
+    """A pose error and where it comes from."""
 
-    Parameters
-    ----------
-    total : (6,) float
-        Twist that is explained: the measured one if there is one, else the predicted [m, rad].
-    rows : tuple of Row
-        Their twists add up to the total.
-    sigma : (2,) float
-        Standard uncertainty of the prediction along the total [m, rad].
-    warnings : tuple of str
-        Effects that were left out, have left first order, or are not known at one pose.
-    verdict : str
-        Whether a measured error is explained, in one sentence; empty for a predicted one.
-    """
-
+    # (6,), twist that is explained: the measured one if there is one, else the predicted [m, rad]
     total: Array
     measured: bool
-    rows: tuple[Row, ...]
-    sigma: Array
+    rows: tuple[Row, ...]  # their twists add up to the total
+    sigma: Array  # (2,), standard uncertainty of the prediction along the total [m, rad]
+    # effects that were left out, have left first order, or are not known at one pose
     warnings: tuple[str, ...]
+    # whether a measured error is explained, in one sentence; empty for a predicted one
     verdict: str
 
     def as_values(self) -> dict[str, Any]:
@@ -197,23 +171,10 @@ def _without(covariate: str, sample: Sample) -> Sample:
 def measured_twist(pose: Sequence[float], platform: Array) -> Array:
     """Return the error twist of a measured pose against the rigid platform.
 
-    Parameters
-    ----------
-    pose : sequence of 7 float
-        The platform's point O in F [m], quaternion x, y, z, w of U -> F.
-    platform : (3, 3) float
-        Rotation U -> F of the rigid platform.
-
-    Returns
-    -------
-    (6,) float
-        At O in F [m, rad].
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, the point is farther from O than any wrist bends, the
-        quaternion is not of unit length, or the rotation is one that no effect explains.
+    `pose`: the platform's point O in F [m], quaternion x, y, z, w of U -> F; `platform` (3, 3):
+    rotation U -> F of the rigid platform.  Gives (6,): at O in F [m, rad].  Raises `InputError` if
+    a number is not finite, the point is farther from O than any wrist bends, the quaternion is not
+    of unit length, or the rotation is one that no effect explains.
     """
     values = np.array(pose, dtype=float)
     if values.shape != (7,) or not np.isfinite(values).all():

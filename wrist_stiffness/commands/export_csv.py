@@ -55,24 +55,13 @@ LONGEST_HEAD = 100_000
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written.
+    """What was written."""
 
-    Parameters
-    ----------
-    path : Path
-        The table.
-    rows : int
-        Measured poses in it.
-    turns : int
-        Rows without a measured value: where the wrist or its load turned back between poses.
-    remarks : tuple of str
-        What was left out of it.
-    """
-
-    path: Path
-    rows: int
+    path: Path  # the table
+    rows: int  # measured poses in it
+    # rows without a measured value: where the wrist or its load turned back between poses
     turns: int
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what was left out of it
 
 
 def export_csv(

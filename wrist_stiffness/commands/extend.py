@@ -34,22 +34,14 @@ AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
 
 @dataclass(frozen=True)
 class FormulaEffect:
-    """A formula; what in it is neither a signal nor a covariate is a parameter.
-
-    Parameters
-    ----------
-    direction : sequence of 6 float
-        Screw for a value of 1, at O in the component's home frame [m, rad].
-    expression : str
-        See `model.formula_law`.
-    start : dict of str to float
-        Values of parameters from which the fit begins; 1 where there is none.
-    """
+    """A formula; what in it is neither a signal nor a covariate is a parameter."""
 
     id: str
     component: str
+    # screw for a value of 1, at O in the component's home frame [m, rad]
     direction: Sequence[float]
-    expression: str
+    expression: str  # see `model.formula_law`
+    # values of parameters from which the fit begins; 1 where there is none
     start: Mapping[str, float]
 
     def effect(self, covariates: Sequence[str]) -> Effect:
@@ -132,16 +124,10 @@ def direction_of(words: Sequence[str]) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class Extended:
-    """An extension and what it was made from.
-
-    Parameters
-    ----------
-    sessions : tuple of MeasuredSession
-        What was measured, in the order of time.
-    """
+    """An extension and what it was made from."""
 
     extension: Extension
-    sessions: tuple[MeasuredSession, ...]
+    sessions: tuple[MeasuredSession, ...]  # what was measured, in the order of time
 
     @property
     def before(self) -> dict[str, float]:

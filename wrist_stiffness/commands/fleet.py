@@ -53,19 +53,11 @@ class Answer(NamedTuple, Generic[Result]):
 
 @dataclass(frozen=True)
 class FleetRow(Generic[Result]):
-    """What one recording gave.
-
-    Parameters
-    ----------
-    result : any
-        What the function returned; None where it failed.
-    error : str
-        Why it failed, one line; empty where it did not.
-    """
+    """What one recording gave."""
 
     path: Path
-    result: Result | None
-    error: str = ""
+    result: Result | None  # what the function returned; None where it failed
+    error: str = ""  # why it failed, one line; empty where it did not
 
     @property
     def reason(self) -> str:
@@ -98,22 +90,8 @@ def each_recording(
 ) -> list[FleetRow[dict[str, Any]]]:
     """Run a command on every recording by itself, as of a wrist of its own, in parallel.
 
-    Parameters
-    ----------
-    command : callable
-        Of recordings; can be pickled.
-    progress : callable
-        As that of `map_recordings`.
-
-    Returns
-    -------
-    list of FleetRow
-        With what the command gives for a program.
-
-    Raises
-    ------
-    InputError
-        If there is no recording.
+    `command`: of recordings; can be pickled.  `progress`: as that of `map_recordings`.  Gives with
+    what the command gives for a program.  Raises `InputError` if there is no recording.
     """
     one = partial(_values, command=command, recordings=recordings)
     paths = recordings_in(recordings.paths)
@@ -134,21 +112,10 @@ def map_recordings(
 ) -> list[FleetRow[Result]]:
     """Call a function of one recording for each of many.
 
-    Parameters
-    ----------
-    function : callable
-        Of a path; can be pickled.
-    paths : sequence of Path
-        Recordings (see `sessions.reading.folder.recordings_in`).
-    workers : int, optional
-        Processes; one for each processor, at most one for each recording, if None.
-    progress : callable
-        Told recordings done and in all.
-
-    Returns
-    -------
-    list of FleetRow
-        In the order of the paths.  A recording that fails is a row with its error, not a stop.
+    `function`: of a path; can be pickled.  `paths`: recordings (see
+    `sessions.reading.folder.recordings_in`).  `workers`: processes; one for each processor, at most
+    one for each recording, if None.  `progress`: told recordings done and in all.  Gives in the
+    order of the paths.  A recording that fails is a row with its error, not a stop.
     """
     answers = spread(function, paths, workers, progress)
     return [FleetRow(path, *answer) for path, answer in zip(paths, answers, strict=True)]
@@ -164,10 +131,7 @@ def spread(
 
     A worker that dies loses nothing: what it had in hand goes to another one, up to three times.
 
-    Returns
-    -------
-    list of Answer
-        In the order of the items.
+    Gives in the order of the items.
     """
     if len(items) <= 1:
         return [attempt(function, item) for item in items]

@@ -79,27 +79,17 @@ LONGEST_LINE = csv.field_size_limit()
 
 @dataclass(frozen=True)
 class Imported:
-    """What was written.
-
-    Parameters
-    ----------
-    rows, measured : int
-        Rows of the table; those in which something was measured.
-    seconds : float
-        From the first row to the last [s]; a wrong unit of time shows in it.
-    temperatures, covariates : tuple of str
-        Components and names that were found.
-    cut_row : int
-        The last row, left out because the file ends in it; 0 if the file is whole.
-    """
+    """What was written."""
 
     path: Path
+    # `rows`, `measured`: rows of the table; those in which something was measured
     rows: int
     measured: int
-    seconds: float
+    seconds: float  # from the first row to the last [s]; a wrong unit of time shows in it
+    # `temperatures`, `covariates`: components and names that were found
     temperatures: tuple[str, ...]
     covariates: tuple[str, ...]
-    cut_row: int
+    cut_row: int  # the last row, left out because the file ends in it; 0 if the file is whole
 
 
 def import_csv(

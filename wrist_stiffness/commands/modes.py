@@ -48,17 +48,11 @@ def payload_of(
 
 @dataclass(frozen=True)
 class ModeMap:
-    """Natural frequencies over the map domain, motors locked, without damping.
+    """Natural frequencies over the map domain, motors locked, without damping."""
 
-    Parameters
-    ----------
-    poses : (n, n, 2) float
-        Motor angles on a grid [rad].
-    frequency : dict of str to (n, n, 6) float
-        By state of the flanges, the slowest first [Hz]; NaN outside the domain.
-    """
-
-    poses: Array
+    poses: Array  # (n, n, 2), motor angles on a grid [rad]
+    # dict of str to (n, n, 6), by state of the flanges, the slowest first [Hz]; NaN outside the
+    # domain
     frequency: dict[str, Array]
 
     def operative(self, table: Table, state: str) -> Array:

@@ -25,22 +25,12 @@ PARENT_PID = "WRIST_STIFFNESS_PARENT"
 
 @dataclass(frozen=True)
 class NodeEntry:
-    """One node to start.
+    """One node to start."""
 
-    Parameters
-    ----------
-    executable : str
-        Name of the executable and of the module in `wrist_stiffness.ros`.
-    parameters : dict
-        Values by parameter name.
-    remappings : tuple of (str, str)
-        (standard, actual) topic names.
-    """
-
-    executable: str
+    executable: str  # name of the executable and of the module in `wrist_stiffness.ros`
     name: str
-    parameters: dict[str, ParameterValue] = field(default_factory=dict)
-    remappings: tuple[tuple[str, str], ...] = ()
+    parameters: dict[str, ParameterValue] = field(default_factory=dict)  # values by parameter name
+    remappings: tuple[tuple[str, str], ...] = ()  # (standard, actual) topic names
 
     def having(self, parameters: Mapping[str, ParameterValue]) -> NodeEntry:
         """Return the same entry with further parameters."""

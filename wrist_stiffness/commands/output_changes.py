@@ -59,27 +59,18 @@ class LargestChange:
 
 @dataclass(frozen=True)
 class TopicChanges:
-    """Changes of one topic.
-
-    Parameters
-    ----------
-    common, only_old, only_new : int
-        Messages that both runs have, and those that one of them lacks.
-    changed : int
-        Common ones that differ by more than `TOLERANCES`, or in a name or a number of values.
-    first_ns : int or None
-        Stamp of the first of these [ns].
-    largest : tuple of LargestChange
-        Of every quantity that changed by more than its tolerance.
-    """
+    """Changes of one topic."""
 
     topic: str
+    # `common`, `only_old`, `only_new`: messages that both runs have, and those that one of them
+    # lacks
     common: int
     only_old: int
     only_new: int
+    # common ones that differ by more than `TOLERANCES`, or in a name or a number of values
     changed: int
-    first_ns: int | None
-    largest: tuple[LargestChange, ...]
+    first_ns: int | None  # stamp of the first of these [ns]
+    largest: tuple[LargestChange, ...]  # of every quantity that changed by more than its tolerance
 
     @property
     def same(self) -> bool:
@@ -92,15 +83,8 @@ def output_changes(
 ) -> tuple[TopicChanges, ...]:
     """Compare the outputs of two runs.
 
-    Returns
-    -------
-    tuple of TopicChanges
-        Of every topic that one of them has.
-
-    Raises
-    ------
-    RecordingError
-        If a recording cannot be read, the old one has no outputs, or one has a foreign type.
+    Gives of every topic that one of them has.  Raises `RecordingError` if a recording cannot be
+    read, the old one has no outputs, or one has a foreign type.
     """
     first, second = open_recording(old), open_recording(new)
     present = {topic.name for topic in first.topics}

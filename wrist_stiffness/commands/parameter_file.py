@@ -36,23 +36,10 @@ def node_settings(
 ) -> tuple[StreamSettings, StreamSettings]:
     """Return the settings of the sample path of predictor and corrector.
 
-    Parameters
-    ----------
-    path : path or None
-        Parameter file as `ros2 run --ros-args --params-file` takes it; None for the defaults.
-    joints : sequence of str
-        Joint names of motor 1 and 2, which override the file's; empty for those.
-
-    Returns
-    -------
-    prediction, correction : StreamSettings
-        In SI units.
-
-    Raises
-    ------
-    InputError
-        If the file is no parameter file, or a parameter is unknown, of another type or out of
-        range.
+    `path`: parameter file as `ros2 run --ros-args --params-file` takes it; None for the defaults.
+    `joints`: joint names of motor 1 and 2, which override the file's; empty for those.  Gives
+    `prediction`, `correction`: in SI units.  Raises `InputError` if the file is no parameter file,
+    or a parameter is unknown, of another type or out of range.
     """
     root = node_of({}, "", InputError) if path is None else read_yaml(path, InputError)
     nodes = {} if path is None else mapping_of(lambda node: node)(root)

@@ -44,34 +44,18 @@ LONGEST_MIN = 120.0
 class Options:
     """What the user says of an experiment.
 
-    Parameters
-    ----------
-    minutes : float or None
-        Duration; needed for a commissioning.
-    speed_deg_per_s : float
-        Largest speed of a motor.
-    dwell_s : float
-        What one measurement at rest takes, settling included.
-    in_motion : bool
-        Whether the pose sensor measures in motion too.
-    noise_um, noise_mdeg : float
-        Standard deviation of each component of one measured pose, for a commissioning.
-    seed : int
-        The same seed gives the same plan.
-
-    Raises
-    ------
-    InputError
-        If a number is not positive or the experiment longer than `LONGEST_MIN`.
+    Raises `InputError` if a number is not positive or the experiment longer than `LONGEST_MIN`.
     """
 
-    minutes: float | None
-    speed_deg_per_s: float = 30.0
-    dwell_s: float = 2.0
-    in_motion: bool = True
+    minutes: float | None  # duration; needed for a commissioning
+    speed_deg_per_s: float = 30.0  # largest speed of a motor
+    dwell_s: float = 2.0  # what one measurement at rest takes, settling included
+    in_motion: bool = True  # whether the pose sensor measures in motion too
+    # `noise_um`, `noise_mdeg`: standard deviation of each component of one measured pose, for a
+    # commissioning
     noise_um: float = 1.0
     noise_mdeg: float = 1.0
-    seed: int = 0
+    seed: int = 0  # the same seed gives the same plan
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -21,35 +21,19 @@ from wrist_stiffness.simulation.exact import ExactWrist
 
 @dataclass(frozen=True)
 class PosePrediction:
-    """Prediction at one pose, and what is worth knowing about it.
-
-    Parameters
-    ----------
-    evaluation : str
-        How the nodes evaluate the table.
-    other : Prediction or None
-        By the other evaluation, where it was asked for.
-    exact : (6,) float or None
-        Twist with finite rotations [m, rad], where the first order in which the prediction is made
-        has been left and the model has no effects.
-    energy_shares : dict of str to float
-        Part of the load's strain energy in each component with free slides; they add up to 1.
-    tilt : float
-        Of the platform's normal from home [rad].
-    singularity : float
-        D at the pose.
-    operative : bool
-        Whether the pose lies in the operative workspace.
-    """
+    """Prediction at one pose, and what is worth knowing about it."""
 
     prediction: Prediction
-    evaluation: Evaluation
-    other: Prediction | None
+    evaluation: Evaluation  # how the nodes evaluate the table
+    other: Prediction | None  # by the other evaluation, where it was asked for
+    # (6,), twist with finite rotations [m, rad], where the first order in which the prediction is
+    # made has been left and the model has no effects
     exact: Array | None
+    # part of the load's strain energy in each component with free slides; they add up to 1
     energy_shares: dict[str, float]
-    tilt: float
-    singularity: float
-    operative: bool
+    tilt: float  # of the platform's normal from home [rad]
+    singularity: float  # D at the pose
+    operative: bool  # whether the pose lies in the operative workspace
 
     def as_values(self) -> dict[str, Any]:
         """Return what people and programs read, with units in the names."""
@@ -76,26 +60,10 @@ def predict(
 ) -> PosePrediction:
     """Predict the pose error at one pose under one load.
 
-    Parameters
-    ----------
-    angles : sequence of 2 float
-        Motor angles [rad].
-    load : sequence of 6 float
-        Wrench on the platform at O [N, N m].
-    on_platform : bool
-        Whether the wrench is given in `wrist_platform` instead of `wrist_base`.
-    both : bool
-        Also evaluate the table in the way that the nodes do not use.
-
-    Returns
-    -------
-    PosePrediction
-        The error and where it comes from.
-
-    Raises
-    ------
-    WristError
-        If the model cannot be read, or pose or load are out of range.
+    `angles`: motor angles [rad]; `load`: wrench on the platform at O [N, N m]; `on_platform`:
+    whether the wrench is given in `wrist_platform` instead of `wrist_base`; `both`: also evaluate
+    the table in the way that the nodes do not use.  Gives `PosePrediction`: the error and where it
+    comes from.  Raises `WristError` if the model cannot be read, or pose or load are out of range.
     """
     error_model = load_model(model)
     theta, wrench = np.array(angles, dtype=float), Load(np.array(load, dtype=float), on_platform)

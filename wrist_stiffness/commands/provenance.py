@@ -20,18 +20,10 @@ PACKAGES = ("numpy", "scipy")
 
 @dataclass(frozen=True)
 class Run:
-    """What a result says of the run that made it.
+    """What a result says of the run that made it."""
 
-    Parameters
-    ----------
-    command : str
-        As it was typed.
-    date : str
-        ISO 8601.
-    """
-
-    command: str
-    date: str
+    command: str  # as it was typed
+    date: str  # ISO 8601
 
     def step(self, parent: str | Path, recordings: Mapping[Path, MeasuredSession]) -> Step:
         """Return the step from a parent's file to its child."""
@@ -43,18 +35,11 @@ class Run:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from.
-
-    Parameters
-    ----------
-    date : str
-        When, ISO 8601.
-    models, recordings : dict of str to str
-        SHA-256 by file name.
-    """
+    """Where a result comes from."""
 
     command: str
-    date: str
+    date: str  # when, ISO 8601
+    # `models`, `recordings`: SHA-256 by file name
     models: Mapping[str, str]
     recordings: Mapping[str, str]
 

@@ -87,22 +87,9 @@ class _Joints:
 class BlockReplay:
     """Answers blocks of messages.
 
-    Parameters
-    ----------
-    writer : RecordingWriter
-        Gets the messages and their answers.
-    predicting, correcting : PredictionStream, CorrectionStream
-        As in nodes.
-    ahead : SignalsAhead
-        Feeds both.
-    sampled : mapping
-        Standard by actual name of the topics that are answered.
-    left_out : collection of str
-        Topics of an earlier run.
-    drawings : Drawings
-        Draws some of the samples.
-    summary : ReplaySummary
-        Counts.
+    `writer`: gets the messages and their answers; `predicting`, `correcting`: as in nodes; `ahead`:
+    feeds both; `sampled`: standard by actual name of the topics that are answered; `left_out`:
+    topics of an earlier run; `drawings`: draws some of the samples; `summary`: counts.
     """
 
     def __init__(

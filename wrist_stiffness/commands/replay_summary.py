@@ -36,42 +36,28 @@ class Sizes:
 
 @dataclass
 class ReplaySummary:
-    """What a replay did.
+    """What a replay did."""
 
-    Parameters
-    ----------
-    joint_states, predictions : int
-        Joint states read, predictions written.
-    commands, corrections : int
-        Commands read, commands that were changed.
-    trajectories, corrected_trajectories : int
-        The same of trajectories.
-    refused : Counter
-        Samples without a result. Reasons that differ only in their numbers are one, told by the
-        first of them.
-    warnings : Counter
-        Predictions by what the model had to leave out of them, such as an effect whose temperature
-        the recording lacks.
-    replaced : int
-        Outputs of an earlier run in the input, left out.
-    shift_um, phi_mdeg : Sizes
-        Predicted |s| [um] and phi [mdeg].
-    damage : str
-        What is wrong with the input; empty if nothing.
-    """
-
+    # `joint_states`, `predictions`: joint states read, predictions written
     joint_states: int = 0
     predictions: int = 0
+    # `commands`, `corrections`: commands read, commands that were changed
     commands: int = 0
     corrections: int = 0
+    # `trajectories`, `corrected_trajectories`: the same of trajectories
     trajectories: int = 0
     corrected_trajectories: int = 0
+    # samples without a result. Reasons that differ only in their numbers are one, told by the first
+    # of them
     refused: Counter[str] = field(default_factory=Counter)
+    # predictions by what the model had to leave out of them, such as an effect whose temperature
+    # the recording lacks
     warnings: Counter[str] = field(default_factory=Counter)
-    replaced: int = 0
+    replaced: int = 0  # outputs of an earlier run in the input, left out
+    # `shift_um`, `phi_mdeg`: predicted |s| [um] and phi [mdeg]
     shift_um: Sizes = field(default_factory=Sizes)
     phi_mdeg: Sizes = field(default_factory=Sizes)
-    damage: str = ""
+    damage: str = ""  # what is wrong with the input; empty if nothing
     _first_of_kind: dict[str, str] = field(default_factory=dict, repr=False)
 
     def refuse(self, topic: str, reason: object) -> None:

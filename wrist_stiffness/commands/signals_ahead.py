@@ -32,38 +32,25 @@ Integers = NDArray[np.int64]
 
 @dataclass
 class _Run:
-    """Messages of one topic, one after the other: loads as arrays, others one by one.
-
-    Parameters
-    ----------
-    time_ns : (k,) int
-        Log times [ns].
-    stamps, frame_id, wrenches
-        Of loads that share their frame, (k,) [ns] and (k, 6) [N, N m].
-    messages : list of Message
-        All others.
-    """
+    """Messages of one topic, one after the other: loads as arrays, others one by one."""
 
     topic: str
-    time_ns: Integers
+    time_ns: Integers  # (k,), log times [ns]
+    # `stamps`, `frame_id`, `wrenches`: of loads that share their frame, (k,) [ns] and (k, 6) [N, N
+    # m]
     stamps: Integers | None = None
     frame_id: str = ""
     wrenches: NDArray[np.float64] | None = None
-    messages: Sequence[Message] = ()
+    messages: Sequence[Message] = ()  # all others
     next: int = 0
 
 
 class SignalsAhead:
     """Feeds the signals of a recording to streams, a fixed time ahead of their samples.
 
-    Parameters
-    ----------
-    names : mapping
-        Standard by actual topic name: the load, static transforms, temperatures and covariates.
-    streams : sequence of Stream
-        All hear the same.
-    refuse : callable
-        Called with topic and reason for each message that a stream cannot use.
+    `names`: standard by actual topic name: the load, static transforms, temperatures and
+    covariates; `streams`: all hear the same; `refuse`: called with topic and reason for each
+    message that a stream cannot use.
     """
 
     def __init__(

@@ -43,19 +43,11 @@ LONGEST_S, FASTEST_HZ = 24.0 * 3600.0, 5000.0
 
 @dataclass(frozen=True)
 class Simulated:
-    """What was written.
-
-    Parameters
-    ----------
-    samples : int
-        Samples on each topic.
-    seconds : float
-        Duration [s].
-    """
+    """What was written."""
 
     path: Path
-    samples: int
-    seconds: float
+    samples: int  # samples on each topic
+    seconds: float  # duration [s]
 
 
 def simulate_recording(
@@ -139,21 +131,10 @@ def hide(
 ) -> CellSettings:
     """Return the settings with one more hidden effect of a wanted size.
 
-    Parameters
-    ----------
-    name : str
-        `NAME@COMPONENT` or `NAME@COMPONENT:FORM` of the catalogue; the first form by default.
-    size : float
-        In units of one sample's noise, over this experiment.
-    seconds : float
-        Its duration [s].
-    tell : callable
-        Is told before every run of the experiment that finds the size.
-
-    Raises
-    ------
-    InputError
-        If the name is not in the catalogue or the size cannot be had.
+    `name`: `NAME@COMPONENT` or `NAME@COMPONENT:FORM` of the catalogue; the first form by default.
+    `size`: in units of one sample's noise, over this experiment.  `seconds`: its duration [s].
+    `tell`: is told before every run of the experiment that finds the size.  Raises `InputError` if
+    the name is not in the catalogue or the size cannot be had.
     """
     effect, _, place = name.partition("@")
     component, _, form = place.partition(":")

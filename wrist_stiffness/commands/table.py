@@ -107,20 +107,8 @@ def build(
 def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
     """Condense a link drawn in CAD, its stiffness in the units of a geometry file [N, mm].
 
-    Parameters
-    ----------
-    step : path
-        STEP file, see `fem/step_part.py`.
-
-    Returns
-    -------
-    StepPart
-        As `matrix_N_mm` reads.
-
-    Raises
-    ------
-    GeometryError
-        If a file is wrong.
+    `step`: STEP file, see `fem/step_part.py`.  Gives `StepPart`: as `matrix_N_mm` reads.  Raises
+    `GeometryError` if a file is wrong.
     """
     from wrist_stiffness.fem.components import SHIPPED_SIZES
     from wrist_stiffness.fem.step_part import step_part
@@ -131,27 +119,17 @@ def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
 
 @dataclass(frozen=True)
 class MapSummary:
-    """Statistics of the rated load's map.
+    """Statistics of the rated load's map."""
 
-    Parameters
-    ----------
-    operative : dict
-        Mean, min and max by quantity over the operative workspace, with the unit in the name.
-    domain_max : dict
-        Maxima over the whole map.
-    """
-
+    # mean, min and max by quantity over the operative workspace, with the unit in the name
     operative: dict[str, dict[str, float]]
-    domain_max: dict[str, float]
+    domain_max: dict[str, float]  # maxima over the whole map
 
 
 def summarise(table: Table) -> MapSummary:
     """Return the statistics of Tables 1 and 2 for a table, on a fine grid over the map.
 
-    Returns
-    -------
-    MapSummary
-        In micrometres and millidegrees.
+    Gives `MapSummary`: in micrometres and millidegrees.
     """
     workspace = table.workspace
     poses = workspace.grid(FINE)

@@ -24,14 +24,9 @@ REBUILT_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a check looked at.
+    """One thing that a check looked at."""
 
-    Parameters
-    ----------
-    name, text : str
-        What was checked and what was found, with the limit.
-    """
-
+    # `name`, `text`: what was checked and what was found, with the limit
     name: str
     text: str
     passed: bool

@@ -41,20 +41,13 @@ SIZES = {"s_um": (slice(0, 3), 1e6), "phi_mdeg": (slice(3, 6), float(np.degrees(
 
 @dataclass(frozen=True)
 class Tolerance:
-    """One parameter that differs from wrist to wrist.
+    """One parameter that differs from wrist to wrist."""
 
-    Parameters
-    ----------
-    law, place, key : str
-        Effect, component, and parameter with its unit.
-    sigma : float
-        Standard deviation, in that unit.
-    """
-
+    # `law`, `place`, `key`: effect, component, and parameter with its unit
     law: str
     place: str
     key: str
-    sigma: float
+    sigma: float  # standard deviation, in that unit
 
     @property
     def name(self) -> str:
@@ -104,24 +97,12 @@ def tolerances_of(limits: Mapping[str, float]) -> tuple[Tolerance, ...]:
 
 @dataclass(frozen=True)
 class Sums:
-    """What many wrists add up to; sums of sums are those of all.
+    """What many wrists add up to; sums of sums are those of all."""
 
-    Parameters
-    ----------
-    count : int
-        Wrists.
-    products : (1 + k, 1 + k) float
-        Of 1 and the k standardised tolerances with each other.
-    answers : (1 + k, p * 6) float
-        Of these with what the wrists err by at p poses [m, rad].
-    squares : (p * 6,) float
-        Of what they err by.
-    """
-
-    count: int
-    products: Array
-    answers: Array
-    squares: Array
+    count: int  # wrists
+    products: Array  # (1 + k, 1 + k), of 1 and the k standardised tolerances with each other
+    answers: Array  # (1 + k, p * 6), of these with what the wrists err by at p poses [m, rad]
+    squares: Array  # (p * 6,), of what they err by
 
     def __add__(self, other: Sums) -> Sums:
         """Return those of both."""
@@ -135,42 +116,24 @@ class Sums:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a tolerance costs: RMS over wrists and poses.
+    """What a tolerance costs: RMS over wrists and poses."""
 
-    Parameters
-    ----------
-    name : str
-        `law@place key`, or what it is where no tolerance alone costs it.
-    sigma : float
-        Standard deviation of the tolerance, in the unit of its name; NaN where it has none.
-    size : dict of str to (float, float)
-        Value and standard uncertainty by `SIZES`.
-    """
-
-    name: str
+    name: str  # `law@place key`, or what it is where no tolerance alone costs it
+    # standard deviation of the tolerance, in the unit of its name; NaN where it has none
     sigma: float
-    size: dict[str, tuple[float, float]]
+    size: dict[str, tuple[float, float]]  # value and standard uncertainty by `SIZES`
 
 
 @dataclass(frozen=True)
 class ToleranceStudy:
-    """Which tolerance costs how much.
-
-    Parameters
-    ----------
-    load : sequence of 6 float
-        At O in F [N, N m].
-    costs : tuple of Cost
-        The dearest in s first.
-    others, whole : Cost
-        What goes with none of them alone, and all together.
-    """
+    """Which tolerance costs how much."""
 
     model: str
     wrists: int
     poses: int
-    load: Sequence[float]
-    costs: tuple[Cost, ...]
+    load: Sequence[float]  # at O in F [N, N m]
+    costs: tuple[Cost, ...]  # the dearest in s first
+    # `others`, `whole`: what goes with none of them alone, and all together
     others: Cost
     whole: Cost
 

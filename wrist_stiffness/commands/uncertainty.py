@@ -54,31 +54,19 @@ STATED_PARTS = {
 
 @dataclass(frozen=True)
 class Contribution:
-    """One part of a prediction's error.
+    """One part of a prediction's error."""
 
-    Parameters
-    ----------
-    name : str
-        Where it comes from.
-    s, phi : float
-        What 99 of 100 poses and loads keep, relative to s and phi.
-    stated : bool
-        Whether it is in what the table states.
-    """
-
-    name: str
+    name: str  # where it comes from
+    # `s`, `phi`: what 99 of 100 poses and loads keep, relative to s and phi
     s: float
     phi: float
-    stated: bool
+    stated: bool  # whether it is in what the table states
 
 
 def contributions(table: Table) -> list[Contribution]:
     """Return all contributions of a table, those in its stated error first.
 
-    Returns
-    -------
-    list of Contribution
-        A part that the table does not state is absent.
+    A part that the table does not state is absent.
     """
     errors, found = table.header.errors, []
     for part, name in STATED_PARTS.items():
@@ -105,15 +93,8 @@ def contributions(table: Table) -> list[Contribution]:
 def second_order(table: Table) -> dict[str, float]:
     """Return how far first order is from the equilibrium of all bodies with finite rotations.
 
-    Parameters
-    ----------
-    table : Table
-        The lookup, taken in closed form.
-
-    Returns
-    -------
-    dict
-        Error of s and phi that 99 of 100 poses and loads keep, relative to their lengths.
+    `table`: the lookup, taken in closed form.  Gives error of s and phi that 99 of 100 poses and
+    loads keep, relative to their lengths.
     """
     poses, loads = _draws(table, EXACT_DRAWS)
     configuration, wrist = table.mechanism.forward(poses), ExactWrist(table, ())

@@ -70,12 +70,7 @@ class Pace:
 class WristDrawing:
     """Draws one wrist.
 
-    Parameters
-    ----------
-    exaggeration : float
-        Factor on the error's twist [-].
-    frame_id : str
-        Name of F.
+    `exaggeration`: factor on the error's twist [-]; `frame_id`: name of F.
     """
 
     def __init__(self, geometry: Geometry, exaggeration: float, frame_id: str = BASE_FRAME) -> None:
@@ -94,19 +89,9 @@ class WristDrawing:
     ) -> list[bytes]:
         """Return links, rigid platform, actual platform and the shift of O, drawn n times.
 
-        Parameters
-        ----------
-        stamps : (n,) int
-            Of the joint states [ns].
-        configuration : Configuration
-            The rigid wrist, n times.
-        twist : (n, 6) float
-            The pose error at O in F [m, rad].
-
-        Returns
-        -------
-        list of bytes
-            visualization_msgs/MarkerArray; the text says the factor.
+        `stamps` (n,): of the joint states [ns]; `configuration`: the rigid wrist, n times; `twist`
+        (n, 6): the pose error at O in F [m, rad].  Gives visualization_msgs/MarkerArray; the text
+        says the factor.
         """
         factor, n = self._exaggeration, len(stamps)
         rotation, shift = exp_twist(factor * twist)

@@ -20,20 +20,13 @@ JUDGES = 12
 
 @dataclass(frozen=True)
 class Size:
-    """Error of one quantity over all units, in the unit of its report.
+    """Error of one quantity over all units, in the unit of its report."""
 
-    Parameters
-    ----------
-    mean, rms, maximum : float
-        Of the vector's length.
-    uncertainty : float
-        One standard uncertainty of `rms`.
-    """
-
+    # `mean`, `rms`, `maximum`: of the vector's length
     mean: float
     rms: float
     maximum: float
-    uncertainty: float
+    uncertainty: float  # one standard uncertainty of `rms`
 
     def as_values(self) -> dict[str, float]:
         """Return what programs read."""
@@ -71,25 +64,14 @@ def _size(observations: Observations, length: Array) -> Size:
 
 @dataclass(frozen=True, eq=False)
 class ComparedModel:
-    """One model against the recordings.
+    """One model against the recordings."""
 
-    Parameters
-    ----------
-    name : str
-        Of the model.
-    raw : Observations
-        Residual as it stands, with the registrations that the model has.
-    explained : Explained
-        Residual after registrations, zeros and tare of every session were fitted again, and on what
-        it depends.
-    absorbed : tuple of str
-        What those took up.
-    """
-
-    name: str
-    raw: Observations
+    name: str  # of the model
+    raw: Observations  # residual as it stands, with the registrations that the model has
+    # residual after registrations, zeros and tare of every session were fitted again, and on what
+    # it depends
     explained: Explained
-    absorbed: tuple[str, ...]
+    absorbed: tuple[str, ...]  # what those took up
 
     @property
     def refitted(self) -> Observations:
@@ -109,25 +91,15 @@ class ComparedModel:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Models side by side over the same units.
+    """Models side by side over the same units."""
 
-    Parameters
-    ----------
-    sessions : tuple of str
-        Names, in the order of time.
-    models : tuple of ComparedModel
-        In the order in which they were named.
-    repeated, repeated_by_side : dict of str to float
-        Repeatability of the measured pose from any side, and from the same side; empty where no
-        dwell was repeated.
-    mistake : str
-        A sentence on a sign, unit or name that may be wrong in the recordings; empty for none.
-    """
-
-    sessions: tuple[str, ...]
-    models: tuple[ComparedModel, ...]
+    sessions: tuple[str, ...]  # names, in the order of time
+    models: tuple[ComparedModel, ...]  # in the order in which they were named
+    # `repeated`, `repeated_by_side`: repeatability of the measured pose from any side, and from the
+    # same side; empty where no dwell was repeated
     repeated: dict[str, float]
     repeated_by_side: dict[str, float]
+    # a sentence on a sign, unit or name that may be wrong in the recordings; empty for none
     mistake: str = ""
 
     @property

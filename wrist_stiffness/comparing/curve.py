@@ -40,40 +40,19 @@ OF_MOTORS = {
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A part of the error against the condition that shows it best.
+    """A part of the error against the condition that shows it best."""
 
-    Parameters
-    ----------
-    quantity : Quantity
-        What is shown.
-    direction : (3,) float, of gauges (K,)
-        Unit vector in F along which it goes most.
-    names : tuple of str
-        The condition, or both angles for a map.
-    values : (u, 1) or (u, 2) float
-        Of the condition, in the unit of `labels`.
-    labels : tuple of str
-        The conditions as axes of a picture, with units.
-    measured : (u,) float
-        What is left when everything else that was found is taken out, NaN where not measured, in
-        the unit of the quantity.
-    places : (c, 1) or (c, 2) float
-        Mean of the condition in classes of units.
-    mean : (c,) float
-        Of the fitted law there.
-    covariance : (c, c) float
-        Its uncertainty.
-    """
-
-    quantity: Quantity
-    direction: Array
-    names: tuple[str, ...]
-    values: Array
-    labels: tuple[str, ...]
+    quantity: Quantity  # what is shown
+    direction: Array  # (3,), of gauges (K,), unit vector in F along which it goes most
+    names: tuple[str, ...]  # the condition, or both angles for a map
+    values: Array  # (u, 1) or (u, 2), of the condition, in the unit of `labels`
+    labels: tuple[str, ...]  # the conditions as axes of a picture, with units
+    # (u,), what is left when everything else that was found is taken out, NaN where not measured,
+    # in the unit of the quantity
     measured: Array
-    places: Array
-    mean: Array
-    covariance: Array
+    places: Array  # (c, 1) or (c, 2), mean of the condition in classes of units
+    mean: Array  # (c,), of the fitted law there
+    covariance: Array  # (c, c), its uncertainty
 
     @property
     def sigma(self) -> Array:
@@ -132,20 +111,10 @@ def curve_of(
 ) -> Curve:
     """Return the curve of one group against the condition that shows it best.
 
-    Parameters
-    ----------
-    observations : Observations
-        Conditions of the units.
-    quantity : Quantity
-        Which the group changes.
-    conditions : tuple of str
-        At which its question looks.
-    residual : (u, 6) float
-        What is left when everything else is taken out [m, rad].
-    columns : (u, 6, k) float
-        What the group's columns leave of the units.
-    values, covariance : (k,) and (k, k) float
-        Of the columns.
+    `observations`: conditions of the units; `quantity`: which the group changes; `conditions`: at
+    which its question looks; `residual` (u, 6): what is left when everything else is taken out [m,
+    rad]; `columns` (u, 6, k): what the group's columns leave of the units; `values`, `covariance`
+    (k,) and (k, k): of the columns.
     """
     at = [c for c in quantity.components if observations.measured[:, c].any()]
     law = (columns @ values)[:, at]

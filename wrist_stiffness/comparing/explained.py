@@ -31,25 +31,14 @@ LEAST = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """A condition on which the error depends.
+    """A condition on which the error depends."""
 
-    Parameters
-    ----------
-    members : dict of str to float
-        Conditions that these recordings cannot tell apart, most probable first, with the
-        probability of each to be the one.
-    probability : float
-        That the error depends on one of them.
-    sizes : dict of str to float
-        What of the error goes with it, RMS by the key of the quantity.
-    curve : Curve
-        What it does.
-    """
-
+    # conditions that these recordings cannot tell apart, most probable first, with the probability
+    # of each to be the one
     members: dict[str, float]
-    probability: float
-    sizes: dict[str, float]
-    curve: Curve
+    probability: float  # that the error depends on one of them
+    sizes: dict[str, float]  # what of the error goes with it, RMS by the key of the quantity
+    curve: Curve  # what it does
 
     @property
     def name(self) -> str:
@@ -59,27 +48,16 @@ class Told:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """What is left of the units, and what the evidence says of it.
+    """What is left of the units, and what the evidence says of it."""
 
-    Parameters
-    ----------
-    observations : Observations
-        Values are what is left after set-up (and whatever else was fitted); conditions as
-        `observing.observe` names them.
-    table : WristTable
-        Of the same units.
-    point : Point
-        The same, whitened, with the slopes of what was fitted.
-    columns : (u, 6, p) float
-        Those slopes before they were whitened [m, rad].
-    weights : (u, 6) float
-        What the square of each number counted in the fit, where the priors count as in the point.
-    """
-
+    # values are what is left after set-up (and whatever else was fitted); conditions as
+    # `observing.observe` names them
     observations: Observations
-    table: WristTable
-    point: Point
-    columns: Array
+    table: WristTable  # of the same units
+    point: Point  # the same, whitened, with the slopes of what was fitted
+    columns: Array  # (u, 6, p), those slopes before they were whitened [m, rad]
+    # (u, 6), what the square of each number counted in the fit, where the priors count as in the
+    # point
     weights: Array
 
     @cached_property

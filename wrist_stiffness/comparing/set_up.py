@@ -59,27 +59,16 @@ LOAD_STEP = np.repeat([1e-2, 1e-3], 3)
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """One session's set-up as a fit finds it, relative to what the model has.
+    """One session's set-up as a fit finds it, relative to what the model has."""
 
-    Parameters
-    ----------
-    session : str
-        Name.
-    values : (20,) float
-        Shift and turn of the instrument in F, of the target in U, encoder zeros, tare
-        [m, rad, rad, N, N m].
-    residual : (u, 6) float
-        What it leaves of all units of the session [m, rad].
-    columns : (u, 6, 20) float
-        Change of that by one `PLAUSIBLE` of each; 0 for what stays.
-    weights : (u, 6) float
-        What the squares of that counted in the fit, where the priors count 1; 0 where not measured.
-    """
-
-    session: str
+    session: str  # name
+    # (20,), shift and turn of the instrument in F, of the target in U, encoder zeros, tare [m, rad,
+    # rad, N, N m]
     values: Array
-    residual: Array
-    columns: Array
+    residual: Array  # (u, 6), what it leaves of all units of the session [m, rad]
+    columns: Array  # (u, 6, 20), change of that by one `PLAUSIBLE` of each; 0 for what stays
+    # (u, 6), what the squares of that counted in the fit, where the priors count 1; 0 where not
+    # measured
     weights: Array
 
     @property
@@ -110,19 +99,9 @@ def refit_set_up(
 ) -> tuple[SetUp, ...]:
     """Fit the set-up of every session anew.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        With which the sessions were observed.
-    observed : Observed
-        Of `observing.observe`.
-    calibrated : sequence of str
-        Effects among `GROUPS` that the recordings say were calibrated: they stay.
-
-    Returns
-    -------
-    tuple of SetUp
-        One for each session.
+    `model`: with which the sessions were observed; `observed`: of `observing.observe`;
+    `calibrated`: effects among `GROUPS` that the recordings say were calibrated: they stay.  Gives
+    one for each session.
     """
     ends = np.cumsum([len(each) for each in observed.sessions])
     parts = np.split(observed.predicted, ends[:-1])
@@ -144,16 +123,8 @@ def without_set_up(
 ) -> tuple[Observed, Observations, tuple[SetUp, ...]]:
     """Return what a model leaves of units, what a set-up fitted anew leaves of that, and the fit.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Predicts.
-    sessions : tuple of UnitSession
-        In the order of time.
-    calibrated : sequence of str
-        As in `refit_set_up`.
-    predicted : (u, 6) float, optional
-        What the model predicts of all units, where that is known already [m, rad].
+    `model`: predicts; `sessions`: in the order of time; `calibrated`: as in `refit_set_up`;
+    `predicted` (u, 6): what the model predicts of all units, where that is known already [m, rad].
     """
     if predicted is None:
         predicted = np.concatenate([predict_units(model, each) for each in sessions])
@@ -271,14 +242,8 @@ def _softness(model: ErrorModel, session: UnitSession, theta: Array) -> Array:
 def _solved(columns: Array, residual: Array, taken: Array) -> tuple[Array, Array]:
     """Least squares that lost beams do not pull, with a prior of unit scatter: (p,), and weights.
 
-    Parameters
-    ----------
-    columns : (u, 6, p) float
-        Per standard deviation of the prior.
-    residual : (u, 6) float
-        NaN = not measured.
-    taken : (p,) float
-        How far the parameters are from their prior means already.
+    `columns` (u, 6, p): per standard deviation of the prior; `residual` (u, 6): NaN = not measured;
+    `taken` (p,): how far the parameters are from their prior means already.
     """
     known = np.isfinite(residual)
     rows = np.where(known[:, :, None], columns, 0.0)

@@ -45,29 +45,15 @@ drift: a fault explains the rest no better."""
 
 @dataclass(frozen=True)
 class Mistake:
-    """One thing that is easily got wrong.
+    """One thing that is easily got wrong."""
 
-    Parameters
-    ----------
-    without : str
-        The data without it, after "with".
-    check : str
-        Where to look.
-    block : callable
-        From the recorded signals to those without it.
-    shift_factor : float
-        The same for the measured positions.
-    gauge : str
-        Name of a gauge whose readings turn their sign without it.
-    stiff : bool
-        A wrist stiffer or softer than its model may look like it: none is a thousandfold.
-    """
-
-    without: str
-    check: str
+    without: str  # the data without it, after "with"
+    check: str  # where to look
+    # from the recorded signals to those without it
     block: Callable[[Block], Block] = lambda block: block
-    shift_factor: float = 1.0
-    gauge: str = ""
+    shift_factor: float = 1.0  # the same for the measured positions
+    gauge: str = ""  # name of a gauge whose readings turn their sign without it
+    # a wrist stiffer or softer than its model may look like it: none is a thousandfold
     stiff: bool = False
 
     def put_right(self, session: UnitSession) -> UnitSession:
@@ -153,24 +139,13 @@ def _turned(gauge: Gauge) -> Mistake:
 
 @dataclass(frozen=True)
 class Suspicion:
-    """A mistake that explains part of an error.
+    """A mistake that explains part of an error."""
 
-    Parameters
-    ----------
-    mistake : Mistake
-        The most probable one.
-    probability : float
-        Of it, against all others and none.
-    share : float
-        What is left without it of what s or phi has above noise and drift, whichever falls more.
-    fall : str
-        How the error falls.
-    """
-
-    mistake: Mistake
-    probability: float
+    mistake: Mistake  # the most probable one
+    probability: float  # of it, against all others and none
+    # what is left without it of what s or phi has above noise and drift, whichever falls more
     share: float
-    fall: str
+    fall: str  # how the error falls
 
     @property
     def clear(self) -> bool:
@@ -198,18 +173,9 @@ def suspected(
     noise of a size that nobody knows: so the likelihood of a mistake goes with the error that it
     leaves in the unit of the instrument, to the power of minus the numbers measured.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        With which the sessions are compared.
-    observed : Observed
-        The sessions as they were recorded, and what the model predicts of them.
-    calibrated : sequence of str
-        Effects of the set-up that are not refitted.
-    left : Explained
-        What the units leave after the refit.
-    mistakes : sequence of Mistake, optional
-        Those that are tried.
+    `model`: with which the sessions are compared; `observed`: the sessions as they were recorded,
+    and what the model predicts of them; `calibrated`: effects of the set-up that are not refitted;
+    `left`: what the units leave after the refit; `mistakes`: those that are tried.
     """
     before, count = left.error, _independent(left.observations)
     read = observed.sessions[0].readings

@@ -22,27 +22,13 @@ SAME_DEG, SAME_N = 2.0, 0.1
 
 @dataclass(frozen=True, eq=False)
 class WorstPose:
-    """One dwell or moment.
+    """One dwell or moment."""
 
-    Parameters
-    ----------
-    session : str
-        Name.
-    time_s : float
-        Since the first unit of its session [s].
-    theta_deg : (2,) float
-        Motor angles [deg].
-    load : (6,) float
-        At O [N, N m].
-    errors : dict of str to float
-        By the key of the quantity; NaN where not measured.
-    """
-
-    session: str
-    time_s: float
-    theta_deg: Array
-    load: Array
-    errors: dict[str, float]
+    session: str  # name
+    time_s: float  # since the first unit of its session [s]
+    theta_deg: Array  # (2,), motor angles [deg]
+    load: Array  # (6,), at O [N, N m]
+    errors: dict[str, float]  # by the key of the quantity; NaN where not measured
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""
@@ -60,16 +46,8 @@ def worst_poses(
 ) -> tuple[WorstPose, ...]:
     """Return the units with the largest errors against the noise, worst first.
 
-    Parameters
-    ----------
-    observations : Observations
-        Residuals with the covariates of `observing.observe`.
-    noise : dict of str to float
-        What noise alone gives each quantity.
-    sessions : sequence of str
-        Names.
-    most : int
-        How many at most.
+    `observations`: residuals with the covariates of `observing.observe`; `noise`: what noise alone
+    gives each quantity; `sessions`: names; `most`: how many at most.
     """
     errors = {q.key: lengths(observations, q) for q in observations.reported}
     relative = [np.nan_to_num(error) / (noise[key] or np.inf) for key, error in errors.items()]

@@ -33,23 +33,9 @@ def wrong_load(
 ) -> str:
     """Return the mistake that a fit hides, in a sentence for a technician; empty for none.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Before the fit.
-    fitted : ErrorModel
-        After it.
-    sessions : sequence of MeasuredSession
-        To which it was fitted, in the order of time.
-    found : Calibration, optional
-        The fit, if it was one; else it is made.
-    progress : callable, optional
-        Told steps of the fit without the mistake, done and at most.
-
-    Raises
-    ------
-    InputError
-        If there is too little to compare.
+    `model`, `fitted`: before and after the fit; `found`: the fit, if it was one, else it is made;
+    `progress`: told steps of the fit without the mistake.  Raises `InputError` if there is too
+    little to compare.
     """
     suspicion = suspicion_in(answering_as(model, fitted), sessions, LOAD_MISTAKES)
     if suspicion is None:

@@ -37,21 +37,11 @@ LIKELY = 0.5
 
 @dataclass(frozen=True)
 class Answer:
-    """How well the plan answers one question.
+    """How well the plan answers one question."""
 
-    Parameters
-    ----------
-    goal : Goal
-        The question.
-    discrimination : float
-        Beyond what was measured before, in standard deviations.
-    reachable : bool
-        Whether `LONGER` times the pool with these loads could settle it.
-    """
-
-    goal: Goal
-    discrimination: float
-    reachable: bool
+    goal: Goal  # the question
+    discrimination: float  # beyond what was measured before, in standard deviations
+    reachable: bool  # whether `LONGER` times the pool with these loads could settle it
 
     @property
     def settled(self) -> bool:
@@ -61,27 +51,14 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Aims:
-    """What experiments are worth to a question.
+    """What experiments are worth to a question."""
 
-    Parameters
-    ----------
-    truths : Truths
-        Columns of all Gram matrices here, from those that were evaluated.
-    pool : Information
-        All settings as one experiment, in these columns.
-    start : (q, q) float
-        What was measured before.
-    goals : tuple of Goal
-        All that is asked.
-    everything : bool
-        Whether a new wrist is asked for: its calibration counts as well, and of each effect only
-        the nearest rivals.
-    """
-
-    truths: Truths
-    pool: Information
-    start: Array
-    goals: tuple[Goal, ...]
+    truths: Truths  # columns of all Gram matrices here, from those that were evaluated
+    pool: Information  # all settings as one experiment, in these columns
+    start: Array  # (q, q), what was measured before
+    goals: tuple[Goal, ...]  # all that is asked
+    # whether a new wrist is asked for: its calibration counts as well, and of each effect only the
+    # nearest rivals
     everything: bool
 
     @cached_property
@@ -133,16 +110,9 @@ def aims(
 ) -> Aims:
     """Return what settings are chosen by.
 
-    Parameters
-    ----------
-    known : Information
-        Of the pool.
-    before : sequence of Information
-        Of earlier experiments on this wrist, each with instruments set up anew.
-    question : Question
-        What is asked, without what no experiment shows.
-    rng : numpy.random.Generator
-        Draws rivals that agree with what was measured before.
+    `known`: of the pool; `before`: of earlier experiments on this wrist, each with instruments set
+    up anew; `question`: what is asked, without what no experiment shows; `rng`: draws rivals that
+    agree with what was measured before.
     """
     start = np.zeros_like(known.total)
     for each in before:

@@ -17,23 +17,10 @@ from wrist_stiffness.sessions.units import COUNTS
 def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
     """Return where and when a session measured.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        For the table's domain and load range; measurements outside are left out.
-    session : MeasuredSession
-        Any.
-
-    Returns
-    -------
-    Experiment
-        One row for each dwell and each single moment in motion.  Dwells between which no motor
-        moved belong to one visit.
-
-    Raises
-    ------
-    InputError
-        If no measurement lies in the table's domain and load range, or gauges measured.
+    `model`: for the table's domain and load range; measurements outside are left out.  `session`:
+    any.  Gives `Experiment`: one row for each dwell and each single moment in motion.  Dwells
+    between which no motor moved belong to one visit.  Raises `InputError` if no measurement lies in
+    the table's domain and load range, or gauges measured.
     """
     if session.readings is not None:
         raise InputError(f"{session.name}: readings of gauges; plans are made for measured poses")

@@ -42,56 +42,30 @@ MOTION_NOISE = 3.0
 
 @dataclass(frozen=True, eq=False)
 class MeasurementNoise:
-    """White noise of one dwell, and the encoder count that hides in it.
+    """White noise of one dwell, and the encoder count that hides in it."""
 
-    Parameters
-    ----------
-    white : (6,) float
-        Standard deviations of a dwell's mean pose [m, rad].
-    encoder_step : float
-        [rad]
-    """
-
-    white: Array
-    encoder_step: float
+    white: Array  # (6,), standard deviations of a dwell's mean pose [m, rad]
+    encoder_step: float  # [rad]
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A question that the experiment shall answer.
+    """A question that the experiment shall answer."""
 
-    Parameters
-    ----------
-    truth : str
-        Effect that is there.
-    rival : str
-        Effect that might be taken for it; empty where the truth shall only be seen at all.
-    """
-
-    truth: str
-    rival: str
+    truth: str  # effect that is there
+    rival: str  # effect that might be taken for it; empty where the truth shall only be seen at all
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Which column of the Gram matrices is what.
+    """Which column of the Gram matrices is what."""
 
-    Parameters
-    ----------
-    prior : (p,) float
-        Precision of each nuisance in plausible sizes, first columns of the Gram matrices.
-    nuisances : dict of str to (k,) int
-        Of each nuisance among these.
-    columns : dict of str to (k,) int
-        Of each effect among the columns after the nuisances.
-    truths : dict of str to (t,) int
-        Likewise.
-    """
-
+    # (p,), precision of each nuisance in plausible sizes, first columns of the Gram matrices
     prior: Array
-    nuisances: dict[str, NDArray[np.intp]]
+    nuisances: dict[str, NDArray[np.intp]]  # dict of str to (k,), of each nuisance among these
+    # dict of str to (k,), of each effect among the columns after the nuisances
     columns: dict[str, NDArray[np.intp]]
-    truths: dict[str, NDArray[np.intp]]
+    truths: dict[str, NDArray[np.intp]]  # dict of str to (t,), likewise
 
 
 def whitened(
@@ -102,21 +76,8 @@ def whitened(
     Between two approaches the hidden place within the encoder's count stays the same, so all
     dwells of a visit have that error in common.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        With r observed rows.
-    twists : (n, 6, p) float
-        Columns at all samples of the path [m, rad].
-    table : Table
-        Of the wrist.
-    noise : MeasurementNoise
-        Of one dwell.
-
-    Returns
-    -------
-    list of (6 rows, p) float
-        By visit.
+    `experiment`: with r observed rows; `twists` (n, 6, p): columns at all samples of the path [m,
+    rad]; `table`: of the wrist; `noise`: of one dwell.  Gives list of (6 rows, p): by visit.
     """
     mechanism = table.mechanism
     theta = experiment.block.theta[experiment.rows]
@@ -143,18 +104,10 @@ def whitened(
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """Gram matrices of the visits of an experiment.
+    """Gram matrices of the visits of an experiment."""
 
-    Parameters
-    ----------
-    grams : (v, q, q) float
-        One for each visit.
-    layout : Layout
-        Of their columns.
-    """
-
-    grams: Array
-    layout: Layout
+    grams: Array  # (v, q, q), one for each visit
+    layout: Layout  # of their columns
 
     @cached_property
     def total(self) -> Array:
@@ -173,26 +126,8 @@ def information(
 ) -> Information:
     """Return the Gram matrices of an experiment.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        The experiment.
-    nuisances : sequence of Signature
-        Refitted whatever is asked.
-    free : sequence of str
-        Names of the nuisances of which nothing is known beforehand; the others are known to one
-        plausible size.
-    effects : sequence of Signature
-        What is asked for.
-    table : Table
-        Of the wrist.
-    noise : MeasurementNoise
-        Of one dwell.
-
-    Returns
-    -------
-    Information
-        Of every visit.
+    `nuisances`: refitted whatever is asked.  `free`: names of those of which nothing is known
+    beforehand; the others are known to one plausible size.  `effects`: what is asked for.
     """
     blocks = [each.columns for each in nuisances]
     prior: list[float] = []
@@ -217,17 +152,8 @@ def information(
 def carried_over(known: Information, names: Sequence[str]) -> Array:
     """Return what an experiment tells for another one in which some nuisances are set anew.
 
-    Parameters
-    ----------
-    known : Information
-        Of the earlier experiment.
-    names : sequence of str
-        Nuisances that are refitted in each.
-
-    Returns
-    -------
-    (q, q) float
-        Gram matrix, zero for those nuisances.
+    `known`: of the earlier experiment; `names`: nuisances that are refitted in each.  Gives its
+    Gram matrix (q, q), zero for those nuisances.
     """
     gram, layout = known.total, known.layout
     own = np.concatenate([layout.nuisances[name] for name in names if name in layout.nuisances])
@@ -253,22 +179,10 @@ def discrimination(
 ) -> Array:
     """Return the discrimination of each goal.
 
-    Parameters
-    ----------
-    gram : (..., q, q) float
-        Of one experiment or several.
-    layout : Layout
-        Of the columns.
-    goals : sequence of g Goal
-        Questions.
-    before : (q, q) float, optional
-        Part of the experiments that was measured before the questions were asked; only what comes
-        on top counts.
-
-    Returns
-    -------
-    (..., g) float
-        d in standard deviations; over several truths, what errs as often as they do on average.
+    `gram` (..., q, q): of one experiment or several.  `layout`: of the columns.  `goals`:
+    questions.  `before` (q, q): part of the experiments that was measured before the questions were
+    asked; only what comes on top counts.  Gives (..., g): d in standard deviations; over several
+    truths, what errs as often as they do on average.
     """
     squares = np.zeros((*gram.shape[:-2], len(goals)))
     for number, own in enumerate(by_truth(gram, layout, goals, before)):
@@ -325,17 +239,8 @@ def wrong_bound(discriminations: Array) -> Array:
 def calibrated(gram: Array, layout: Layout) -> Array:
     """Return the mean gain of what is calibrated over its prior, in nats (D-optimality).
 
-    Parameters
-    ----------
-    gram : (..., q, q) float
-        Of one experiment or several.
-    layout : Layout
-        Of the columns.
-
-    Returns
-    -------
-    (...) float
-        Mean over the nuisances of the log of prior over posterior deviation.
+    Of Gram matrices (..., q, q) the mean over the nuisances of the log of prior over posterior
+    deviation, (...).
     """
     p = len(layout.prior)
     weight = 1.0 / np.sqrt(layout.prior)
@@ -347,17 +252,7 @@ def calibrated(gram: Array, layout: Layout) -> Array:
 def improvement(gram: Array, layout: Layout) -> dict[str, float]:
     """Return by how much each nuisance's uncertainty falls, the geometric mean of its parameters.
 
-    Parameters
-    ----------
-    gram : (q, q) float
-        Of one experiment.
-    layout : Layout
-        Of the columns.
-
-    Returns
-    -------
-    dict of str to float
-        Prior over posterior standard deviation, 1 for nothing gained.
+    Of a Gram matrix (q, q): prior over posterior standard deviation, 1 for nothing gained.
     """
     p = len(layout.prior)
     posterior = np.diagonal(np.linalg.inv(gram[:p, :p] + np.diag(layout.prior)))

@@ -31,44 +31,22 @@ FRAMES = ("wrist_base", "wrist_platform")
 
 @dataclass(frozen=True, eq=False)
 class AppliedLoad:
-    """One load as it is put on.
+    """One load as it is put on."""
 
-    Parameters
-    ----------
-    name : str
-        Of the weight or actuator; empty for no load.
-    force, moment : (3,) float
-        In U if it turns with the platform, else in F; the moment is about the point [N, N m].
-    point : (3,) float
-        Where the force acts, in U unless the actuator stands on the base [m].
-    turns : bool
-        Whether force and moment turn with the platform.
-    point_turns : bool
-        Whether the point moves with the platform.
-    change_s : float
-        Time that it takes to put it on or to take it off [s].
-    """
-
-    name: str
+    name: str  # of the weight or actuator; empty for no load
+    # `force`, `moment`: (3,), in U if it turns with the platform, else in F; the moment is about
+    # the point [N, N m]
     force: Array
     moment: Array
-    point: Array
-    turns: bool
-    point_turns: bool
-    change_s: float
+    point: Array  # (3,), where the force acts, in U unless the actuator stands on the base [m]
+    turns: bool  # whether force and moment turn with the platform
+    point_turns: bool  # whether the point moves with the platform
+    change_s: float  # time that it takes to put it on or to take it off [s]
 
     def wrench(self, platform: Array) -> Array:
         """Return the wrench on the platform at O in F.
 
-        Parameters
-        ----------
-        platform : (..., 3, 3) float
-            Rotation U -> F.
-
-        Returns
-        -------
-        (..., 6) float
-            [N, N m]
+        `platform` (..., 3, 3): rotation U -> F.  Gives (..., 6) [N, N m].
         """
         shape = (*platform.shape[:-2], 3)
         force, moment = (
@@ -84,24 +62,12 @@ NO_LOAD = AppliedLoad("", np.zeros(3), np.zeros(3), np.zeros(3), False, False, 0
 
 @dataclass(frozen=True, eq=False)
 class Weight:
-    """A mass that hangs at a point of the platform: it pulls along gravity at every pose.
+    """A mass that hangs at a point of the platform: it pulls along gravity at every pose."""
 
-    Parameters
-    ----------
-    name : str
-        What the user calls it.
-    mass : float
-        [kg]
-    point : (3,) float
-        Where it hangs, in U [m].
-    change_s : float
-        To put it on or take it off [s].
-    """
-
-    name: str
-    mass: float
-    point: Array
-    change_s: float
+    name: str  # what the user calls it
+    mass: float  # [kg]
+    point: Array  # (3,), where it hangs, in U [m]
+    change_s: float  # to put it on or take it off [s]
 
     def draw(self, gravity: Array, rng: np.random.Generator) -> AppliedLoad:
         """Return the load; gravity (3,) in F [m/s^2].  A weight leaves nothing to draw."""
@@ -111,28 +77,15 @@ class Weight:
 
 @dataclass(frozen=True, eq=False)
 class Actuator:
-    """A gripper, a pusher: any force and moment between its limits.
+    """A gripper, a pusher: any force and moment between its limits."""
 
-    Parameters
-    ----------
-    name : str
-        What the user calls it.
-    lower, upper : (6,) float
-        Limits of force and moment in the actuator's frame [N, N m].
-    point : (3,) float
-        Where the force acts, in the actuator's frame [m].
-    on_platform : bool
-        Whether it turns with the platform.
-    change_s : float
-        To change the load [s].
-    """
-
-    name: str
+    name: str  # what the user calls it
+    # `lower`, `upper`: (6,), limits of force and moment in the actuator's frame [N, N m]
     lower: Array
     upper: Array
-    point: Array
-    on_platform: bool
-    change_s: float
+    point: Array  # (3,), where the force acts, in the actuator's frame [m]
+    on_platform: bool  # whether it turns with the platform
+    change_s: float  # to change the load [s]
 
     def draw(self, gravity: Array, rng: np.random.Generator) -> AppliedLoad:
         """Return a load between the limits: half the time along one axis to its end, else any."""
@@ -154,25 +107,9 @@ Source = Weight | Actuator
 def read_loads(path: str | Path, gravity: Array, force_limit: float) -> tuple[Source, ...]:
     """Read the loads that a user can apply.
 
-    Parameters
-    ----------
-    path : path
-        A YAML file.
-    gravity : (3,) float
-        In F [m/s^2].
-    force_limit : float
-        Largest force of the table [N].
-
-    Returns
-    -------
-    tuple of Weight or Actuator
-        Empty where the file lists none.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key is missing, unknown or wrong, a name is there twice, or a
-        force is beyond the table's range.
+    `path`: a YAML file; `gravity` (3,): in F [m/s^2]; `force_limit`: largest force of the table
+    [N].  Gives empty where the file lists none.  Raises `InputError` if the file cannot be read, a
+    key is missing, unknown or wrong, a name is there twice, or a force is beyond the table's range.
     """
     root = read_yaml(path, InputError)
     sources: list[Source] = []

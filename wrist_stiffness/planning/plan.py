@@ -51,51 +51,26 @@ LONGEST_S = 3600.0
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Under which an experiment is planned.
+    """Under which an experiment is planned."""
 
-    Parameters
-    ----------
-    sources : tuple of Weight or Actuator
-        What the user can apply; nothing else is proposed.
-    pace : Pace
-        Speeds and durations.
-    noise : MeasurementNoise
-        Of one dwell.
-    seconds : float or None
-        Duration; None for as long as it takes, but not beyond `LONGEST_S`.
-    seed : int
-        The same seed gives the same plan.
-    """
-
-    sources: tuple[Source, ...]
-    pace: Pace
-    noise: MeasurementNoise
-    seconds: float | None
-    seed: int
+    sources: tuple[Source, ...]  # what the user can apply; nothing else is proposed
+    pace: Pace  # speeds and durations
+    noise: MeasurementNoise  # of one dwell
+    seconds: float | None  # duration; None for as long as it takes, but not beyond `LONGEST_S`
+    seed: int  # the same seed gives the same plan
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """An experiment and what it is good for.
+    """An experiment and what it is good for."""
 
-    Parameters
-    ----------
-    timeline : Timeline or None
-        What to do when; None where no such experiment could answer any of the questions.
-    visits : tuple of Visit
-        Chosen ones, in the order of their worth.
-    answers : tuple of Answer
-        To every question.
-    cannot : dict of str to str
-        Effects that no such experiment shows, with the signal that they need.
-    calibration : dict of str to float
-        By how much the uncertainty of each effect that is always refitted falls.
-    """
-
+    # what to do when; None where no such experiment could answer any of the questions
     timeline: Timeline | None
-    visits: tuple[Visit, ...]
-    answers: tuple[Answer, ...]
+    visits: tuple[Visit, ...]  # chosen ones, in the order of their worth
+    answers: tuple[Answer, ...]  # to every question
+    # effects that no such experiment shows, with the signal that they need
     cannot: Mapping[str, str]
+    # by how much the uncertainty of each effect that is always refitted falls
     calibration: Mapping[str, float]
 
 
@@ -282,25 +257,7 @@ def evaluated(
 ) -> tuple[Information, dict[str, str]]:
     """Return what an experiment tells of the effects in question.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        What is known of the wrist.
-    question : Question
-        What is asked.
-    experiment : Experiment
-        Its path.
-    noise : MeasurementNoise
-        Of one dwell.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    Information
-        Without the effects that lack a signal.
-    dict of str to str
-        Those, and the signal.
+    Gives its information without the effects that lack a signal, and these with the signal.
     """
     sets = [*((effect,) for effect in question.nuisances), *question.effects]
     found = signatures(model, experiment.block, sets, progress)

@@ -44,27 +44,14 @@ OUTWARD_STEPS = 30
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """A pose under a load, visited from both sides.
+    """A pose under a load, visited from both sides."""
 
-    Parameters
-    ----------
-    theta : (2,) float
-        Motor angles [rad].
-    approach : (2,) float
-        Sense of the first visit's approach, the second one comes from the other side.
-    load : AppliedLoad
-        What is put on.
-    carried : bool
-        Whether the load is put on before the approach.
-    speeds : (float, float)
-        Of both visits, shares of the allowed speed.
-    """
-
-    theta: Array
+    theta: Array  # (2,), motor angles [rad]
+    # (2,), sense of the first visit's approach, the second one comes from the other side
     approach: Array
-    load: AppliedLoad
-    carried: bool
-    speeds: tuple[float, float]
+    load: AppliedLoad  # what is put on
+    carried: bool  # whether the load is put on before the approach
+    speeds: tuple[float, float]  # of both visits, shares of the allowed speed
 
     def visits(self, dwell_s: float) -> tuple[Visit, Visit]:
         """Return the visits from both sides."""
@@ -78,10 +65,7 @@ class Setting:
 def reference_pose(workspace: Workspace) -> Array:
     """Return the pose that is measured again and again: home, (2,) [rad].
 
-    Raises
-    ------
-    InputError
-        If home or the way to it from either side is out of the table's domain.
+    Raises `InputError` if home or the way to it from either side is out of the table's domain.
     """
     home = np.zeros(2)
     if not _approachable(workspace, home, home, np.ones(2)):
@@ -94,26 +78,8 @@ def draw_settings(
 ) -> list[Setting]:
     """Draw the pool: random poses, without load or with one that the user can apply.
 
-    Parameters
-    ----------
-    workspace : Workspace
-        Of the wrist.
-    sources : sequence of Weight or Actuator
-        What the user can apply.
-    gravity : (3,) float
-        In F [m/s^2].
-    rng : numpy.random.Generator
-        Draws.
-
-    Returns
-    -------
-    list of Setting
-        About `POOL`.
-
-    Raises
-    ------
-    LoadRangeError
-        If a source has no load within the table's range at any pose.
+    `gravity` (3,): in F [m/s^2].  Gives about `POOL`.  Raises `LoadRangeError` if a source
+    has no load within the table's range at any pose.
     """
     limits, reference = workspace.limits, reference_pose(workspace)
     # One in four settings is without load, as loads are what most effects need.
@@ -255,23 +221,10 @@ def arrange(
 ) -> Timeline:
     """Put chosen visits into a random order, with everything that an experiment needs besides.
 
-    Parameters
-    ----------
-    chosen : sequence of Visit
-        Both sides of a pose, where both are chosen, come at different times.
-    fixed : sequence of Visit
-        Of `fixed_visits`.
-    workspace : Workspace
-        Of the wrist.
-    pace : Pace
-        Speeds and durations.
-    rng : numpy.random.Generator
-        Chooses the order.
-
-    Returns
-    -------
-    Timeline
-        Warm-up, visits, returns to the reference pose at the beginning, in between and at the end.
+    `chosen`: both sides of a pose, where both are chosen, come at different times; `fixed`: of
+    `fixed_visits`; `workspace`: of the wrist; `pace`: speeds and durations; `rng`: chooses the
+    order.  Gives `Timeline`: warm-up, visits, returns to the reference pose at the beginning, in
+    between and at the end.
     """
     reference, *holds = fixed
     visits = [chosen[i] for i in rng.permutation(len(chosen))]

@@ -29,27 +29,15 @@ TRUTHS = 2
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What an experiment is planned for.
+    """What an experiment is planned for."""
 
-    Parameters
-    ----------
-    effects : tuple of tuples of Effect
-        Each at one or more plausible sets of values.
-    nuisances : tuple of Effect
-        Refitted whatever is asked.
-    free : tuple of str
-        Nuisances of which nothing is known.
-    goals : tuple of Goal, optional
-        Questions; None for all effects and the nearest rivals of each.
-    alike : tuple of (str, ...)
-        Classes of rivals: made equally large, as all explain the same measurements; the first one
-        is as large as its values say.
-    """
-
-    effects: tuple[tuple[Effect, ...], ...]
-    nuisances: tuple[Effect, ...]
-    free: tuple[str, ...]
+    effects: tuple[tuple[Effect, ...], ...]  # each at one or more plausible sets of values
+    nuisances: tuple[Effect, ...]  # refitted whatever is asked
+    free: tuple[str, ...]  # nuisances of which nothing is known
+    # questions; None for all effects and the nearest rivals of each
     goals: tuple[Goal, ...] | None = None
+    # classes of rivals: made equally large, as all explain the same measurements; the first one is
+    # as large as its values say
     alike: tuple[tuple[str, ...], ...] = ()
 
     def without(self, names: Collection[str]) -> Question:

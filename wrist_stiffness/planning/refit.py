@@ -28,21 +28,11 @@ EVALUATIONS = 20
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What an effect left in an experiment.
+    """What an effect left in an experiment."""
 
-    Parameters
-    ----------
-    experiment : Experiment
-        With n samples.
-    nuisances : sequence of Signature
-        What is refitted whatever is asked, there.
-    left : (n, 6) float
-        Twists [m, rad].
-    """
-
-    experiment: Experiment
-    nuisances: Sequence[Signature]
-    left: Array
+    experiment: Experiment  # with n samples
+    nuisances: Sequence[Signature]  # what is refitted whatever is asked, there
+    left: Array  # (n, 6), twists [m, rad]
 
 
 def fitted(
@@ -54,23 +44,8 @@ def fitted(
 ) -> Effect:
     """Return an effect with the values that fit all data best.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Of the wrist.
-    data : sequence of Measured
-        Each with instruments set up anew.
-    effect : Effect
-        With the values to begin from.
-    free : sequence of str
-        Nuisances of which nothing is known.
-    noise : MeasurementNoise
-        Of one dwell.
-
-    Returns
-    -------
-    Effect
-        Within its bounds.
+    `data`: each with instruments set up anew; `effect`: with the values to begin from; `free`:
+    nuisances of which nothing is known.
     """
     keys = [p.key for p in effect.parameters]
     scale = np.array([p.scale for p in effect.parameters])
@@ -138,23 +113,7 @@ def rivals_alike(
     A law that is not linear in its values changes its shape with them, so values that the data
     exclude would plan for poses where the rivals do not part.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Of the wrist.
-    question : Question
-        With classes.
-    earlier : sequence of Experiment
-        What the classes agree on.
-    noise : MeasurementNoise
-        Of one dwell.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    Question
-        With one set of values for each member of a class.
+    `earlier`: what the classes agree on.  Gives one set of values for each member of a class.
     """
     by_name = {sets[0].name: sets for sets in question.effects}
     nuisances = [

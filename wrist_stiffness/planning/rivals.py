@@ -31,21 +31,13 @@ LEAST_WHITE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Rivals:
-    """What a diagnosis left open.
+    """What a diagnosis left open."""
 
-    Parameters
-    ----------
-    classes : tuple of tuples of Effect
-        Effects that its recordings could not tell apart, best first and with the values found: of
-        what was named, and of what was not sure enough.
-    silent : tuple of Effect
-        What its recordings could not have shown.
-    floor : (2,) float
-        Root mean square of shift and rotation that noise leaves [m, rad].
-    """
-
+    # effects that its recordings could not tell apart, best first and with the values found: of
+    # what was named, and of what was not sure enough
     classes: tuple[tuple[Effect, ...], ...]
-    silent: tuple[Effect, ...]
+    silent: tuple[Effect, ...]  # what its recordings could not have shown
+    # (2,), root mean square of shift and rotation that noise leaves [m, rad]
     floor: tuple[float, float]
 
     def noise(self, table: Table) -> MeasurementNoise:
@@ -62,20 +54,9 @@ class Rivals:
 def read_rivals(path: str | Path) -> Rivals:
     """Read the result of `diagnose --json`.
 
-    Parameters
-    ----------
-    path : path
-        JSON file.
-
-    Returns
-    -------
-    Rivals
-        Classes, silent effects and noise floor.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key is missing or wrong, or an effect is not of the catalogue.
+    `path`: JSON file.  Gives `Rivals`: classes, silent effects and noise floor.  Raises
+    `InputError` if the file cannot be read, a key is missing or wrong, or an effect is not of the
+    catalogue.
     """
     found = DIAGNOSIS(read_json(path, InputError))
     floor, silent = found["noise"], found["not_excited"]

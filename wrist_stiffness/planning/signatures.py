@@ -26,24 +26,13 @@ some thousandths."""
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """Of one effect in an experiment of n samples.
+    """Of one effect in an experiment of n samples."""
 
-    Parameters
-    ----------
-    effect : Effect
-        At the plausible values about which the differences were taken.
-    columns : (n, 6, k) float
-        Change of the measured twist by one plausible size of each parameter [m, rad].
-    truths : (n, 6, t) float
-        Change by the whole effect at t plausible sets of values [m, rad].
-    lacks : str
-        Why the experiment cannot show it: the signal that is missing; else empty.
-    """
-
-    effect: Effect
+    effect: Effect  # at the plausible values about which the differences were taken
+    # (n, 6, k), change of the measured twist by one plausible size of each parameter [m, rad]
     columns: Array
-    truths: Array
-    lacks: str = ""
+    truths: Array  # (n, 6, t), change by the whole effect at t plausible sets of values [m, rad]
+    lacks: str = ""  # why the experiment cannot show it: the signal that is missing; else empty
 
     @property
     def name(self) -> str:
@@ -70,26 +59,10 @@ def signatures(
 ) -> list[Signature]:
     """Evaluate what effects would leave.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Without them, or with them at other values.
-    block : Block
-        The experiment's path.
-    candidates : sequence of sequences of Effect
-        Each effect at one or more sets of values; the differences are taken at the first.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    list of Signature
-        One for each.
-
-    Raises
-    ------
-    InputError
-        If a sample lies outside the table's domain or load range.
+    `model`: without them, or with them at other values.  `block`: the experiment's path.
+    `candidates`: each effect at one or more sets of values; the differences are taken at the first.
+    `progress`: called with (done, total).  Gives one for each.  Raises `InputError` if a sample
+    lies outside the table's domain or load range.
     """
     if model.evaluation == "spline":
         model = model.with_evaluation("closed_form")

@@ -42,33 +42,16 @@ LONG_S = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Visit:
-    """One approach to a pose.
+    """One approach to a pose."""
 
-    Parameters
-    ----------
-    theta : (2,) float
-        Motor angles [rad].
-    approach : (2,) float
-        Sense in which each motor moves at last, +1 or -1.
-    load : AppliedLoad
-        What is put on.
-    carried : bool
-        Whether the load is put on before the approach instead of at rest in the pose.
-    speed : float
-        Share of the allowed speed.
-    hold_s : float
-        How long the load is held and measured [s].
-    purpose : str
-        For the user.
-    """
-
-    theta: Array
-    approach: Array
-    load: AppliedLoad = NO_LOAD
+    theta: Array  # (2,), motor angles [rad]
+    approach: Array  # (2,), sense in which each motor moves at last, +1 or -1
+    load: AppliedLoad = NO_LOAD  # what is put on
+    # whether the load is put on before the approach instead of at rest in the pose
     carried: bool = False
-    speed: float = 1.0
-    hold_s: float = 2.0
-    purpose: str = "setting"
+    speed: float = 1.0  # share of the allowed speed
+    hold_s: float = 2.0  # how long the load is held and measured [s]
+    purpose: str = "setting"  # for the user
 
     @property
     def before(self) -> Array:
@@ -78,72 +61,35 @@ class Visit:
 
 @dataclass(frozen=True, eq=False)
 class Dwell:
-    """One rest in a pose: a row of the plan's table.
+    """One rest in a pose: a row of the plan's table."""
 
-    Parameters
-    ----------
-    time_s : float
-        When it begins [s].
-    visit : Visit
-        Which it belongs to.
-    load : AppliedLoad
-        What is on.
-    wrench : (6,) float
-        At O in F [N, N m].
-    hold_s : float
-        [s]
-    purpose : str
-        For the user.
-    """
-
-    time_s: float
-    visit: Visit
-    load: AppliedLoad
-    wrench: Array
-    hold_s: float
-    purpose: str
+    time_s: float  # when it begins [s]
+    visit: Visit  # which it belongs to
+    load: AppliedLoad  # what is on
+    wrench: Array  # (6,), at O in F [N, N m]
+    hold_s: float  # [s]
+    purpose: str  # for the user
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What is measured along a path.
+    """What is measured along a path."""
 
-    Parameters
-    ----------
-    block : Block
-        n samples of the path that laws with memory need, the observed ones among them.
-    rows : (r,) int
-        Observed samples.
-    visit : (r,) int
-        Approach to a pose that each belongs to.
-    moving : (r,) bool
-        Whether it is observed in motion.
-    """
-
-    block: Block
-    rows: NDArray[np.intp]
-    visit: NDArray[np.intp]
-    moving: NDArray[np.bool_]
+    block: Block  # n samples of the path that laws with memory need, the observed ones among them
+    rows: NDArray[np.intp]  # (r,), observed samples
+    visit: NDArray[np.intp]  # (r,), approach to a pose that each belongs to
+    moving: NDArray[np.bool_]  # (r,), whether it is observed in motion
 
 
 @dataclass(frozen=True, eq=False)
 class Timeline(Experiment):
-    """A planned experiment.
+    """A planned experiment."""
 
-    Parameters
-    ----------
-    dwells : tuple of Dwell
-        In the order of time.
-    knots : tuple of (float, (2,) float, (6,) float)
-        Time [s], motor angles [rad] and wrench at O in F [N, N m] between which motors move and
-        loads change by minimum jerk.
-    ends : (v,) float
-        When each visit is over [s].
-    """
-
-    dwells: tuple[Dwell, ...]
+    dwells: tuple[Dwell, ...]  # in the order of time
+    # time [s], motor angles [rad] and wrench at O in F [N, N m] between which motors move and loads
+    # change by minimum jerk
     knots: tuple[tuple[float, Array, Array], ...]
-    ends: Array
+    ends: Array  # (v,), when each visit is over [s]
 
     @property
     def duration_s(self) -> float:
@@ -153,21 +99,11 @@ class Timeline(Experiment):
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast the experiment may go.
+    """How fast the experiment may go."""
 
-    Parameters
-    ----------
-    speed : float
-        Largest speed of a motor [rad/s].
-    dwell_s : float
-        What one measurement at rest takes, settling included [s].
-    in_motion : bool
-        Whether the pose sensor measures in motion too.
-    """
-
-    speed: float
-    dwell_s: float
-    in_motion: bool
+    speed: float  # largest speed of a motor [rad/s]
+    dwell_s: float  # what one measurement at rest takes, settling included [s]
+    in_motion: bool  # whether the pose sensor measures in motion too
 
     def move_s(self, start: Array, end: Array, share: float = 1.0) -> float:
         """Duration of a minimum-jerk move at a share of the allowed speed [s]."""
@@ -191,23 +127,10 @@ def run_through(
 ) -> Timeline:
     """Perform visits one after the other, from rest without load at the reference pose.
 
-    Parameters
-    ----------
-    visits : sequence of Visit
-        In their order.
-    workspace : Workspace
-        Moves stay in it; where a straight one would not, it goes by way of the reference pose.
-    pace : Pace
-        Speeds and durations.
-    reference : (2,) float
-        Motor angles [rad].
-    warm_up : sequence of (2,) float
-        Poses to move through first without measuring [rad].
-
-    Returns
-    -------
-    Timeline
-        Ends without load in the reference pose.
+    `visits`: in their order.  `workspace`: moves stay in it; where a straight one would not, it
+    goes by way of the reference pose.  `pace`: speeds and durations.  `reference` (2,): motor
+    angles [rad].  `warm_up` sequence of (2,): poses to move through first without measuring [rad].
+    Gives `Timeline`: ends without load in the reference pose.
     """
     clock = _Clock(workspace, pace, reference)
     for theta in warm_up:

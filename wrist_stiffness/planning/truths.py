@@ -28,18 +28,10 @@ DRAWS = 3
 
 @dataclass(frozen=True, eq=False)
 class Truths:
-    """Truths as combinations of the columns that were evaluated.
+    """Truths as combinations of the columns that were evaluated."""
 
-    Parameters
-    ----------
-    combined : (q, r) float
-        New columns by the old ones: nuisances, effects' columns, truths.
-    layout : Layout
-        Of the new columns.
-    """
-
-    combined: Array
-    layout: Layout
+    combined: Array  # (q, r), new columns by the old ones: nuisances, effects' columns, truths
+    layout: Layout  # of the new columns
 
     def of(self, gram: Array) -> Array:
         """Return Gram matrices (..., r, r) of the new columns from those (..., q, q) of the old."""
@@ -50,17 +42,8 @@ class Truths:
 def as_asked(known: Information, alike: Sequence[Sequence[str]]) -> Truths:
     """Take truths as they are, the members of each class made as large as its first one.
 
-    Parameters
-    ----------
-    known : Information
-        Of an experiment that shows how large they are.
-    alike : sequence of sequences of str
-        Classes.
-
-    Returns
-    -------
-    Truths
-        Only scaled.
+    `known`: of an experiment that shows how large they are; `alike`: classes.  Gives `Truths`: only
+    scaled.
     """
     layout = known.layout
     size = np.ones(len(known.total))
@@ -78,21 +61,10 @@ def after_data(
 ) -> Truths:
     """Take for each member of a class what fits the data that its first member explains.
 
-    Parameters
-    ----------
-    gram : (q, q) float
-        Of the data at hand.
-    layout : Layout
-        Of its columns.
-    alike : sequence of sequences of str
-        Classes; the first truth of the first member says what was measured.
-    rng : numpy.random.Generator
-        Draws values within the uncertainty that these data leave, from a prior of plausible sizes.
-
-    Returns
-    -------
-    Truths
-        `DRAWS` + 1 for each member, the most probable one first.
+    `gram` (q, q): of the data at hand.  `layout`: of its columns.  `alike`: classes; the first
+    truth of the first member says what was measured.  `rng`: draws values within the uncertainty
+    that these data leave, from a prior of plausible sizes.  Gives `Truths`: `DRAWS` + 1 for each
+    member, the most probable one first.
     """
     p, q = len(layout.prior), len(gram)
     left = beyond_nuisances(gram, layout)

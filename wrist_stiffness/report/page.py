@@ -87,22 +87,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A report.
+    """A report."""
 
-    Parameters
-    ----------
-    title, subtitle : str
-        What it is about.
-    verdict : tuple of str
-        The answer in a few sentences, before everything else.
-    sections : tuple of Section
-        In the order in which they are read.
-    """
-
+    # `title`, `subtitle`: what it is about
     title: str
     subtitle: str
-    verdict: tuple[str, ...]
-    sections: tuple[Section, ...]
+    verdict: tuple[str, ...]  # the answer in a few sentences, before everything else
+    sections: tuple[Section, ...]  # in the order in which they are read
 
 
 def drawn(figure: Any, caption: str) -> Picture:

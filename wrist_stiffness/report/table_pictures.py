@@ -82,22 +82,8 @@ def draw_modes(
 ) -> list[Path]:
     """Draw the first natural frequency over both motor angles, and the shapes of four modes.
 
-    Parameters
-    ----------
-    folder : path
-        Where the PNG files go; made if missing.
-    payload : RigidBody, optional
-        What the platform carries.
-
-    Returns
-    -------
-    list of Path
-        `map_mode_1.png` and `mode_shapes.png`.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made.
+    `folder`: where the PNG files go; made if missing.  `payload`: what the platform carries.  Gives
+    `map_mode_1.png` and `mode_shapes.png`.  Raises `InputError` if the folder cannot be made.
     """
     pictures = [picture_folder(folder) / name for name in ("map_mode_1.png", "mode_shapes.png")]
     carried = "no payload" if payload is None else f"payload {payload.mass:g} kg"

@@ -36,21 +36,11 @@ class Moments(Enum):
 
 @dataclass(frozen=True, eq=False)
 class SessionModel:
-    """A model with the effects that hold in one session, on the units of that session.
+    """A model with the effects that hold in one session, on the units of that session."""
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Table and evaluation; its own effects do not count.
-    session : UnitSession
-        Units and the moments that tell their path.
-    effects : tuple of Effect
-        All effects at the point about which columns are wanted.
-    """
-
-    model: ErrorModel
-    session: UnitSession
-    effects: Effects
+    model: ErrorModel  # table and evaluation; its own effects do not count
+    session: UnitSession  # units and the moments that tell their path
+    effects: Effects  # all effects at the point about which columns are wanted
 
     def remembers(self, effects: Effects) -> bool:
         """Tell whether any of the effects needs the path and not the mean moment alone."""

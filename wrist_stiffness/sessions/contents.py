@@ -14,37 +14,24 @@ from wrist_stiffness.sessions.unit_session import UnitSession
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What one recording holds.
+    """What one recording holds."""
 
-    Parameters
-    ----------
-    name, instrument : str
-        Of the recording, and of its pose sensor.
-    duration_s, rate_hz : float
-        Duration [s], and measured poses in a second [Hz].
-    measured, dwells : int
-        Measured poses, and poses that were held.
-    angles : (2, 2) float
-        Lowest and highest angle of each motor [rad].
-    speed, force : (float, float)
-        Lowest and highest [rad/s], [N].
-    signals : tuple of str
-        What was recorded beside angles, load and pose.
-    registered : dict of str to float
-        Remaining error once it is known where instrument and target stand, RMS by the key of the
-        quantity.
-    """
-
+    # `name`, `instrument`: of the recording, and of its pose sensor
     name: str
     instrument: str
+    # `duration_s`, `rate_hz`: duration [s], and measured poses in a second [Hz]
     duration_s: float
     rate_hz: float
+    # `measured`, `dwells`: measured poses, and poses that were held
     measured: int
     dwells: int
-    angles: Array
+    angles: Array  # (2, 2), lowest and highest angle of each motor [rad]
+    # `speed`, `force`: lowest and highest [rad/s], [N]
     speed: tuple[float, float]
     force: tuple[float, float]
-    signals: tuple[str, ...]
+    signals: tuple[str, ...]  # what was recorded beside angles, load and pose
+    # remaining error once it is known where instrument and target stand, RMS by the key of the
+    # quantity
     registered: Mapping[str, float]
 
 

@@ -38,23 +38,14 @@ tell them (assumed)."""
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """One instrument that reads one number of the platform's pose.
+    """One instrument that reads one number of the platform's pose."""
 
-    Parameters
-    ----------
-    name : str
-        Column of the table without its unit.
-    direction : (3,) float
-        Unit vector along which the reading grows.  Of a dial gauge in F: it stands on the base, its
-        flat tip on a ball.  Of an inclinometer in U: an arrow on the platform, whose angle above
-        the horizontal it reads.
-    point : (3,) float, optional
-        Centre of the ball in U from O [m]; None for an inclinometer.
-    """
-
-    name: str
+    name: str  # column of the table without its unit
+    # (3,), unit vector along which the reading grows.  Of a dial gauge in F: it stands on the base,
+    # its flat tip on a ball.  Of an inclinometer in U: an arrow on the platform, whose angle above
+    # the horizontal it reads
     direction: Array
-    point: Array | None = None
+    point: Array | None = None  # (3,), centre of the ball in U from O [m]; None for an inclinometer
 
     @classmethod
     def of_note(cls, facts: Mapping[str, Any]) -> Gauge:
@@ -82,14 +73,8 @@ class Gauge:
     def reading(self, shift: Array, rotation: Array, up: Array) -> Array:
         """Return what it reads of poses but for its zero, (..., n) [m] or [rad].
 
-        Parameters
-        ----------
-        shift : (..., n, 3) or (3,) float
-            Position of O in F [m].
-        rotation : (..., n, 3, 3) float
-            U -> F.
-        up : (3,) float
-            Unit vector against gravity in F.
+        `shift` (..., n, 3) or (3,): position of O in F [m]; `rotation` (..., n, 3, 3): U -> F; `up`
+        (3,): unit vector against gravity in F.
         """
         if self.point is None:
             return np.asarray(np.arcsin(np.clip(rotation @ self.direction @ up, -1.0, 1.0)))
@@ -139,22 +124,12 @@ def quantities_of(gauges: Sequence[Gauge]) -> tuple[Quantity, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What gauges read of n samples.
+    """What gauges read of n samples."""
 
-    Parameters
-    ----------
-    gauges : tuple of Gauge
-        K of them, as they stand.
-    up : (3,) float
-        Unit vector against gravity in F.
-    values : (n, K) float
-        Readings less those of the rigid wrist [m] or [rad]; NaN = not read.
-    """
-
-    gauges: tuple[Gauge, ...]
+    gauges: tuple[Gauge, ...]  # K of them, as they stand
     mechanism: Mechanism
-    up: Array
-    values: Array
+    up: Array  # (3,), unit vector against gravity in F
+    values: Array  # (n, K), readings less those of the rigid wrist [m] or [rad]; NaN = not read
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -199,14 +174,8 @@ class Readings:
 def cleared(values: Array, common: Array, sigma: Array) -> Array:
     """Return values (n, m) or (n, m, k) without what they have in common, NaN where they have it.
 
-    Parameters
-    ----------
-    values : (n, m) or (n, m, k) float
-        Left by a model.
-    common : (n, m, q) float
-        What a standard deviation of each unknown does to them.
-    sigma : (m,) float
-        Their scatter: what is less than that is not taken out.
+    `values` (n, m) or (n, m, k): left by a model; `common` (n, m, q): what a standard deviation of
+    each unknown does to them; `sigma` (m,): their scatter: what is less than that is not taken out.
     """
     if not common.shape[2]:
         return values

@@ -23,44 +23,24 @@ class MeasuredSession:
     measured carry the path of angles and load between two measurements, which friction, backlash
     and creep remember.
 
-    Parameters
-    ----------
-    name : str
-        For reports: the recording's file name.
-    block : Block
-        Signals at the stamps of the n rows.
-    shift : (n, 3) float
-        Measured position of the platform's point O in F [m]; NaN = not measured.
-    rotation : (n, 3, 3) float
-        Measured rotation U -> F; NaN = not measured.
-    covariance : (6, 6) float, optional
-        White scatter of one measurement as its instrument states it, fixed axes of F, translation
-        first [m, rad].
-    notes : dict
-        What the recording says of itself: sensor, wrist, session, load source.
-    remarks : tuple of str
-        What could not be used of the recording or was put right, a line for each.
-    clock_offset_s : (float, float), optional
-        Pose sensor's clock minus the joint states', estimate and one standard uncertainty, where
-        the motion tells it [s].
-    readings : Readings, optional
-        Of dial gauges and inclinometers, (n, K), in place of poses.
-
-    Raises
-    ------
-    InputError
-        If there is no measurement, or the shapes do not belong together.
+    Raises `InputError` if there is no measurement, or the shapes do not belong together.
     """
 
-    name: str
-    block: Block
-    shift: Array
-    rotation: Array
+    name: str  # for reports: the recording's file name
+    block: Block  # signals at the stamps of the n rows
+    shift: Array  # (n, 3), measured position of the platform's point O in F [m]; NaN = not measured
+    rotation: Array  # (n, 3, 3), measured rotation U -> F; NaN = not measured
+    # (6, 6), white scatter of one measurement as its instrument states it, fixed axes of F,
+    # translation first [m, rad]
     covariance: Array | None = None
+    # what the recording says of itself: sensor, wrist, session, load source
     notes: Mapping[str, Any] = field(default_factory=dict)
+    # what could not be used of the recording or was put right, a line for each
     remarks: tuple[str, ...] = ()
+    # pose sensor's clock minus the joint states', estimate and one standard uncertainty, where the
+    # motion tells it [s]
     clock_offset_s: tuple[float, float] | None = None
-    readings: Readings | None = None
+    readings: Readings | None = None  # of dial gauges and inclinometers, (n, K), in place of poses
 
     def __post_init__(self) -> None:
         """Check the shapes."""

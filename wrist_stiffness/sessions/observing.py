@@ -26,23 +26,13 @@ SAME_POSE_COUNTS, SAME_LOAD = 2.5, 0.02
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Sessions, what a model predicts of them, and the table of the difference.
+    """Sessions, what a model predicts of them, and the table of the difference."""
 
-    Parameters
-    ----------
-    sessions : tuple of UnitSession
-        Sessions as units.
-    predicted : (u, 6) float
-        Predicted pose error of the units of all sessions, what the sensor would say [m, rad].
-    observations : Observations
-        Residuals and conditions of all units.
-    unit : tuple of (n,) int
-        For each session the row in the table of each measurement, -1 for none.
-    """
-
-    sessions: tuple[UnitSession, ...]
+    sessions: tuple[UnitSession, ...]  # sessions as units
+    # (u, 6), predicted pose error of the units of all sessions, what the sensor would say [m, rad]
     predicted: Array
-    observations: Observations
+    observations: Observations  # residuals and conditions of all units
+    # tuple of (n,), for each session the row in the table of each measurement, -1 for none
     unit: tuple[Labels, ...]
 
 
@@ -64,20 +54,9 @@ def without_mounting(table: Observations, values: Array) -> Array:
 def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
     """Compare a model with what was measured, unit by unit.
 
-    Parameters
-    ----------
-    sessions : sequence of MeasuredSession
-        In the order of time.
-
-    Returns
-    -------
-    Observed
-        Only of units that lie in the table's domain and load range.
-
-    Raises
-    ------
-    InputError
-        If there is no session, nothing of one lies in the model's range, or no unit was measured.
+    `sessions`: in the order of time.  Gives `Observed`: only of units that lie in the table's
+    domain and load range.  Raises `InputError` if there is no session, nothing of one lies in the
+    model's range, or no unit was measured.
     """
     if not sessions:
         raise InputError("no session to compare the model with")
@@ -94,19 +73,9 @@ def predict_units(model: ErrorModel, session: UnitSession) -> Array:
 def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:
     """Return the table of residuals of units against a prediction of them.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Its kinematics and encoder step tell what the encoders hide.
-    sessions : tuple of UnitSession
-        In the order of time, u units together.
-    predicted : (u, 6) float
-        Pose error of the units, as the sensor would say it [m, rad].
-
-    Raises
-    ------
-    InputError
-        If no unit was measured.
+    `model`: its kinematics and encoder step tell what the encoders hide; `sessions`: in the order
+    of time, u units together; `predicted` (u, 6): pose error of the units, as the sensor would say
+    it [m, rad].  Raises `InputError` if no unit was measured.
     """
     units = [len(each) for each in sessions]
     ends = np.cumsum(units)

@@ -48,36 +48,21 @@ FINEST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class UnitSession:
-    """One session as units.
-
-    Parameters
-    ----------
-    cut : Cut
-        Its units, and the moments that tell its path.
-    shift, turn : (u, 3) float
-        Mean measured pose error of each unit against the rigid wrist: shift of O [m] and rotation
-        vector [rad]; NaN = not measured.
-    samples : (u,) float
-        Measurements in each mean.
-    lost : int
-        Measurements left out as lost beams.
-    white : (m,) float
-        Scatter of one measurement, NaN where it is not known [m, rad].
-    wander : (m,) float
-        Slow scatter beside it, which no mean over a dwell makes smaller: what the instrument states
-        beyond the white scatter, or what its digits hide where they hide that one [m, rad].
-    readings : Readings, optional
-        Mean readings of gauges, (u, K), in place of `shift` and `turn`: then m is K, else 6.
-    """
+    """One session as units."""
 
     name: str
-    cut: Cut
+    cut: Cut  # its units, and the moments that tell its path
+    # `shift`, `turn`: (u, 3), mean measured pose error of each unit against the rigid wrist: shift
+    # of O [m] and rotation vector [rad]; NaN = not measured
     shift: Array
     turn: Array
-    samples: Array
-    lost: int
-    white: Array
+    samples: Array  # (u,), measurements in each mean
+    lost: int  # measurements left out as lost beams
+    white: Array  # (m,), scatter of one measurement, NaN where it is not known [m, rad]
+    # (m,), slow scatter beside it, which no mean over a dwell makes smaller: what the instrument
+    # states beyond the white scatter, or what its digits hide where they hide that one [m, rad]
     wander: Array
+    # mean readings of gauges, (u, K), in place of `shift` and `turn`: then m is K, else 6
     readings: Readings | None = None
 
     def __len__(self) -> int:

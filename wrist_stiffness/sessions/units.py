@@ -53,43 +53,22 @@ FIRST_S, GROWTH = 0.05, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Units of n samples and the moments that are kept of them.
+    """Units of n samples and the moments that are kept of them."""
 
-    Parameters
-    ----------
-    label : (n,) int
-        Unit of each sample in the order of time, -1 for none.
-    dwell : (u,) bool
-        Whether a unit is a dwell.
-    kept : (k,) int
-        Samples that are kept.
-    block : Block
-        Their signals, smoothed: means of angles and load over a rest, motor speeds over a window.
-    unit : (k,) int
-        Unit of each kept sample, -1 for none.
-    weight : (k,) float
-        Its share of the unit's mean; the shares of a unit add up to 1.
-    held_s : (n,) float
-        Time since anything changed [s].
-    speed, mean_speed : (k, 2) float
-        Motor speeds at the kept samples, and their means over a window around each [rad/s].
-    at_rest : (n,) bool
-        Whether the load changed after the last motion rather than before it.
-    sense : (n, 2) float
-        Sign of each motor's last motion, 0 before the first.
-    """
-
-    label: Labels
-    dwell: Mask
-    kept: Labels
+    label: Labels  # (n,), unit of each sample in the order of time, -1 for none
+    dwell: Mask  # (u,), whether a unit is a dwell
+    kept: Labels  # (k,), samples that are kept
+    # their signals, smoothed: means of angles and load over a rest, motor speeds over a window
     block: Block
-    unit: Labels
-    weight: Array
-    held_s: Array
+    unit: Labels  # (k,), unit of each kept sample, -1 for none
+    weight: Array  # (k,), its share of the unit's mean; the shares of a unit add up to 1
+    held_s: Array  # (n,), time since anything changed [s]
+    # `speed`, `mean_speed`: (k, 2), motor speeds at the kept samples, and their means over a window
+    # around each [rad/s]
     speed: Array
     mean_speed: Array
-    at_rest: Mask
-    sense: Array
+    at_rest: Mask  # (n,), whether the load changed after the last motion rather than before it
+    sense: Array  # (n, 2), sign of each motor's last motion, 0 before the first
 
     @property
     def without_path(self) -> Cut:
@@ -116,14 +95,8 @@ class Cut:
 def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     """Find the units of a session, at a cost linear in its samples.
 
-    Parameters
-    ----------
-    block : Block
-        Signals at the stamps of the measurements.
-    encoder_step : float
-        [rad].
-    measured : (n,) bool
-        Where anything was measured; the other samples only tell the path.
+    `block`: signals at the stamps of the measurements.  `encoder_step` [rad].  `measured` (n,):
+    where anything was measured; the other samples only tell the path.
     """
     n = len(block)
     # Moments that only tell the path between two poses do not make these denser.

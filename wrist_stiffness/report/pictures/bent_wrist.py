@@ -32,18 +32,10 @@ ALONG, AROUND = 24, 24
 
 @dataclass(frozen=True)
 class Shape:
-    """A drawn body: a grid of surface points and how they move.
+    """A drawn body: a grid of surface points and how they move."""
 
-    Parameters
-    ----------
-    points : (p, q, 3) float
-        Of the rigid wrist in F [m].
-    shift : (p, q, 3) float
-        Displacement [m].
-    """
-
-    points: Array
-    shift: Array
+    points: Array  # (p, q, 3), of the rigid wrist in F [m]
+    shift: Array  # (p, q, 3), displacement [m]
 
 
 def bent_shapes(table: Table, theta: Array, push: Push) -> list[Shape]:

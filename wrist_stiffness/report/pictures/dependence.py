@@ -19,34 +19,18 @@ CLASSES = 12
 
 @dataclass(frozen=True, eq=False)
 class Against:
-    """One condition and a part of what is left.
-
-    Parameters
-    ----------
-    conditions : tuple of str
-        Name of the condition with unit, or of both angles of a map.
-    label : str
-        Name of the part, with unit.
-    values : (n, 1) or (n, 2) float
-        Of the condition.
-    measured : (n,) float
-        The part of each unit, NaN where not measured.
-    places : (c, 1) or (c, 2) float
-        Where the law that was found is told.
-    mean, sigma : (c,) float
-        Of that law, with one standard uncertainty.
-    others : sequence of (str, (n,) float)
-        Name of a further model and the same part of what it leaves.
-    """
+    """One condition and a part of what is left."""
 
     title: str
-    conditions: tuple[str, ...]
-    label: str
-    values: Array
-    measured: Array
-    places: Array
+    conditions: tuple[str, ...]  # name of the condition with unit, or of both angles of a map
+    label: str  # name of the part, with unit
+    values: Array  # (n, 1) or (n, 2), of the condition
+    measured: Array  # (n,), the part of each unit, NaN where not measured
+    places: Array  # (c, 1) or (c, 2), where the law that was found is told
+    # `mean`, `sigma`: (c,), of that law, with one standard uncertainty
     mean: Array
     sigma: Array
+    # name of a further model and the same part of what it leaves
     others: Sequence[tuple[str, Array]] = ()
 
 

@@ -27,24 +27,14 @@ MOST_LETTERS = 28
 
 @dataclass(frozen=True)
 class Bars:
-    """One quantity of several models.
+    """One quantity of several models."""
 
-    Parameters
-    ----------
-    label : str
-        Quantity with unit, for the axis.
-    names : sequence of str
-        Of the models.
-    values, uncertainties : sequence of float
-        Root mean square errors and their standard uncertainties.
-    marks : dict of str to float
-        Levels to compare with: the instrument's noise, what laws of the conditions leave.
-    """
-
-    label: str
-    names: Sequence[str]
+    label: str  # quantity with unit, for the axis
+    names: Sequence[str]  # of the models
+    # `values`, `uncertainties`: root mean square errors and their standard uncertainties
     values: Sequence[float]
     uncertainties: Sequence[float]
+    # levels to compare with: the instrument's noise, what laws of the conditions leave
     marks: dict[str, float]
 
 
@@ -91,14 +81,9 @@ def draw_map(
 ) -> Any:
     """Return a figure of errors over the joint space: a row for a model, a column for a quantity.
 
-    Parameters
-    ----------
-    border : (b, 2) float
-        Motor angles on the border of the operative workspace [rad].
-    theta : (n, 2) float
-        Motor angles of the units [rad].
-    lengths : sequence of (str, (k, n) float)
-        Quantity with unit, and the error of each model at each unit, NaN where not measured.
+    `border` (b, 2): motor angles on the border of the operative workspace [rad]; `theta` (n, 2):
+    motor angles of the units [rad]; `lengths`: quantity with unit, and the error of each model at
+    each unit, NaN where not measured.
     """
     figure = new_figure(0.5 + 3.8 * len(lengths), 0.9 + 3.4 * len(titles))
     plots = figure.subplots(len(titles), len(lengths), squeeze=False, sharex=True, sharey=True)
@@ -156,14 +141,9 @@ def draw_time_line(
 ) -> Any:
     """Return a figure of errors over the time of each session.
 
-    Parameters
-    ----------
-    times, sessions : (n,) arrays
-        Of the units; time in s.
-    session_names : sequence of str
-        The last few are drawn where there are many.
-    lengths : sequence of (str, (k, n) float, float)
-        Quantity with unit, error of each model, and what noise alone gives.
+    `times`, `sessions` (n,) arrays: of the units; time in s.  `session_names`: the last few are
+    drawn where there are many.  `lengths`: quantity with unit, error of each model, and what noise
+    alone gives.
     """
     numbers = list(range(len(session_names)))[-MOST_SESSIONS:]
     figure = new_figure(1.5 + 6.0 * min(len(numbers), 2) ** 0.5, 2.3 * len(lengths) + 0.5)

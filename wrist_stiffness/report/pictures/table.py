@@ -19,14 +19,9 @@ BANDS = 12
 def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, path: Path) -> None:
     """Draw one quantity over the joint space, with the operative workspace bordered.
 
-    Parameters
-    ----------
-    poses : (n, n, 2) float
-        Motor angles on a grid, the first one along the first axis [rad].
-    values : (n, n) float
-        The quantity in the unit of the label; NaN outside the map domain.
-    label, load : str
-        What is shown, and under which load.
+    `poses` (n, n, 2): motor angles on a grid, the first one along the first axis [rad].  `values`
+    (n, n): the quantity in the unit of the label; NaN outside the map domain.  `label`, `load`:
+    what is shown, and under which load.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -59,19 +54,7 @@ def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, p
 
 
 def draw_budget(table: Table, budget: Budget, load: str, path: Path) -> None:
-    """Draw the strain-energy share of each component, and which is the largest where.
-
-    Parameters
-    ----------
-    table : Table
-        The lookup.
-    budget : Budget
-        Of one load.
-    load : str
-        The load in words.
-    path : Path
-        PNG to write.
-    """
+    """Draw the strain-energy share of each component, and which is the largest where."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 

@@ -44,19 +44,12 @@ LEAST_OVERLAP = 0.5
 
 @dataclass(frozen=True)
 class ClockOffset:
-    """Stamps of the pose sensor minus stamps of the joint states for the same moment.
+    """Stamps of the pose sensor minus stamps of the joint states for the same moment."""
 
-    Parameters
-    ----------
-    seconds, sigma : float
-        Estimate and one standard uncertainty [s].
-    gain : float
-        Mean squared misfit of the motion without the offset over that with it.
-    """
-
+    # `seconds`, `sigma`: estimate and one standard uncertainty [s]
     seconds: float
     sigma: float
-    gain: float
+    gain: float  # mean squared misfit of the motion without the offset over that with it
 
 
 def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset | None:
@@ -65,19 +58,9 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
     What is compared is the angle turned in a short time: it does not depend on where the instrument
     stands and how the target sits.
 
-    Parameters
-    ----------
-    time_ns : (n,) int64
-        Stamps of the measured rotations [ns].
-    measured : (n, 3, 3) float
-        Rotations U -> F.
-    rigid : Signal
-        Quaternions (m, 4) of the rigid wrist by the stamps of the joint states.
-
-    Returns
-    -------
-    ClockOffset or None
-        None where nothing moves, or too few stamps overlap.
+    `time_ns` (n,) int64: stamps of the measured rotations [ns]; `measured` (n, 3, 3): rotations U
+    -> F; `rigid`: quaternions (m, 4) of the rigid wrist by the stamps of the joint states.  Gives
+    None where nothing moves, or too few stamps overlap.
     """
     if len(rigid) < 2 or len(time_ns) == 0:
         return None

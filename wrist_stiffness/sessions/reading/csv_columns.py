@@ -59,28 +59,15 @@ STEM = re.compile(r"(motor_[12]|[fm][xyz]|[xyz]|q[xyzw]|p\d+[xyz])(_.*)?", re.IG
 
 @dataclass(frozen=True)
 class Columns:
-    """Which columns a table has.
+    """Which columns a table has."""
 
-    Parameters
-    ----------
-    loads : bool
-        Whether it has the load.
-    pose : tuple of str
-        Columns of the platform's pose that are there.
-    markers : int
-        Number of markers; 0 for a table of poses.
-    temperatures, covariates : dict of str to str
-        Column by component; by name.
-    gauges : tuple of str
-        Columns of dial gauges and inclinometers.
-    """
-
-    loads: bool
-    pose: tuple[str, ...]
-    markers: int
+    loads: bool  # whether it has the load
+    pose: tuple[str, ...]  # columns of the platform's pose that are there
+    markers: int  # number of markers; 0 for a table of poses
+    # `temperatures`, `covariates`: column by component; by name
     temperatures: dict[str, str]
     covariates: dict[str, str]
-    gauges: tuple[str, ...] = ()
+    gauges: tuple[str, ...] = ()  # columns of dial gauges and inclinometers
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,24 +92,10 @@ def marker_columns(count: int) -> tuple[str, ...]:
 def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
     """Sort the columns of a table by what they mean.
 
-    Parameters
-    ----------
-    header : sequence of str
-        Names in any order.
-    gauges : sequence of str
-        Columns that are readings of dial gauges and inclinometers.
-
-    Returns
-    -------
-    Columns
-        Columns that are neither the machine's nor the pose's are temperatures (`T_COMPONENT_degC`)
-        and covariates (`NAME_UNIT`).
-
-    Raises
-    ------
-    InputError
-        If a column is missing, named twice or has no unit or a wrong one, or nothing measured is
-        there.
+    `header`: names in any order; `gauges`: columns that are readings of dial gauges and
+    inclinometers.  Gives `Columns`: columns that are neither the machine's nor the pose's are
+    temperatures (`T_COMPONENT_degC`) and covariates (`NAME_UNIT`).  Raises `InputError` if a column
+    is missing, named twice or has no unit or a wrong one, or nothing measured is there.
     """
     if not any(letter.isalpha() for name in header for letter in name):
         raise InputError("no column names in the first line")

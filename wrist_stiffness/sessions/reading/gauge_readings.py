@@ -44,21 +44,11 @@ ANGLES = (
 
 @dataclass(frozen=True, eq=False)
 class GaugeTrack:
-    """Readings by stamp.
+    """Readings by stamp."""
 
-    Parameters
-    ----------
-    time_ns : (n,) int64
-        Rising [ns].
-    gauges : tuple of Gauge
-        As the recording describes them.
-    values : (n, K) float
-        As they were read [m] or [rad]; NaN = not read.
-    """
-
-    time_ns: Stamps
-    gauges: tuple[Gauge, ...]
-    values: Array
+    time_ns: Stamps  # (n,) int64, rising [ns]
+    gauges: tuple[Gauge, ...]  # as the recording describes them
+    values: Array  # (n, K), as they were read [m] or [rad]; NaN = not read
 
 
 def gauge_track(samples: GaugeSamples, notes: Mapping[str, Any]) -> GaugeTrack:
@@ -86,19 +76,9 @@ def held_to(
 ) -> tuple[Readings, list[str]]:
     """Return readings less those of the rigid wrist, with the mountings that fit it, and remarks.
 
-    Parameters
-    ----------
-    gauges : sequence of Gauge
-        K of them, as somebody measured where they stand.
-    values : (n, K) float
-        [m] or [rad].
-    rotation : (n, 3, 3) float
-        Of the rigid wrist.
-
-    Raises
-    ------
-    InputError
-        If a reading has a wrong sign or unit, or nothing stands where it is said to.
+    `gauges`: K of them, as somebody measured where they stand; `values` (n, K) [m] or [rad];
+    `rotation` (n, 3, 3): of the rigid wrist.  Raises `InputError` if a reading has a wrong sign or
+    unit, or nothing stands where it is said to.
     """
     gravity = table.geometry.gravity
     length = float(np.linalg.norm(gravity))

@@ -14,18 +14,13 @@ from wrist_stiffness.sessions.reading.registration import agreement, places_of, 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """How an instrument sees the wrist: position X (R q) + X o, rotation X R Y, with R rigid.
+    """How an instrument sees the wrist: position X (R q) + X o, rotation X R Y, with R rigid."""
 
-    Parameters
-    ----------
-    instrument, target : (3, 3) float
-        X and Y: the turn of F as the instrument sees it, and of the target on the platform.
-    origin, place : (3,) float
-        o and q: O from the instrument, in the axes of F; the target in U [m].
-    """
-
+    # `instrument`, `target`: (3, 3), X and Y: the turn of F as the instrument sees it, and of the
+    # target on the platform
     instrument: Array
     target: Array
+    # `origin`, `place`: (3,), o and q: O from the instrument, in the axes of F; the target in U [m]
     origin: Array
     place: Array
 
@@ -55,19 +50,9 @@ class Registration:
 def registered(shift: Array, rotation: Array, rigid: Array) -> Registration:
     """Return where an instrument stands, in closed form.
 
-    Parameters
-    ----------
-    shift : (n, 3) float
-        Measured positions of the target [m]; NaN = not measured.
-    rotation : (n, 3, 3) float
-        Measured rotations; NaN = not measured.
-    rigid : (n, 3, 3) float
-        Rotations U -> F of the rigid wrist.
-
-    Raises
-    ------
-    InputError
-        If no pose has both, or the platform turned about one axis only.
+    `shift` (n, 3): measured positions of the target [m]; NaN = not measured.  `rotation` (n, 3, 3):
+    measured rotations; NaN = not measured.  `rigid` (n, 3, 3): rotations U -> F of the rigid wrist.
+    Raises `InputError` if no pose has both, or the platform turned about one axis only.
     """
     known = np.isfinite(rotation).all(axis=(1, 2)) & np.isfinite(shift).all(axis=1)
     if not known.any():

@@ -36,22 +36,10 @@ def lost_beams(
 ) -> NDArray[np.bool_]:
     """Tell which poses stand out from their neighbours.
 
-    Parameters
-    ----------
-    time : (n,) float
-        Rising [s].
-    shift : (n, 3) float
-        Measured positions [m]; NaN = not measured.  Of a target that is not at O they swing with
-        the rotation.
-    rotation, rigid : (n, 3, 3) float
-        Measured rotations, and those of the rigid wrist when they were measured.
-    step : float
-        Of the encoders [rad].
-
-    Returns
-    -------
-    (n,) bool
-        True = lost; none where poses are far apart.
+    `time` (n,): rising [s].  `shift` (n, 3): measured positions [m]; NaN = not measured.  Of a
+    target that is not at O they swing with the rotation.  `rotation`, `rigid` (n, 3, 3): measured
+    rotations, and those of the rigid wrist when they were measured.  `step`: of the encoders [rad].
+    Gives (n,): True = lost; none where poses are far apart.
     """
     if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
         return np.zeros(len(time), dtype=bool)

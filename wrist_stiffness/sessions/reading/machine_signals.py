@@ -44,31 +44,17 @@ HOT_DEGC = 150.0
 
 @dataclass(frozen=True, eq=False)
 class MachineSignals:
-    """Signals of one recording by their own stamps.
+    """Signals of one recording by their own stamps."""
 
-    Parameters
-    ----------
-    angles : Signal
-        Motor angles (m, 2) [rad].
-    speeds : Signal or None
-        Motor speeds (m, 2), where the joint states tell them or are dense enough [rad/s].
-    loads : Signal
-        Wrenches (l, 6) at O [N, N m].
-    load_on_platform : bool
-        Whether their components are in U.
-    temperatures, covariates : dict of str to Signal
-        By component, by name.
-    remarks : tuple of str
-        What could not be used.
-    """
-
-    angles: Signal
+    angles: Signal  # motor angles (m, 2) [rad]
+    # motor speeds (m, 2), where the joint states tell them or are dense enough [rad/s]
     speeds: Signal | None
-    loads: Signal
-    load_on_platform: bool
+    loads: Signal  # wrenches (l, 6) at O [N, N m]
+    load_on_platform: bool  # whether their components are in U
+    # `temperatures`, `covariates`: by component, by name
     temperatures: Mapping[str, Signal]
     covariates: Mapping[str, Signal]
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what could not be used
 
     def usable(
         self, time_ns: Stamps, load_age_limit_s: float
@@ -151,17 +137,9 @@ class MachineSignals:
 def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
     """Return the signals of a recording, loads moved to O.
 
-    Returns
-    -------
-    MachineSignals
-        Values that are not finite are left out.
-
-    Raises
-    ------
-    FrameError
-        If loads are in an unknown frame, or some in F and some in U.
-    InputError
-        If no angle or no load is finite.
+    Gives `MachineSignals`: values that are not finite are left out.  Raises `FrameError` if loads
+    are in an unknown frame, or some in F and some in U; `InputError` if no angle or no load is
+    finite.
     """
     loads, on_platform = _loads(samples.loads, frames)
     recorded = in_order(samples.joints.time_ns, samples.joints.position)

@@ -22,19 +22,9 @@ def turning_stamps(signal: Signal, time_ns: Stamps, least: Array) -> Stamps:
     Of each gap only the outermost extremes count: smaller swings inside them are forgotten by play
     and friction as well.
 
-    Parameters
-    ----------
-    signal : Signal
-        Values (m, k).
-    time_ns : (n,) int64
-        Stamps of the poses, rising [ns].
-    least : (k,) float
-        An extreme stands out by more than this from the values at both ends of its gap.
-
-    Returns
-    -------
-    (p,) int64
-        Rising [ns].
+    `signal`: values (m, k); `time_ns` (n,) int64: stamps of the poses, rising [ns]; `least` (k,):
+    an extreme stands out by more than this from the values at both ends of its gap.  Gives (p,)
+    int64: rising [ns].
     """
     ends = signal.interpolated(np.clip(time_ns, signal.time_ns[0], signal.time_ns[-1]))
     after = np.searchsorted(signal.time_ns, time_ns, side="right")

@@ -36,29 +36,15 @@ REFERENCE_SHARE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class PoseTrack:
-    """Measured poses by stamp.
+    """Measured poses by stamp."""
 
-    Parameters
-    ----------
-    time_ns : (n,) int64
-        Rising [ns].
-    shift : (n, 3) float
-        Position of the platform's point O in F [m]; NaN = not measured.
-    rotation : (n, 3, 3) float
-        U -> F; NaN = not measured.
-    covariance : (6, 6) float, optional
-        As the instrument states it, zero where it does not [m, rad].
-    remarks : tuple of str
-        What could not be used.
-    unplaced : bool
-        All of this is in the axes of an instrument that stands anywhere, not in F.
-    """
-
-    time_ns: Stamps
-    shift: Array
-    rotation: Array
+    time_ns: Stamps  # (n,) int64, rising [ns]
+    shift: Array  # (n, 3), position of the platform's point O in F [m]; NaN = not measured
+    rotation: Array  # (n, 3, 3), U -> F; NaN = not measured
+    # (6, 6), as the instrument states it, zero where it does not [m, rad]
     covariance: Array | None = None
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what could not be used
+    # all of this is in the axes of an instrument that stands anywhere, not in F
     unplaced: bool = False
 
     def __len__(self) -> int:
@@ -119,16 +105,9 @@ def _track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
 def without_frame_motion(track: PoseTrack, frame: PoseTrack) -> PoseTrack:
     """Take the motion of the frame out of the platform's poses.
 
-    Parameters
-    ----------
-    frame : PoseTrack
-        Poses of a target on the frame by the same instrument.
-
-    Returns
-    -------
-    PoseTrack
-        As seen from the frame at the start.  Unchanged, with a remark, where the frame stood still
-        within its noise: the noise of a target that is far from O would only be added.
+    `frame`: poses of a target on the frame by the same instrument.  Gives `PoseTrack`: as seen from
+    the frame at the start.  Unchanged, with a remark, where the frame stood still within its noise:
+    the noise of a target that is far from O would only be added.
     """
     known = np.isfinite(frame.shift).all(axis=1) & np.isfinite(frame.rotation).all(axis=(1, 2))
     if known.sum() < LEAST_FRAME_POSES:

@@ -24,21 +24,11 @@ SOUND = 3.0
 
 @dataclass(frozen=True)
 class Agreement:
-    """How well measured rotations follow the rigid ones, the target turned on the platform as fits.
+    """How well measured rotations follow rigid ones, the target turned on the platform as fits."""
 
-    Parameters
-    ----------
-    misfit : float
-        Median angle that is left with the instrument as it stands [rad].
-    misfit_turned : float
-        The same with the instrument turned as fits best [rad].
-    turn : float
-        Angle of that turn [rad].
-    """
-
-    misfit: float
-    misfit_turned: float
-    turn: float
+    misfit: float  # median angle that is left with the instrument as it stands [rad]
+    misfit_turned: float  # the same with the instrument turned as fits best [rad]
+    turn: float  # angle of that turn [rad]
 
 
 def agreement(measured: Array, rigid: Array) -> Agreement:
@@ -73,14 +63,8 @@ def _instrument(seen: Rotation, said: Rotation, weight: Array) -> Rotation:
 def put_right(measured: Array, theta: Array, table: Table, limit: float) -> str:
     """Return what to change so that rotations agree, empty for nothing known.
 
-    Parameters
-    ----------
-    measured : (n, 3, 3) float
-        U -> F, finite.
-    theta : (n, 2) float
-        Motor angles as they were recorded [rad].
-    limit : float
-        Largest misfit of rotations that agree [rad].
+    `measured` (n, 3, 3): U -> F, finite; `theta` (n, 2): motor angles as they were recorded [rad];
+    `limit`: largest misfit of rotations that agree [rad].
     """
     w_first = Rotation.from_quat(Rotation.from_matrix(measured).as_quat()[:, [1, 2, 3, 0]])
     changes = (

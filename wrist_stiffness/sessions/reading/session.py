@@ -151,24 +151,10 @@ def session_of(
 ) -> MeasuredSession:
     """Put the signals of a recording together: clocks, spikes, the way between poses.
 
-    Parameters
-    ----------
-    track : PoseTrack
-        Measured poses in F.
-    table, load_age_limit_s
-        As in `read_session`.
-
-    Returns
-    -------
-    MeasuredSession
-        With remarks on everything that could not be used, and no notes.
-
-    Raises
-    ------
-    RecordingError
-        If the clocks do not overlap.
-    InputError
-        If too few poses are left, or they are those of another wrist.
+    `track`: measured poses in F; `table`, `load_age_limit_s`: as in `read_session`.  Gives
+    `MeasuredSession`: with remarks on everything that could not be used, and no notes.  Raises
+    `RecordingError` if the clocks do not overlap; `InputError` if too few poses are left, or they
+    are those of another wrist.
     """
     remarks = [*machine.remarks, *track.remarks]
     require_overlap(machine.angles.time_ns, track.time_ns)
@@ -287,19 +273,9 @@ def path_stamps(
 ) -> Stamps:
     """Return the stamps that tell the way to the first pose and between poses far apart.
 
-    Parameters
-    ----------
-    machine : MachineSignals
-        Angles and loads.
-    time_ns : (n,) int64
-        Stamps of measured poses, rising [ns].
-    table, load_age_limit_s
-        As in `read_session`.
-
-    Returns
-    -------
-    (p,) int64
-        Where angles or load turned back [ns].
+    `machine`: angles and loads; `time_ns` (n,) int64: stamps of measured poses, rising [ns];
+    `table`, `load_age_limit_s`: as in `read_session`.  Gives (p,) int64: where angles or load
+    turned back [ns].
     """
     start = max(machine.angles.time_ns[0], machine.loads.time_ns[0])
     far = time_ns[0] - start > GAP_S * NANOSECONDS

@@ -14,18 +14,10 @@ Stamps = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """Values by stamp.
+    """Values by stamp."""
 
-    Parameters
-    ----------
-    time_ns : (n,) int64
-        Stamps, rising [ns].
-    values : (n, ...) float
-        Finite.
-    """
-
-    time_ns: Stamps
-    values: Array
+    time_ns: Stamps  # (n,) int64, stamps, rising [ns]
+    values: Array  # (n, ...), finite
 
     def __len__(self) -> int:
         """Return the number of values."""

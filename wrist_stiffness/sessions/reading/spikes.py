@@ -36,21 +36,9 @@ def spikes(
     What the wrist itself does lasts longer than two samples, or is as large everywhere.  What a
     stamp that is not quite right does grows with the motion, in all motions alike.
 
-    Parameters
-    ----------
-    values : (n, m) float
-        In the order of time; NaN = not measured.
-    least : float
-        Smaller spikes are none.
-    swing : (n,) float
-        Largest difference from its neighbours that motion can make of a value.
-    moving : (n,) bool
-        Rows whose swing tells how much of it motion does make.
-
-    Returns
-    -------
-    (n,) bool
-        True = spike.
+    `values` (n, m): in the order of time; NaN = not measured.  `least`: smaller spikes are none.
+    `swing` (n,): largest difference from its neighbours that motion can make of a value.  `moving`
+    (n,): rows whose swing tells how much of it motion does make.  Gives (n,): True = spike.
     """
     apart = np.stack([_apart(column) for column in values.T], axis=1)
     scale = np.array([_usual(column) for column in apart.T])

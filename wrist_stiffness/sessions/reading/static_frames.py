@@ -27,20 +27,12 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class KnownFrames:
-    """The frames in which the sensors of a recording may speak.
+    """The frames in which the sensors of a recording may speak."""
 
-    Parameters
-    ----------
-    frames : Frames
-        All of them.
-    remarks : tuple of str
-        Transforms that cannot be used, or that contradict an earlier one.
-    elsewhere : tuple of str
-        Frames on `/tf_static` that nothing ties to `wrist_base` or `wrist_platform`.
-    """
-
-    frames: Frames
+    frames: Frames  # all of them
+    # transforms that cannot be used, or that contradict an earlier one
     remarks: tuple[str, ...] = ()
+    # frames on `/tf_static` that nothing ties to `wrist_base` or `wrist_platform`
     elsewhere: tuple[str, ...] = ()
 
     @property

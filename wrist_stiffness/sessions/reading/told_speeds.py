@@ -25,17 +25,8 @@ OTHER = 2.0
 def fault_of(told: Signal, angles: Signal) -> str:
     """Say what is wrong with told speeds; nothing where the angles agree or do not move.
 
-    Parameters
-    ----------
-    told : Signal
-        Motor speeds (m, 2) [rad/s].
-    angles : Signal
-        Motor angles (k, 2) [rad].
-
-    Returns
-    -------
-    str
-        Which motor's, and how many times the true ones they are; empty if none.
+    `told`: motor speeds (m, 2) [rad/s]; `angles`: motor angles (k, 2) [rad].  Gives which motor's,
+    and how many times the true ones they are; empty if none.
     """
     for motor, gain in zip(MOTORS, gains(told, angles).tolist(), strict=True):
         if not (np.isnan(gain) or 1.0 / OTHER < gain < OTHER):
