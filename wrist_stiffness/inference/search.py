@@ -95,6 +95,8 @@ class Ranked:
         The candidate.
     gain : float
         Of log evidence.
+    log : float
+        That with it.
     shape : tuple of float
         Where on its grid.
     z : (k,) float
@@ -103,6 +105,7 @@ class Ranked:
 
     trial: Trial
     gain: float
+    log: float
     shape: tuple[float, ...]
     z: Array
 
@@ -351,7 +354,7 @@ class Search:
                 log = evidence(point, self._problem.background, state.evidence).log
                 log -= _of_shape(each.shape, point)
                 # Beside flanges that a strained base closed either may fall short.
-                log = max(log, state.evidence.log + each.gain)
+                log = max(log, each.log)
                 if not state.names:
                     self.promised[each.trial.name] = log - state.evidence.log
             found.append((log, each))
@@ -433,5 +436,5 @@ def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     for (trial, shape, _), (gain, z) in zip(flat, gains, strict=True):
         gain -= _of_shape(shape, at.point)
         if trial.name not in best or best[trial.name].gain < gain:
-            best[trial.name] = Ranked(trial, gain, shape, z)
+            best[trial.name] = Ranked(trial, gain, at.log + gain, shape, z)
     return sorted(best.values(), key=lambda each: -each.gain)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS
-from wrist_stiffness.model.at_point import bushing_centre, cross_axes, screw_from
+from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.situation import Situation
@@ -29,9 +29,7 @@ TILTS = SHIFTS | {"joint_3": "u"}
 
 
 class AxisMisalignment(Law):
-    """Constant screw at the bushing's centre, fixed in the body on the motor's side of the joint.
-
-    There a drawing says where the bore is; a tilt about it also shifts the axis at O.
+    """Constant screw at O, fixed in the body on the motor's side of the joint.
 
     w is the joint's axis at home, u is perpendicular to it and to the other axis of its link (the
     frame-side joints: to the next axis), v = w x u.
@@ -63,5 +61,4 @@ class AxisMisalignment(Law):
             np.array([values[f"{kind}_{axis}_{unit}"] for axis in felt]) @ axes[: len(felt)]
             for kind, felt, unit in (("shift", SHIFTS[place], "um"), ("tilt", TILTS[place], "mdeg"))
         )
-        centre = bushing_centre(at.table.geometry, place)
-        return at.screw(place, screw_from(centre, np.concatenate([shift, tilt])[None])[0]), None
+        return at.screw(place, np.concatenate([shift, tilt])), None
