@@ -12,7 +12,6 @@ from wrist_stiffness.inference.evidence import (
     Array,
     Evidence,
     beside_known,
-    likely_size,
     log_amplitude,
     log_excess,
 )
@@ -147,21 +146,17 @@ def _improved(at: Evidence) -> Evidence:
     # Of the products times the covariance, the inverse of products over excess plus precision.
     trace = at.excess * float(np.sum(1.0 - at.precision * at.variances))
     excess = _excess(at.square + trace, at.point.count, ground.noise_width)
-    p = len(at.point.z)
-    seconds = (at.point.z + at.step[:p]) ** 2 + at.variances[:p]
-    effects = at.point.sized.items()
-    sizes = {name: likely_size(float(seconds[own].sum()), len(own)) for name, own in effects}
-    return replace(at, amplitude=np.array(amplitude), excess=excess, sizes=sizes)
+    return replace(at, amplitude=np.array(amplitude), excess=excess)
 
 
 def _amplitude(square: float, count: int, group: Group) -> float:
-    if group.expected:
-        unit = group.expected
-        return max(unit * likely_size(square / unit**2, count, group.width), OFF)
     size = float(np.sqrt(square / count))
     for _ in range(5):
-        # Of the logarithm of a half-Cauchy density of scale 1 over the logarithm of the size.
-        slope = (size**2 - 1.0) / (size**2 + 1.0)
+        if group.expected:
+            slope = float(np.log(size / group.expected)) / group.width**2
+        else:
+            # Of the logarithm of a half-Cauchy density of scale 1 over the logarithm of the size.
+            slope = (size**2 - 1.0) / (size**2 + 1.0)
         size = float(np.sqrt(square / max(count + slope, 0.3 * count)))
     return max(size, OFF)
 

@@ -13,14 +13,15 @@ integrated (Laplace's method, exact where a law is linear).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.linalg.lapack import dpotri, dtrtri
+from scipy.special import gammaln
 
 from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
@@ -28,13 +29,9 @@ from wrist_stiffness.inference.projection import NEGLIGIBLE
 
 Array = NDArray[np.float64]
 
-DECADES = 0.5
-"""Standard deviation of the decimal logarithm of an effect's size over the typical one (assumed):
-one fault in three is three times as large or small, one in twenty ten times."""
-
-_SIZES = np.linspace(-5.0 * DECADES, 7.0 * DECADES, 121) * np.log(10.0)
-_LOG_WEIGHTS = -0.5 * (_SIZES / (DECADES * np.log(10.0))) ** 2
-_LOG_WEIGHTS -= np.logaddexp.reduce(_LOG_WEIGHTS)
+TAIL = 2.0
+"""Degrees of freedom of the prior of an effect's size (assumed), a multivariate t: a fault ten
+times as large as the effect of an ordinary wrist is rare, but no wonder."""
 
 MISFIT = 0.05
 """Prior probability that units scatter more than is known of their noise (assumed)."""
@@ -50,23 +47,16 @@ OFF = 1e-3
 """Amplitude of a group that is absent, in scatters of a unit."""
 
 
-def likely_size(square: float, count: int, width: float = DECADES * np.log(10.0)) -> float:
-    """Return the most probable size of `count` unknowns whose squares sum up to `square`.
+def log_size_prior(square: float, count: int) -> float:
+    """Return the log density of an effect's `count` unknowns whose squares sum up to `square`."""
+    density = gammaln(0.5 * (TAIL + count)) - gammaln(0.5 * TAIL)
+    density -= 0.5 * count * np.log(TAIL * np.pi)
+    return float(density - 0.5 * (TAIL + count) * np.log1p(square / TAIL))
 
-    Parameters
-    ----------
-    square : float
-        Expected, with the uncertainties of the unknowns.
-    count : int
-        Of unknowns.
-    width : float
-        Standard deviation of the logarithm of the size about 1; by default that of effects.
-    """
-    size = float(np.sqrt(square / count))
-    for _ in range(5):
-        slope = float(np.log(max(size, OFF))) / width**2
-        size = float(np.sqrt(square / max(count + slope, 0.3 * count)))
-    return max(size, OFF)
+
+def size_weight(square: float, count: int) -> float:
+    """Return the square of the Gaussian weight that has the slope of that prior."""
+    return (TAIL + count) / (TAIL + square)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,15 +74,12 @@ class Evidence:
     excess : float
         Variance of what is left of each number once everything is explained, in units of its known
         noise.
-    sizes : dict of str to float
-        Size of each effect over the typical one; those of their unknowns where left out.
     """
 
     point: Point
     background: Background
     amplitude: Array
     excess: float
-    sizes: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def _known(self) -> tuple[Array, Array, float]:
@@ -101,34 +88,21 @@ class Evidence:
         target = point.products(ground, point.left)
         return point.gram(ground), target, float(point.left @ point.left)
 
-    def size(self, name: str) -> float:
-        """Return the size of an effect over the typical one."""
-        if name in self.sizes:
-            return self.sizes[name]
-        z = self.point.z[self.point.sized[name]]
-        return likely_size(float(z @ z), len(z))
-
     @cached_property
-    def _priors(self) -> tuple[Array, Array]:
-        """Precision and offset of what has a name."""
+    def _priors(self) -> tuple[Array, Array, float]:
+        """Precision and offset of what has a name, and by how much no Gaussian is its prior."""
         point = self.point
         extra = point.inexact.shape[1]
         precision = np.concatenate([point.weight**2, np.ones(extra)])
         offset = np.concatenate([point.z, np.zeros(extra)])
-        for name, places in point.sized.items():
-            precision[places] = 1.0 / self.size(name) ** 2
-        return precision, offset
-
-    @property
-    def _log_sizes(self) -> float:
-        """Log prior of the sizes of the effects, with the widths at which the data know them."""
-        width, found = DECADES * np.log(10.0), 0.0
-        for name, places in self.point.sized.items():
-            size = self.size(name)
-            z = self.point.z[places] + self.step[places]
-            found -= 0.5 * (np.log(size) / width) ** 2
-            found -= 0.5 * np.log1p(2.0 * width**2 * float(z @ z) / size**2)
-        return float(found)
+        correction = 0.0
+        for places in point.sized.values():
+            count, square = len(places), float(np.sum(point.z[places] ** 2))
+            own = size_weight(square, count)
+            precision[places] = own
+            gaussian = 0.5 * (count * np.log(own / (2.0 * np.pi)) - own * square)
+            correction += log_size_prior(square, count) - gaussian
+        return precision, offset, correction
 
     @cached_property
     def precision(self) -> Array:
@@ -139,7 +113,7 @@ class Evidence:
     def _solved(self) -> tuple[Array, Array, Array, Array]:
         """Scaled Cholesky factor of the information, the scales, the step, and the slope."""
         gram, target, _ = self._known
-        precision, offset = self._priors
+        precision, offset, _ = self._priors
         information = gram / self.excess
         information[np.diag_indices_from(information)] += self.precision
         slope = target / self.excess
@@ -153,12 +127,12 @@ class Evidence:
     def log(self) -> float:
         """Natural logarithm of the evidence, up to what all sets of a table share."""
         factor, scale, step, slope = self._solved
-        precision, offset = self._priors
+        precision, offset, correction = self._priors
         n, ground = self.point.count, self.background
         cost = self._known[2] / self.excess + float(precision @ offset**2 + slope @ step)
         volume = 2.0 * float(np.sum(np.log(np.diag(factor))) - np.sum(np.log(scale)))
         log = -0.5 * (n * np.log(self.excess) + cost + volume - np.sum(np.log(self.precision)))
-        log += self._log_sizes + log_excess(np.array([self.excess]), ground.noise_width)[0]
+        log += correction + log_excess(np.array([self.excess]), ground.noise_width)[0]
         for size, group, count in zip(self.amplitude, ground.groups, ground.sizes, strict=True):
             log += log_amplitude(float(size), group, int(count))
         log += ground.log_odds * np.count_nonzero(ground.optional & (self.amplitude > OFF))
@@ -168,7 +142,7 @@ class Evidence:
     def attainable(self) -> float:
         """Log evidence if the set left noise alone, beside drift as it is known."""
         usual = beside_known(self.point, self.background.whole or self.background)
-        precision, offset = usual._priors
+        precision, offset, _ = usual._priors
         _, _, step, slope = usual._solved
         cost = usual._known[2] + float(precision @ offset**2 + slope @ step)
         return usual.log + 0.5 * (cost - self.point.count)
@@ -187,8 +161,13 @@ class Evidence:
         information = self._known[0][p:, p:] / self.excess + np.diag(self.precision[p:])
         target = self.point.products(self.background, point.left)[p:] / self.excess
         cost = float(point.left @ point.left) / self.excess
-        cost += float(self.precision[:p] @ point.z**2)
-        return cost - float(target @ np.linalg.solve(information, target))
+        cost += float(np.sum((point.weight * point.z) ** 2))
+        cost -= float(target @ np.linalg.solve(information, target))
+        for places in point.sized.values():
+            square = float(np.sum(point.z[places] ** 2))
+            cost -= float(np.sum((point.weight[places] * point.z[places]) ** 2))
+            cost -= 2.0 * log_size_prior(square, len(places))
+        return cost
 
     @cached_property
     def covariance_of_fit(self) -> Array:
@@ -449,48 +428,33 @@ class Evidence:
 def _gain(
     information: Array, slope: Array, bounds: tuple[Array, Array] | None
 ) -> tuple[float, Array]:
-    """Return the gain of an effect and its unknowns.
+    """Return the gain of an effect and its unknowns: Laplace's method at the better of two modes.
 
-    Unknowns that would go beyond what is possible stay at the bound, and their room to move is
-    none.
+    The prior has a peak and tails: a large effect is found from the side of the tails.  Unknowns
+    that would go beyond what is possible stay at the bound, and their room to move is none.
     """
     z, free = np.zeros(len(slope)), np.ones(len(slope), dtype=bool)
     while True:
         rest = slope - information @ np.where(free, 0.0, z)
-        gain, own = integrated(information[None][:, free][:, :, free], rest[None, free])
-        z[free] = own[0]
+        own = information[np.ix_(free, free)], rest[free]
+        gain, z[free] = max((_mode(*own, near) for near in (1.0, 1e-8)), key=lambda each: each[0])
         if bounds is None or not (beyond := free & ((z < bounds[0]) | (z > bounds[1]))).any():
             break
         free &= ~beyond
         z = np.clip(z, *bounds)
     held = np.where(free, 0.0, z)
-    return float(gain[0] + slope @ held - 0.5 * held @ information @ held), z
+    return gain + float(slope @ held - 0.5 * held @ information @ held), z
 
 
-def integrated(information: Array, slope: Array) -> tuple[Array, Array]:
-    """Return what effects gain, integrated over their unknowns and sizes.
-
-    Parameters
-    ----------
-    information : (n, k, k) float
-        Of the unknowns of n effects.
-    slope : (n, k) float
-        Of the log likelihood where these are 0.
-
-    Returns
-    -------
-    (n,) and (n, k) float
-        Gain of log evidence, and the unknowns at the most probable size.
-    """
-    known, vectors = np.linalg.eigh(information)
-    known = np.maximum(known, 0.0)[:, None]
-    along = np.einsum("nij,ni->nj", vectors, slope)
-    squares = np.exp(2.0 * _SIZES)[:, None]
-    logs = squares * along[:, None] ** 2 / (1.0 + squares * known) - np.log1p(squares * known)
-    logs = 0.5 * np.sum(logs, axis=2) + _LOG_WEIGHTS
-    best = squares[np.argmax(logs, axis=1)]
-    z = np.einsum("nij,nj->ni", vectors, best * along / (1.0 + best * known[:, 0]))
-    return np.asarray(np.logaddexp.reduce(logs, axis=1)), z
+def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array]:
+    count = len(slope)
+    for _ in range(5):
+        whole = information + weight * np.eye(count)
+        z = np.linalg.solve(whole, slope)
+        weight = size_weight(float(z @ z), count)
+    fits = float(slope @ z - 0.5 * z @ information @ z)
+    prior = log_size_prior(float(z @ z), count) + 0.5 * count * np.log(2.0 * np.pi)
+    return fits + prior - 0.5 * float(np.linalg.slogdet(whole)[1]), np.asarray(z)
 
 
 def known_noise(point: Point, background: Background) -> Evidence:

@@ -13,7 +13,7 @@ from scipy.linalg import lstsq
 from scipy.optimize import minimize
 
 from wrist_stiffness.inference.candidates import Candidate
-from wrist_stiffness.inference.evidence import likely_size
+from wrist_stiffness.inference.evidence import size_weight
 from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
@@ -345,7 +345,7 @@ def _solved(
     z = np.where(held, z, 0.0) if len(z) else np.zeros(len(target))
     if not len(target):
         return z
-    # Any size first: a large effect is found from there.
+    # The tails of the priors first: a large effect is found from their side.
     weight = np.ones(len(target))
     for places in effects.values():
         weight[places] = 1e-8
@@ -354,12 +354,9 @@ def _solved(
     for _ in range(ROUNDS if effects else 1):
         information = gram[np.ix_(free, free)] + np.diag(weight[free])
         scale = 1.0 / np.sqrt(np.diag(information))
-        covariance = np.linalg.inv(information * scale[:, None] * scale)
-        z[free] = scale * (covariance @ (scale * rest[free]))
-        seconds = z**2
-        seconds[free] += scale**2 * np.diag(covariance)
+        z[free] = scale * np.linalg.solve(information * scale[:, None] * scale, scale * rest[free])
         for places in effects.values():
-            weight[places] = likely_size(float(np.sum(seconds[places])), len(places)) ** -2.0
+            weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
     return z
 
 
