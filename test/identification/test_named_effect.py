@@ -86,9 +86,7 @@ def test_a_shape_is_found_from_its_grid(model):
     )
     found = found_beside(base_of(model, hidden), Effect(hidden.law, "motor_1"))
     assert agrees(found["order"], 13.8)
-    # The run-out of its teeth, some 10 %, is known no better than that.
-    wave = found["cos_mdeg"]
-    assert abs(wave.value - 25.0) < 3.0 * wave.sigma < 0.4 * 25.0
+    assert agrees(found["cos_mdeg"], 25.0)
 
 
 @pytest.mark.parametrize("typed", [1.0, -10.0])

@@ -393,13 +393,16 @@ def _columns(
 
 def _about_zero(effect: Effect) -> FreeEffect:
     """Return an effect with priors about its absence; shapes, which have a mean, are free."""
-    known = [p for p in effect.parameters if p.mean == 0.0 and np.isfinite(p.scale)]
-    keys = effect.law.sized_by(effect.component)
-    sizes = [effect.estimates[p.key].value / p.scale for p in known if p.key in keys]
-    size = max(1.0, float(np.sqrt(np.mean(np.square(sizes))))) if sizes else 1.0
+    sizes = [p for p in effect.parameters if p.mean == 0.0 and np.isfinite(p.scale)]
+    found = {p.key: abs(effect.estimates[p.key].value) / p.scale for p in sizes}
+    linear = [found[p.key] for p in sizes if p.linear]
+    together = float(np.sqrt(np.mean(np.square(linear)))) if linear else 0.0
     scale = dict.fromkeys((p.key for p in effect.parameters), np.inf)
-    scale |= {p.key: p.scale * (size if p.key in keys else 1.0) for p in known}
-    return FreeEffect(effect.with_values({p.key: 0.0 for p in known}), scale)
+    sized = effect.law.sized_by(effect.component)
+    for p in sizes:
+        wide = max(1.0, together if p.linear else found[p.key]) if p.key in sized else 1.0
+        scale[p.key] = p.scale * wide
+    return FreeEffect(effect.with_values({p.key: 0.0 for p in sizes}), scale)
 
 
 def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effect]) -> Array:

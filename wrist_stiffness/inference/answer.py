@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -275,7 +275,7 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         for name in names:
             gain = state.evidence.log - nominal
             fitted[name] = max(gain, fitted.get(name, gain))
-    alike = _as_good(search)
+    alike = _as_good(search, named)
     found = []
     for name in {**fitted, **search.promised}:
         gain = fitted[name] if name in fitted else search.promised[name]
@@ -291,14 +291,15 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
     return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
 
 
-def _as_good(search: Search) -> set[str]:
-    """Return the effects of sets that leave no more than the most probable one, but for noise."""
+def _as_good(search: Search, named: Collection[str]) -> set[str]:
+    """Return the effects that in place of a named one leave no more than it does, but for noise."""
     best = search.best.evidence
     most = best.square + 2.0 * NEGLIGIBLE * best.excess
     return {
         name
         for names, state in search.states.items()
         if len(names) == len(search.best.names)
+        and search.best.names - names <= set(named)
         and state.evidence.unexplained <= best.unexplained
         and state.evidence.square <= most
         for name in names - search.best.names

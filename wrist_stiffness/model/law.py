@@ -91,13 +91,11 @@ class Law(ABC):
         """Return the parameters that the law has at a place."""
 
     def sized_by(self, place: str) -> tuple[str, ...]:
-        """Return the parameters that say how large the effect is: the linear ones, or the first.
+        """Return the parameters that may be large together, because the effect is: by default all.
 
-        Faults are small or large over decades.  Where and how they act, which the others say, lies
-        within what is usual, however large they are.
+        The others lie within their typical magnitudes, however large the effect is.
         """
-        parameters = self.parameters(place)
-        return tuple(each.key for each in parameters if each.linear) or (parameters[0].key,)
+        return tuple(each.key for each in self.parameters(place))
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return how the law becomes columns, and where a fit of it begins.

@@ -87,7 +87,7 @@ class Creep(Law):
         """Return the delayed part of the flexibility and its time constant."""
         return (
             Parameter("delayed_percent", 0.0, 500.0, 20.0),
-            Parameter("time_constant_s", 0.1, 1e5, 150.0, 60.0, linear=False, grid=TIMES_S),
+            Parameter("time_constant_s", 0.1, 1e5, 60.0, 60.0, linear=False, grid=TIMES_S),
         )
 
     def advance(

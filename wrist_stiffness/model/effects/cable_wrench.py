@@ -37,10 +37,7 @@ class CableWrench(Law):
             symmetric(key, 50.0 if key.startswith("f") else 2000.0, 0.2 if key[0] == "f" else 5.0)
             for key in _keys()
         )
-        return (
-            *linear,
-            Parameter("hysteresis_deg", 0.0, 60.0, 10.0, linear=False, grid=(0.0, 5.0)),
-        )
+        return (*linear, Parameter("hysteresis_deg", 0.0, 60.0, 3.0, linear=False, grid=(0.0, 5.0)))
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

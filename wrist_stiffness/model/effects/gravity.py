@@ -49,6 +49,10 @@ class Gravity(Law):
         tilt = (Parameter(key, -2e5, 2e5, 1000.0, linear=False) for key in TILTS)
         return (mass, *centre, *tilt)
 
+    def sized_by(self, place: str) -> tuple[str, ...]:
+        """Return all but the tilt: a heavy payload does not turn the wrist."""
+        return tuple(each.key for each in self.parameters(place) if each.key not in TILTS)
+
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return columns of the mass and its first moment, and of the tilt of the base."""
         parameters = self.parameters(place)
