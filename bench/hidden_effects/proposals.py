@@ -30,6 +30,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bench_wrist import Array, wrist
+from blind_strangers import BLIND, register
 from cases import Case, one_each
 from observe import as_read, hidden_effects, measured_session, run_cell
 from right_sentences import is_right, right_components
@@ -55,9 +56,11 @@ STRETCHES = 12
 
 
 def cases(sizes: Sequence[float], sound: int) -> list[Case]:
-    """Return strangers at one place each, and sound wrists."""
+    """Return strangers at one place each, sound wrists, and strangers by another author."""
     found = [Case((place,), size) for place in one_each(STRANGERS) for size in sizes]
     found += [Case((), 0.0)] * sound
+    register()
+    found += [Case((place,), size) for place in one_each(BLIND) for size in sizes]
     return [replace(case, seed=FIRST_SEED + n) for n, case in enumerate(found)]
 
 

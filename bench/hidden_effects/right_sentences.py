@@ -93,7 +93,8 @@ def follows(form: str) -> set[str]:
         names = names - angles | {name.replace("_", "_dot_") for name in angles}
     if kind == "hysteresis":
         names -= angles
-    return names | {form}
+    # The load that goes through a part is that on the platform, turned and shared.
+    return names | {f"W_{name}" for name in names} | {form}
 
 
 def is_right(effect: str, place: str, laws: Sequence[Proposal]) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.commands.extend import direction_of
 from wrist_stiffness.identification import wrist_problem
 from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.proposal import twins
@@ -36,8 +37,10 @@ def day(model, in_the_cell):
 def planted(model, session, place, direction, text, *others, **sizes):
     """The session with a law of the user's more in the wrist, and other effects."""
     law = FormulaLaw("planted", place, np.array(direction), text, ("clamp_bar",), tuple(sizes))
-    effects = (effect_at(law, place, sizes), *others)
-    bare, grown = model.with_effects().batch_with(session.block, [(), effects])
+    # Beside the wrist as it is: a turn about a target that sits a millimetre off moves it as well.
+    wrist = WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
+    effects = (*wrist, effect_at(law, place, sizes), *others)
+    bare, grown = model.with_effects().batch_with(session.block, [wrist, effects])
     change = grown.measured - bare.measured
     turned = Rotation.from_rotvec(change[:, 3:]).as_matrix() @ session.rotation
     return replace(session, shift=session.shift + change[:, :3], rotation=turned)
@@ -139,3 +142,53 @@ def test_beside_an_effect_that_is_named_a_law_is_proposed_for_the_rest(model, da
     first, second = [line for line in lines if line.startswith("   wrist-stiffness")]
     assert first.endswith("extend m.yaml --effect backlash@motor_2 --fit day -o found_1.yaml")
     assert "extend found_1.yaml --formula 'size_um * clamp_bar'" in second
+
+
+def test_what_gives_under_its_own_load_is_told_by_the_load_through_it(model, day):
+    # The moment through joint_1 about its own axis; that on the platform turns with the pose.
+    text = "gives_mdeg * tanh(mx / 0.01)"
+    session = planted(model, day, "joint_1", [0, 0, 0, 1.0, 0, 0], text, gives_mdeg=40.0)
+    found = proposed(model, session)
+    law = found.terms[0]
+    assert law.form.name == "a saturating function of mx"
+    # Before and behind a joint a turn about its own axis is the same.
+    assert law.component in ("joint_1", "link_1")
+    assert {"joint_1", "link_1"} <= set(found.places)
+    assert law.value * law.direction[3] == pytest.approx(40.0, rel=0.15)
+
+
+def test_a_shift_and_a_turn_together_are_one_law_that_can_be_added(model, day):
+    text = "lift_um * exp(-((turn_2 - 0.05) ** 2) / 0.01)"
+    session = planted(model, day, "joint_2", [0, 0.6, 0.8, 0, 0, 20.0], text, lift_um=15.0)
+    found = proposed(model, session)
+    (law,) = found.terms
+    assert law.form.name == "a spot of turn_2"
+    assert law.probability > 0.9
+    assert law.value == pytest.approx(15.0, rel=0.2)
+    assert law.direction == pytest.approx([0, 0.6, 0.8, 0, 0, 20.0], abs=6.0)
+    assert direction_of(law.way.split()) == pytest.approx(law.direction, abs=0.01)
+    assert "mdeg about" in law.sentence
+    added = extend(model, law.effect("dent"), [session])
+    assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
+
+
+def test_what_is_otherwise_beyond_a_line_across_the_workspace(model, day):
+    text = "hop_um * tanh((0.8 * theta_1 - 0.6 * theta_2 - 0.1) / 0.03)"
+    session = planted(model, day, "frame", [0.6, 0, 0.8, 0, 0, 0], text, hop_um=8.0)
+    found = proposed(model, session)
+    law = found.terms[0]
+    assert law.form.name == "a jump of theta_1 and theta_2"
+    way = np.array([np.cos(law.shape[0]), np.sin(law.shape[0])])
+    assert abs(way @ [0.8, -0.6]) > 0.98
+    assert abs(law.value * law.direction[:3]) == pytest.approx([4.8, 0.0, 6.4], abs=1.5)
+
+
+def test_what_comes_with_time_is_not_put_down_to_a_thermometer_that_hardly_moved(model, day):
+    grown = np.linspace(20.0, 20.01, len(day.block))
+    block = replace(day.block, temperatures={"frame": grown, "link_3": grown + 0.001})
+    text = "slope_um * tanh(theta_1 / 0.1) * (time - 60) / 60"
+    session = planted(
+        model, replace(day, block=block), "link_3", [0, 1.0, 0, 0, 0, 0], text, slope_um=12.0
+    )
+    found = proposed(model, session)
+    assert not any("T_" in name for law in found.terms for name in law.form.of)

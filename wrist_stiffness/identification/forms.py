@@ -10,7 +10,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula import Formula, Past
-from wrist_stiffness.model.formula_law import TEMPERATURE, TURNS
+from wrist_stiffness.model.formula_law import TEMPERATURE, TURNS, WRENCH
 
 Shape = tuple[float, ...]
 
@@ -28,6 +28,10 @@ CENTRES, WIDTHS = 5, (0.15, 0.3)
 SPOTS, WIDTHS_OF_SPOTS = 12, (0.04, 0.1)
 """Places and widths of a bump along one angle, the widths in its range."""
 
+LINES, AWAY, SHARP = 8, 5, 0.1
+"""Directions of a line across the workspace, distances from its middle, and how sharp a jump is, in
+half ranges of the angles."""
+
 SLACKS = (0.05, 0.2, 0.5)
 """Slacks of play that are tried, in half ranges of the signal."""
 
@@ -35,6 +39,11 @@ LATE = 6
 """Time constants that are tried, from a second to half of the longest recording."""
 
 EVERYWHERE = "poses all over the workspace"
+
+USUAL_RANGES = {"K": 5.0, "N": 1.0, "N m": 0.03, "rad": 0.3, "rad/s": 1.0}
+"""How much a signal usually changes, by its unit: a motor that warms up, what a cell's tool pushes,
+the same at the distance of a bearing, a move and its speed (assumed).  A law has its usual size
+there; what hardly changes does hardly anything."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +83,8 @@ class Form:
         shape -> the same in words, after a size.
     needs : str
         What a recording must have to show it.
+    usual : float
+        Value of the formula at which the law has its usual size.
     """
 
     kind: str
@@ -82,6 +93,7 @@ class Form:
     write: Callable[[Shape], str]
     tell: Callable[[Shape], str]
     needs: str
+    usual: float = 1.0
 
     @property
     def shapes(self) -> list[Shape]:
@@ -118,13 +130,15 @@ def _moment(value: float) -> str:
 
 def unit_of(name: str) -> str:
     """Return the unit of a signal, `1` where its name does not say."""
+    if name == "time":
+        return "s"
     if name in ("theta_dot_1", "theta_dot_2"):
         return "rad/s"
     if "theta" in name or name in TURNS:
         return "rad"
-    if name.startswith("W_"):
-        return "N" if name[2] == "f" else "N m"
-    if name.startswith(TEMPERATURE):
+    if (axis := name.removeprefix("W_")) in WRENCH:
+        return "N" if axis[0] == "f" else "N m"
+    if name.startswith((TEMPERATURE, f"({TEMPERATURE}")):
         return "K"
     return name.rpartition("_")[2] if "_" in name else "unit"
 
@@ -143,16 +157,21 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
     moving = [name for name, own in pooled.items() if name != "time" and _moves(own)]
     motors = [name for name in moving if name in ("theta_1", "theta_2")]
     angles = [name for name in moving if name in (*motors, *TURNS)]
-    others = [name for name in moving if name not in angles]
+    warm = [name for name in moving if name.startswith(TEMPERATURE)]
+    others = [name for name in moving if name not in (*angles, *warm)]
     found = [each for name in others for each in _of_signal(name, pooled[name], late)]
     found += [each for name in angles for each in _of_angle(name, pooled[name], late)]
+    found += [each for name in warm for each in _of_warmth(name, pooled[name], late)]
+    for pair in combinations(warm, 2):
+        if _moves(apart := pooled[pair[0]] - pooled[pair[1]]):
+            found += _of_warmth(f"({' - '.join(pair)})", apart, late)
     if len(motors) == 2:
         one, two = (pooled[name] for name in motors)
         found += [_wave("(theta_1 - theta_2)", one - two), _wave("(theta_1 + theta_2)", one + two)]
-        found.append(_zone(one, two))
+        found += [_zone(one, two), *_across(one, two)]
     found += _of_time(pooled["time"], length)
     slow = [name for name in moving if "dot" not in name and name not in TURNS]
-    found += [_together(*pair, pooled) for pair in combinations(slow, 2)]
+    found += [_together(*pair, pooled) for pair in combinations((*slow, "time"), 2)]
     return found
 
 
@@ -166,53 +185,74 @@ def _half_range(values: Array) -> float:
 
 
 def _of_signal(name: str, values: Array, late: Span) -> list[Form]:
-    unit, half = unit_of(name), _half_range(values)
-    x, of = _zeroed(name, values), (name,)
+    unit, half, of, u = unit_of(name), _half_range(values), (name,), _usual(name, values)
     every = f"for every {unit} of {name}"
     slack = Span(tuple(half * each for each in SLACKS), positive=True)
-    needs = f"{name} over its whole range, at one pose and load"
     sizes = Span(tuple(half * each for each in (0.1, 0.3, 1.0)), positive=True)
     low, high = np.percentile(values, (5.0, 95.0))
     ends = Span(tuple(np.linspace(low, high, 7)[1:-1]))
+    needs = f"{name} over its whole range, at one pose and load"
+    in_turn = f"{name} raised and lowered in turn at one pose"
     slowly = f"{name} changed and then held for minutes"
     found = [
-        Form("a share", of, (), lambda s: x, lambda s: every, needs),
-        Form("a square", of, (), lambda s: f"{x} ** 2", lambda s: f"{every} squared", needs),
-        Form("a saturating function", of, (sizes,), lambda s: f"tanh({x} / {number(s[0])})",
+        Form("a share", of, (), lambda s: name, lambda s: every, needs, u),
+        Form("a square", of, (), lambda s: f"{name} ** 2", lambda s: f"{every} squared", needs,
+             u**2),
+        Form("a saturating function", of, (sizes,), lambda s: f"tanh({name} / {number(s[0])})",
              lambda s: f"as {name} leaves 0, saturating from {number(s[0])} {unit} on", needs),
         Form("what lies beyond a limit", of, (ends,), lambda s: f"max({_beyond(name, s[0])}, 0)",
-             lambda s: f"{every} above {number(s[0])}", needs),
-        Form("a late follower", of, (late,), lambda s: f"lag({x}, {number(s[0])})",
-             lambda s: f"{every}, {number(s[0])} s late", slowly),
+             lambda s: f"{every} above {number(s[0])}", needs, u),
+        Form("a late follower", of, (late,), lambda s: f"lag({name}, {number(s[0])})",
+             lambda s: f"{every}, {number(s[0])} s late", slowly, u),
     ]  # fmt: skip
-    if not (name.startswith(TEMPERATURE) or "dot" in name):
-        # Digits of a thermometer are no events, and nothing plays against a speed.
+    if "dot" not in name:
+        # Nothing plays against a speed.
         found += [
-            Form("play", of, (slack,), lambda s: f"play({x}, {number(s[0])})",
+            Form("play", of, (slack,), lambda s: f"play({name}, {number(s[0])})",
                  lambda s: f"{every}, with a slack of {number(s[0])} {unit} to both sides",
-                 f"{name} raised and lowered in turn at one pose"),
-            Form("hysteresis", of, (slack,), lambda s: f"({x} - play({x}, {number(s[0])}))",
-                 lambda s: f"{every} since it turned, {number(s[0])} {unit} at most",
-                 f"{name} raised and lowered in turn at one pose"),
-            Form("a passing answer", of, (late,), lambda s: f"({x} - lag({x}, {number(s[0])}))",
-                 lambda s: f"{every} when it changes, dying away in {number(s[0])} s", slowly),
+                 in_turn, u),
+            Form("hysteresis", of, (slack,), lambda s: f"({name} - play({name}, {number(s[0])}))",
+                 lambda s: f"{every} since it turned, {number(s[0])} {unit} at most", in_turn,
+                 SLACKS[1] * half),
+            Form("a passing answer", of, (late,),
+                 lambda s: f"({name} - lag({name}, {number(s[0])}))",
+                 lambda s: f"{every} when it changes, dying away in {number(s[0])} s", slowly, u),
         ]  # fmt: skip
     if values.min() < 0.0 < values.max():
         found.append(
-            Form("the size", of, (), lambda s: f"abs({x})", lambda s: f"{every} of either sign",
-                 needs)
+            Form("the size", of, (), lambda s: f"abs({name})",
+                 lambda s: f"{every} of either sign", needs, u)
         )  # fmt: skip
     if "dot" in name:
         found.append(
-            Form("warmth by motion", of, (late,), lambda s: f"lag({x} ** 2, {number(s[0])})",
+            Form("warmth by motion", of, (late,), lambda s: f"lag({name} ** 2, {number(s[0])})",
                  lambda s: f"{every} squared, {number(s[0])} s late",
-                 f"minutes of fast motion of motor {name[-1]}, then minutes of rest")
+                 f"minutes of fast motion of motor {name[-1]}, then minutes of rest", u**2)
         )  # fmt: skip
     return found
 
 
+def _usual(name: str, values: Array) -> float:
+    """Return how much a signal usually changes; one of which nobody knows, as much as it did."""
+    return USUAL_RANGES.get(unit_of(name), float(values.std()))
+
+
+def _of_warmth(name: str, values: Array, late: Span) -> list[Form]:
+    """Return the forms of a temperature, or of how much one part is warmer than another."""
+    x, every, u = _zeroed(name, values), f"for every K of {name}", USUAL_RANGES["K"]
+    slowly, of = f"{name} changed and then held for minutes", (name.strip("()"),)
+    return [
+        Form("a share", of, (), lambda s: x, lambda s: every, slowly, u),
+        Form("a square", of, (), lambda s: f"{x} ** 2", lambda s: f"{every} squared", slowly, u**2),
+        Form("a late follower", of, (late,), lambda s: f"lag({x}, {number(s[0])})",
+             lambda s: f"{every}, {number(s[0])} s late", slowly, u),
+    ]  # fmt: skip
+
+
 def _zeroed(name: str, values: Array) -> str:
-    """Return a signal as a formula has it; temperatures count from where they began."""
+    """Return a signal as a formula has it; time and temperatures count from where they began."""
+    if name == "time":
+        return _beyond(name, float(values.min()), _moment)
     return _beyond(name, float(values[0])) if name.startswith(TEMPERATURE) else name
 
 
@@ -224,11 +264,11 @@ def _of_angle(name: str, values: Array, late: Span) -> list[Form]:
         _spot(name, values),
         Form("hysteresis", (name,), (slack,), lambda s: f"({name} - play({name}, {number(s[0])}))",
              lambda s: f"for every rad since {motor} turned back, {number(s[0])} rad at most",
-             f"every pose from both sides of {motor}"),
+             f"every pose from both sides of {motor}", slack.grid[1]),
         Form("a passing answer", (name,), (late,),
              lambda s: f"({name} - lag({name}, {number(s[0])}))",
              lambda s: f"for every rad that {motor} moved, dying away in {number(s[0])} s",
-             f"dwells of minutes after moves of {motor}"),
+             f"dwells of minutes after moves of {motor}", USUAL_RANGES["rad"]),
     ]  # fmt: skip
 
 
@@ -282,6 +322,34 @@ def _zone(one: Array, two: Array) -> Form:
     return Form("a zone", ("theta_1", "theta_2"), tuple(spans), write, tell, EVERYWHERE)
 
 
+def _across(one: Array, two: Array) -> list[Form]:
+    """Return what begins, or is otherwise, beyond a line across the workspace: a stop, a switch."""
+    middle = [float(np.mean(np.percentile(values, (1.0, 99.0)))) for values in (one, two)]
+    half = max(_half_range(one), _half_range(two))
+    ways = Span(tuple(np.arange(LINES) * 2.0 * np.pi / LINES))
+    away = Span(tuple(half * np.linspace(-0.8, 0.8, AWAY)))
+
+    def parts(s: Shape) -> tuple[float, float, float]:
+        a, b = float(np.cos(s[0])), float(np.sin(s[0]))
+        return a, b, a * middle[0] + b * middle[1] + s[1]
+
+    def line(s: Shape) -> str:
+        a, b, c = parts(s)
+        return _beyond(f"{number(a)} * theta_1 + {number(b)} * theta_2", c)
+
+    def where(s: Shape) -> str:
+        a, b, c = parts(s)
+        return f"{a:.2f} theta_1 {'-' if b < 0.0 else '+'} {abs(b):.2f} theta_2 is above {c:.3f}"
+
+    of = ("theta_1", "theta_2")
+    return [
+        Form("what lies beyond a line", of, (ways, away), lambda s: f"max({line(s)}, 0)",
+             lambda s: f"for every rad by which {where(s)} rad", EVERYWHERE, USUAL_RANGES["rad"]),
+        Form("a jump", of, (ways, away), lambda s: f"tanh({line(s)} / {number(SHARP * half)})",
+             lambda s: f"to either side of where {where(s)} rad", EVERYWHERE),
+    ]  # fmt: skip
+
+
 def _of_time(time: Array, length: float) -> list[Form]:
     first, of = float(time.min()), ("time",)
     since = _beyond("time", first, _moment)
@@ -290,7 +358,8 @@ def _of_time(time: Array, length: float) -> list[Form]:
     late = Span(tuple(np.geomspace(max(2.0, 0.02 * length), length, LATE)), positive=True)
     again = "the same poses over and over, for as long as possible"
     return [
-        Form("a drift", of, (), lambda s: f"{since} / 3600", lambda s: "for every hour", again),
+        Form("a drift", of, (), lambda s: f"{since} / 3600", lambda s: "for every hour", again,
+             float(time.std()) / 3600.0),
         Form("a step", of, (moments,),
              lambda s: f"0.5 * (1 + sign{_beyond('time', s[0], _moment)})",
              lambda s: f"since {s[0] - first:.0f} s after the start", again),
@@ -306,4 +375,5 @@ def _together(one: str, two: str, pooled: Mapping[str, Array]) -> Form:
     x, y = (_zeroed(name, pooled[name]) for name in (one, two))
     every = f"for every {unit_of(one)} of {one} and {unit_of(two)} of {two} together"
     needs = f"{one} and {two} changed one without the other"
-    return Form("a product", (one, two), (), lambda s: f"{x} * {y}", lambda s: every, needs)
+    usual = _usual(one, pooled[one]) * _usual(two, pooled[two])
+    return Form("a product", (one, two), (), lambda s: f"{x} * {y}", lambda s: every, needs, usual)

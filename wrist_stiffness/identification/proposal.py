@@ -14,7 +14,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import names_in
 from wrist_stiffness.model.formula_law import LOAD_SENSOR, SIGNALS, FormulaLaw
-from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.parameters import Estimate, si_factor
 from wrist_stiffness.model.places import BODY, LIMB
 
 SAME: dict[str, tuple[str, ...]] = {
@@ -23,6 +23,22 @@ SAME: dict[str, tuple[str, ...]] = {
     LOAD_SENSOR: ("whatever pulls at the platform",),
 }
 """What does exactly the same and is none of the wrist."""
+
+
+BESIDE = {
+    "size_um": "size_mdeg",
+    "size_mdeg": "size_um",
+    "size_N": "size_Nmm",
+    "size_Nmm": "size_N",
+}
+"""The other half of a screw or a wrench."""
+
+TURNING = ("size_mdeg", "size_Nmm")
+"""Sizes of a turn, or of a moment."""
+
+
+def _unit(key: str) -> str:
+    return key.rpartition("_")[2]
 
 
 def twins(component: str) -> tuple[str, ...]:
@@ -46,7 +62,8 @@ class Proposal:
     component : str
         Where.
     direction : (6,) float
-        Translation; rotation at O in the component's home frame, of length 1.
+        Translation; rotation at O in the component's home frame, for a size of 1; that of `key`
+        has length 1 [m, rad; N, N m].
     value, sigma : float
         Size and its standard uncertainty, in the unit of `key`.
     key : str
@@ -80,14 +97,20 @@ class Proposal:
 
     @property
     def way(self) -> str:
-        """Direction in the words of `extend --direction`: `along +z`."""
-        turns = bool(np.any(self.direction[3:]))
+        """Direction as `extend --direction` takes it: `along +z`, or six numbers."""
+        if self.direction[:3].any() and self.direction[3:].any():
+            return " ".join(f"{each:.4g}" for each in self.direction)
+        return self._words(self.key)
+
+    def _words(self, key: str) -> str:
+        turns = key in TURNING
         three = self.direction[3:] if turns else self.direction[:3]
-        axis = int(np.argmax(np.abs(three)))
-        if abs(three[axis]) == 1.0:
-            words = f"{'+' if three[axis] > 0.0 else '-'}{'xyz'[axis]}"
+        own = three / np.linalg.norm(three)
+        axis = int(np.argmax(np.abs(own)))
+        if abs(own[axis]) == 1.0:
+            words = f"{'+' if own[axis] > 0.0 else '-'}{'xyz'[axis]}"
         else:
-            words = f"({', '.join(f'{each:.2f}' for each in three)})"
+            words = f"({', '.join(f'{each:.2f}' for each in own)})"
         return f"{'about' if turns else 'along'} {words}"
 
     @property
@@ -99,8 +122,14 @@ class Proposal:
     def sentence(self) -> str:
         """What it says of the wrist."""
         digits = max(0, 1 - int(np.floor(np.log10(max(self.sigma, 1e-9)))))
-        size = f"{self.value:.{digits}f} +- {self.sigma:.{digits}f} {self.key.rpartition('_')[2]}"
-        return f"{size} {self.way} at {self.places} {self.form.tell(self.shape)}"
+        size = f"{self.value:.{digits}f} +- {self.sigma:.{digits}f} {_unit(self.key)}"
+        screw = f"{size} {self._words(self.key)}"
+        other = BESIDE[self.key]
+        beside = np.linalg.norm(self.direction[:3] if self.key in TURNING else self.direction[3:])
+        if beside:
+            more = self.value * si_factor(self.key) / si_factor(other) * beside
+            screw += f" and {more:.3g} {_unit(other)} {self._words(other)}"
+        return f"{screw} at {self.places} {self.form.tell(self.shape)}"
 
     def effect(self, name: str = "proposed") -> Effect:
         """Return it as an effect of a model."""

@@ -165,6 +165,27 @@ class WristFit:
             sizing=sizing,
         )
 
+    def without_numbers(self, name: str) -> Point:
+        """Return the point without the unknowns of an effect of no typical magnitude.
+
+        What it does stays in what is left.
+        """
+        point, kept = self.point, np.delete(np.arange(len(self.base.z)), self.places[name])
+        before = list(point.varied)[: list(point.varied).index(name)]
+        first = len(self.gives) + sum(point.varied[each].shape[1] for each in before)
+        wrong = np.arange(first, first + point.varied[name].shape[1])
+        return replace(
+            point,
+            columns=point.columns[:, kept],
+            z=point.z[kept],
+            weight=point.weight[kept],
+            effects={n: np.searchsorted(kept, own) for n, own in point.effects.items()},
+            inexact=np.delete(point.inexact, wrong, axis=1),
+            varied={n: own for n, own in point.varied.items() if n != name},
+            sizing={n: np.searchsorted(kept, own) for n, own in point.sizing.items()},
+            _beside={},
+        )
+
     @cached_property
     def evidence(self) -> Evidence:
         """At the amplitudes of the largest evidence."""
