@@ -34,7 +34,7 @@ PICTURES = Path(__file__).parents[2] / "docs/pictures"
 STORIES = {
     "tutorial-known": ("tuesday", "the side of approach", ("wrist_7", "worn")),
     "tutorial-unknown": ("thursday", "clamp_bar", ("worn", "clamped")),
-    "tutorial-proposed": ("saturday", "turn_3", ("worn", "proposed_2")),
+    "tutorial-proposed": ("saturday", "turn_3", ("worn", "proposed_1")),
 }
 """Recording, condition and models by the beginning of the pictures' names."""
 

@@ -298,7 +298,7 @@ def _spot(name: str, values: Array) -> Form:
         (name,),
         (Span(tuple(np.linspace(low, high, SPOTS))), Span(widths, positive=True)),
         lambda s: f"exp(-{_beyond(name, s[0])} ** 2 / {number(2.0 * s[1] ** 2)})",
-        lambda s: f"about {np.rad2deg(s[0]):.1f} deg of {of}, {np.rad2deg(s[1]):.2g} deg wide",
+        lambda s: f"near {np.rad2deg(s[0]):.1f} deg of {of}, {np.rad2deg(s[1]):.2g} deg wide",
         f"the angle of {of} in steps far below the width",
     )
 
@@ -317,7 +317,7 @@ def _zone(one: Array, two: Array) -> Form:
 
     def tell(s: Shape) -> str:
         at = ", ".join(f"{np.rad2deg(each):.1f}" for each in s[:2])
-        return f"in a zone of poses about motor angles ({at}) deg, {np.rad2deg(s[2]):.2g} deg wide"
+        return f"in a zone of poses near motor angles ({at}) deg, {np.rad2deg(s[2]):.2g} deg wide"
 
     return Form("a zone", ("theta_1", "theta_2"), tuple(spans), write, tell, EVERYWHERE)
 
