@@ -11,6 +11,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import (
+    GROWS,
     NAMING,
     Class,
     Diagnosis,
@@ -135,7 +136,7 @@ def diagnose(
     refused = bool(reading.named) and refuted(before, after)
     if refused:
         after = before
-        reading = reading.refute(search.base)
+        reading = reading.refute(search.base, GROWS)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
     answer = Diagnosis(
