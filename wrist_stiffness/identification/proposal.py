@@ -69,7 +69,8 @@ class Proposal:
     key : str
         `size_um` or `size_mdeg`; of a wrench `size_N` or `size_Nmm`.
     probability : float
-        That it is the one, among all that were asked and none of them.
+        That it is the one, among all that were asked and none of them; of a second law, that both
+        are.
     log_gain : float
         Natural logarithm of the evidence with it over that without it, its prior included.
     explains : float

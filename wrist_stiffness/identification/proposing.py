@@ -107,7 +107,9 @@ def propose(
             first = found, chances, base
         if something < naming:
             break
-        terms.append(_proposal(found[0], float(chances[0]), base))
+        # A second one is no surer than the first, beside which it was found.
+        before = terms[0].probability if terms else 1.0
+        terms.append(_proposal(found[0], before * float(chances[0]), base))
         if len(terms) < MOST_TERMS:
             # Tolerances that had given way to the first law find back.
             try:

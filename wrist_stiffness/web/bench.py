@@ -90,7 +90,7 @@ class Offer:
     formula: str
     component: str
     way: str
-    probability: float  # that it is the one, beside what stands before it
+    probability: float  # that it is the one; of another beside the first, that both are
     # the law itself, another beside it, or one in place of the first: only the first and those in
     # its place exclude each other, and only their probabilities add up to at most 1
     role: str
