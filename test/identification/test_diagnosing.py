@@ -202,7 +202,8 @@ def test_a_drive_that_is_stiffer_than_stiff_is_not_asked(model, in_the_cell, sig
     (trial,) = (each for each in problem.trials(fit) if each.name == name)
     (first,) = ranked(fit.evidence.without_discrepancy(), [trial])
     found = problem.added(fit, first)
-    assert problem.tangent(fit, first).columns[:, -1].any() == (sign > 0.0)
+    (place,) = problem.nearly(fit, first).places[name]
+    assert problem.nearly(fit, first).point.columns[:, place].any() == (sign > 0.0)
     if sign > 0.0:
         assert first.gain > 10.0
         assert found.evidence.log > fit.evidence.log + 10.0

@@ -167,6 +167,7 @@ def fit_base(
     beside: bool = False,
     walls: Walls = "sharp",
     base: Base | None = None,
+    quickly: bool = False,
 ) -> BaseFit:
     """Fit registrations, zeros, tare and tolerances, within their priors.
 
@@ -190,6 +191,8 @@ def fit_base(
         to tell which of several fits leads furthest.
     base : (tuple of FreeEffect, tuple of Effect), optional
         What of the model is free and what stays as it is; by default as `free_base` says.
+    quickly : bool
+        Whether the columns of the base's start serve to the end: nearly as far, far quicker.
     """
     free, held = base or free_base(model)
     # What was fitted with rounded walls begins with its own law again.
@@ -219,7 +222,8 @@ def fit_base(
             if walls == "rounded":
                 cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
                 return BaseFit(easy, z, residual, tuple(added), cost, alone, easy, arrived, near)
-    z, residual, near, arrived = _descended(problem, bare, z, len(free), near=near)
+    enough = NEARLY if quickly else ENOUGH
+    z, residual, near, arrived = _descended(problem, bare, z, len(free), enough, near, quickly)
     cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
     return BaseFit(problem, z, residual, tuple(added), cost, alone, bare, arrived, near)
 
@@ -324,6 +328,7 @@ def _descended(
     usual: int,
     enough: float = ENOUGH,
     near: Array | None = None,
+    kept: bool = False,
 ) -> tuple[Array, Array, Array, bool]:
     """Return where Gauss-Newton steps lead from `z`: there, the residual, columns, if they settled.
 
@@ -355,7 +360,7 @@ def _descended(
         if after < before:
             z, residual = trial, tried
         small = cooled and before - after < enough * before
-        if small and fresh:
+        if small and (fresh or kept):
             return z, residual, columns, True
         if small or near is None:
             columns = None

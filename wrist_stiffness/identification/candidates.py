@@ -73,10 +73,6 @@ class WristCandidate:
         """
         return effect_at(self.law, self.place, self.recipe.start(found, shape))
 
-    def effect_of(self, values: Mapping[str, float]) -> Effect:
-        """Return the effect with these values, each brought within its bounds."""
-        return effect_at(self.law, self.place, values)
-
     def at(self, shape: Shape) -> Array:
         """Return the columns of all units at a point of the grid, (u, 6, k)."""
         return self.exact(shape) if self.exact else self.known[shape]

@@ -32,13 +32,16 @@ from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import MEMBER, NAMING, stands_in
 from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.point import Point
-from wrist_stiffness.inference.search import NEGLIGIBLE, UNLIKE
+from wrist_stiffness.inference.search import NEGLIGIBLE
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import si_factor
 
 WHOLE = 6
 """Leading laws that are fitted whole."""
+
+UNLIKE = 2.0
+"""Times by which a fit may reach further beyond its first order than another one (assumed)."""
 
 MOST_TERMS = 2
 
@@ -236,7 +239,7 @@ class _Search:
         proposal = _proposal(first, 0.0, state)
         effect = proposal.effect(PROPOSED)
         try:
-            fit = self._problem.extended(near, effect)
+            fit = self._problem.beside(near, effect)
         except WristError:
             return first
         value = fit.base.beyond()[effect.name].estimates[proposal.key].value

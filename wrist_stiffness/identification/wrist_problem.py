@@ -16,6 +16,7 @@ from wrist_stiffness.identification.base_fit import (
     free_base,
     has_walls,
 )
+from wrist_stiffness.identification.best_multiple import best_multiple
 from wrist_stiffness.identification.candidates import (
     Point as WristPoint,
 )
@@ -25,26 +26,20 @@ from wrist_stiffness.identification.candidates import (
     wrist_candidates,
 )
 from wrist_stiffness.identification.likelihood import WristTable, likelihood_of
-from wrist_stiffness.identification.own_law import Beyond
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.search import Ranked, Trial, ranked
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.columns import SMALL
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 LEAVES_MUCH, HELPS = 1.5, 0.8
 """Variance of what an effect leaves, in units of the noise, and share of the cost without it, at
 which its fit is tried again: from the drawing, for tolerances that gave way to a large effect may
 not find back, and with walls little by little."""
-
-NOTHING = 1e-3
-"""Usual sizes from a bound within which a search by steps inside the bounds stands at it."""
 
 
 class WristProblem:
@@ -69,8 +64,8 @@ class WristProblem:
         self._sessions = self._first.problem.sessions
         self.table: WristTable = likelihood_of(self._first)
         self._extended: tuple[WristFit, Effect, WristFit] | None = None
-        self._starts: dict[WristCandidate, Effect] = {}
-        self._asked: dict[int, tuple[BaseFit, WristPoint, dict[str, WristCandidate]]] = {}
+        self._near: dict[WristCandidate, WristFit] = {}
+        self._asked: tuple[BaseFit, dict[str, WristCandidate]] | None = None
 
     def asks(self, model: ErrorModel, base: Base) -> bool:
         """Tell whether it is of this model, with this free and that held."""
@@ -89,7 +84,7 @@ class WristProblem:
 
     def trials(self, fit: WristFit) -> Sequence[Trial]:
         """Return the catalogue about a fit."""
-        return [self._trial(each) for each in self._catalogue(fit)[1].values()]
+        return [self._trial(each) for each in self._catalogue(fit).values()]
 
     def _trial(self, candidate: WristCandidate) -> Trial:
         blocks = [
@@ -106,63 +101,45 @@ class WristProblem:
             if give not in fit.gives
         ]
 
-    def tangent(self, fit: WristFit, ranked: Ranked) -> Point | None:
-        """Return a fit with one effect more: the effect by its own law, all else to first order.
+    def nearly(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
+        """Return nearly the best fit with one effect more, as `beside` does.
 
-        None where its law goes from wall to wall: only a whole fit tells what that does.
+        None where its law goes from wall to wall, so that only a whole fit tells what it does, or
+        where it finds no equilibrium.
         """
-        at, candidates = self._catalogue(fit)
-        candidate = candidates[ranked.trial.name]
+        candidate = self._catalogue(fit)[ranked.trial.name]
         try:
-            start = self._begun(fit, ranked, at, candidate)
+            return self._nearly(fit, candidate, _begun(candidate, ranked))
         except WristError:
             return None
-        if has_walls(start):
-            return None
-        if candidate.law.smooth:
-            z, columns = ranked.z, candidate.at(ranked.shape) * candidate.usual
-            change, (lower, upper) = columns @ z, candidate.bounds
-            sizing = None
-        else:
-            idle = candidate.recipe.idle
-            asked = [p for p in start.parameters if p.key not in idle and np.isfinite(p.scale)]
-            change, columns = _tangents(at, start, asked)
-            known = [(start.estimates[p.key].value, p.lower, p.upper) for p in asked]
-            mean, scale = np.array([(p.mean, p.scale) for p in asked]).T
-            z, lower, upper = (np.array(known).T - mean) / scale
-            keys = candidate.law.sized_by(candidate.place)
-            sizing = np.array([p.key in keys for p in asked])
-        held = (z < lower + NOTHING) | (z > upper - NOTHING)
-        left = fit.point.left - self.table.whiten(change)
-        own = -self.table.whiten(columns) * ~held
-        varied = self.table.varied(change)
-        return fit.point.with_effect(
-            candidate.name, left, own, z, varied, candidate.law.inexactness, sizing
-        )
 
-    def _begun(
-        self, fit: WristFit, ranked: Ranked, point: WristPoint, candidate: WristCandidate
-    ) -> Effect:
-        """Return an effect with the values with which a whole fit begins; they are kept."""
-        if candidate not in self._starts:
-            factors = [each.factor.name for each in candidate.recipe.columns(ranked.shape)]
-            values = (ranked.z * candidate.usual).tolist()
-            own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
-            if has_walls(own):
-                own = own.with_values({p.key: p.mean or p.scale for p in own.parameters})
-            elif not candidate.law.smooth:
-                own = Beyond(fit.base, point).fitted(candidate, own)
-            self._starts[candidate] = own
-        return self._starts[candidate]
+    def _nearly(self, fit: WristFit, candidate: WristCandidate, begun: Effect) -> WristFit | None:
+        if has_walls(begun):
+            return None
+        if candidate not in self._near:
+            self._near[candidate] = self.beside(fit, begun)
+        return self._near[candidate]
+
+    def beside(self, fit: WristFit, effect: Effect) -> WristFit:
+        """Return a fit with one effect more, from its values, with the base's columns without it.
+
+        Set-up and tolerances follow it; nearly as far as a whole fit, and far quicker.
+
+        Raises
+        ------
+        WristError
+            If its law finds no equilibrium.
+        """
+        extras = [*fit.base.beyond().values(), effect]
+        return WristFit(self._fitted(extras, fit.base, quickly=True), self.table)
 
     def added(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
         """Return the best fit with one effect more.
 
         None where its law finds no equilibrium, or its bounds leave nothing of it.
         """
-        point, candidates = self._catalogue(fit)
         name = ranked.trial.name
-        found = self._added(fit, ranked, point, candidates[name])
+        found = self._added(fit, ranked, self._catalogue(fit)[name])
         return found if found is not None and found.change(name).any() else None
 
     def extended(self, fit: WristFit, effect: Effect) -> WristFit:
@@ -182,27 +159,26 @@ class WristProblem:
     def _extend(self, fit: WristFit, effect: Effect) -> WristFit:
         point = self.about(fit)
         if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
-            start = Beyond(fit.base, point).best_multiple(effect)
+            start = best_multiple(fit.base, point, effect)
             return WristFit(
                 self._fitted([*fit.base.beyond().values(), start], fit.base), self.table
             )
         (candidate,) = wrist_candidates(point, [(effect.law, effect.component)])
         (best,) = ranked(evidence(fit.point, self.background), [self._trial(candidate)])
-        found = self._added(fit, best, point, candidate)
+        found = self._added(fit, best, candidate)
         if found is None:
             raise InputError(f"{effect.name}: its law finds no equilibrium in these recordings")
         return found
 
-    def _added(
-        self, fit: WristFit, ranked: Ranked, point: WristPoint, candidate: WristCandidate
-    ) -> WristFit | None:
+    def _added(self, fit: WristFit, ranked: Ranked, candidate: WristCandidate) -> WristFit | None:
+        begun = _begun(candidate, ranked)
         try:
-            own = self._begun(fit, ranked, point, candidate)
-            extras = [*fit.base.beyond().values(), own]
-            found = self._fitted(extras, fit.base)
+            start = (self._nearly(fit, candidate, begun) or fit).base
+            extras = list({begun.name: begun, **start.beyond()}.values())
+            found = self._fitted(extras, start)
             if found.variance > LEAVES_MUCH and found.cost < HELPS * fit.base.cost:
                 found = min(found, self._fitted(extras, None), key=_cost)
-                if has_walls(own):
+                if has_walls(begun):
                     found = min(found, self._gradual(extras, fit.base), key=_cost)
         except WristError:
             return None
@@ -213,23 +189,23 @@ class WristProblem:
         others = [each for own, each in fit.base.beyond().items() if own != name]
         return WristFit(self._fitted(others, fit.base), self.table)
 
-    def _fitted(self, extras: Sequence[Effect], start: BaseFit | None) -> BaseFit:
-        return fit_base(self._model, self._sessions, extras, start, base=self._base)
+    def _fitted(
+        self, extras: Sequence[Effect], start: BaseFit | None, quickly: bool = False
+    ) -> BaseFit:
+        own = self._model, self._sessions, extras, start
+        return fit_base(*own, base=self._base, quickly=quickly)
 
     def _gradual(self, extras: Sequence[Effect], start: BaseFit) -> BaseFit:
         own = self._model, self._sessions, extras, start, True
         return fit_base(*own, walls="rounded first", base=self._base)
 
-    def _catalogue(self, fit: WristFit) -> tuple[WristPoint, dict[str, WristCandidate]]:
-        known = self._asked.get(id(fit.base))
-        if known is None or known[0] is not fit.base:
-            point = self.about(fit)
+    def _catalogue(self, fit: WristFit) -> dict[str, WristCandidate]:
+        if self._asked is None or self._asked[0] is not fit.base:
             absent = {each.name for each in self._model.effects} | set(fit.names)
-            found = {each.name: each for each in wrist_candidates(point, searched(absent))}
-            self._asked = {id(fit.base): (fit.base, point, found)}
-            self._starts = {}
-            known = self._asked[id(fit.base)]
-        return known[1], known[2]
+            found = wrist_candidates(self.about(fit), searched(absent))
+            self._asked = fit.base, {each.name: each for each in found}
+            self._near = {}
+        return self._asked[1]
 
     def about(self, fit: WristFit) -> WristPoint:
         """Return where candidates are asked: beside all but play, of which the whole fit knows.
@@ -250,14 +226,11 @@ def _cost(fitted: BaseFit) -> float:
     return fitted.cost
 
 
-def _tangents(at: WristPoint, effect: Effect, asked: Sequence[Parameter]) -> tuple[Array, Array]:
-    """Return what an effect changes (u, 6), and that by a typical step of each parameter."""
-    values = {key: each.value for key, each in effect.estimates.items()}
-    trials, steps = [values], []
-    for p in asked:
-        step = SMALL * p.scale if values[p.key] + SMALL * p.scale <= p.upper else -SMALL * p.scale
-        trials.append(values | {p.key: values[p.key] + step})
-        steps.append(step / p.scale)
-    found = at.changes([(effect.law, effect.component, each) for each in trials])
-    slopes = (found[1:] - found[0]) / np.array(steps)[:, None, None]
-    return found[0], np.moveaxis(slopes, 0, -1)
+def _begun(candidate: WristCandidate, ranked: Ranked) -> Effect:
+    """Return an effect with the values with which a fit begins."""
+    factors = [each.factor.name for each in candidate.recipe.columns(ranked.shape)]
+    values = (ranked.z * candidate.usual).tolist()
+    own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
+    if has_walls(own):
+        own = own.with_values({p.key: p.mean or p.scale for p in own.parameters})
+    return own

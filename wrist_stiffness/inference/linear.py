@@ -192,7 +192,7 @@ class LinearProblem:
         """Return the candidates that are not in a set."""
         return [each for each in self._trials if each.name not in fit.terms]
 
-    def tangent(self, fit: LinearFit, ranked: Ranked) -> None:
+    def nearly(self, fit: LinearFit, ranked: Ranked) -> None:
         """Return nothing: a whole fit costs no more."""
 
     def giving(self, fit: LinearFit) -> tuple[()]:

@@ -222,7 +222,6 @@ class Point:
         z: Array,
         varied: Array,
         inexactness: float,
-        sizing: NDArray[np.bool_] | None = None,
     ) -> Point:
         """Return the point with one effect more, everything followed to first order.
 
@@ -240,11 +239,8 @@ class Point:
             What it would add if its size changed with the conditions by its own size.
         inexactness : float
             Share of that by which its law may be wrong.
-        sizing : (k,) bool, optional
-            Which of its unknowns say how large it is; by default all.
         """
         places = np.arange(len(self.z), len(self.z) + len(z))
-        sized = places if sizing is None else places[sizing]
         return replace(
             self,
             left=left,
@@ -254,7 +250,6 @@ class Point:
             effects={**self.effects, name: places},
             inexact=np.hstack([self.inexact, inexactness * varied]),
             varied={**self.varied, name: varied},
-            sizing={**self.sizing, name: sized},
             linear=True,
             _beside={},
         )

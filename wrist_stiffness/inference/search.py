@@ -2,7 +2,7 @@
 
 A set is fitted whole, with everything that belongs to set-up and tolerances, and judged by its
 evidence.  Effects are added, dropped and swapped; every set that was fitted stays and counts in the
-answer.  Which of the candidates are worth a fit, their slopes tell to first order.
+answer.  Which of the candidates are worth a fit, their slopes tell, and then a quick one.
 """
 
 from __future__ import annotations
@@ -29,11 +29,6 @@ MOST_EFFECTS = 3
 """Effects of a set: more are hardly told apart in one recording.  If all of n more are in the
 catalogue, the largest takes an nth of the error, or brings an nth of the log evidence that is to be
 had; where the best candidate does neither, the search does not go on beside it."""
-
-UNLIKE = 2.0
-"""Times by which a whole fit may reach further beyond its first order than another one of its law.
-Where an effect strains the base until flanges close, first orders say little: rivals that explain
-as much as the best one fell short of it by 1.1 times its reach (fresh cases 34 and 57)."""
 
 PRICE_OF_GIVING = float(np.log(len(WAYS) / GIVES))
 """Log prior odds against a law that gives in one way."""
@@ -123,8 +118,8 @@ class Problem(Protocol):
     def trials(self, fit: Any) -> Sequence[Trial]:
         """Return the candidates about a fit."""
 
-    def tangent(self, fit: Any, ranked: Ranked) -> Point | None:
-        """Return the fit with one effect more to first order; None where only a fit can tell."""
+    def nearly(self, fit: Any, ranked: Ranked) -> Any | None:
+        """Return nearly the best fit with one effect more; None where only a whole fit can tell."""
 
     def giving(self, fit: Any) -> Sequence[tuple[Array, Any]]:
         """Return the fits in which one more law gives, with the column (N,) which that adds."""
@@ -292,9 +287,8 @@ class Search:
             for log, each in self._nearest(state, candidates):
                 name, law = each.trial.name, each.trial.law
                 logs[name] = log
-                # Whole fits may reach further than their first order, those of a law most alike.
-                known = [each for each in reach.values() if each < np.inf]
-                further = max([UNLIKE * reach.get(law, 0.0), *known])
+                # As far as others did, its whole fit may reach further.
+                further = max((each for each in reach.values() if each < np.inf), default=0.0)
                 if log + further < best - NEGLIGIBLE:
                     continue
                 if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
@@ -312,8 +306,7 @@ class Search:
                 found.append(self._known(fit, state))
                 logs[name] = found[-1].evidence.log
                 best = max(best, logs[name])
-                beyond_slopes = logs[name] - log if log < np.inf else np.inf
-                reach[law] = max(reach.get(law, 0.0), beyond_slopes)
+                reach[law] = max(reach.get(law, 0.0), logs[name] - log if log < np.inf else np.inf)
 
         ask(leaders)
         if all(each.rough for each in found):
@@ -322,7 +315,7 @@ class Search:
             leading = max(found, key=lambda each: each.evidence.log)
             (name,) = leading.names - state.names
             law = name.partition("@")[0]
-            # Where first orders tell, the leaders hold what comes near; of walls they tell nothing.
+            # Where slopes tell, the leaders hold what comes near; of walls they tell nothing.
             if reach.get(law, 0.0) > NEGLIGIBLE:
                 ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
         return found
@@ -339,22 +332,16 @@ class Search:
             self.promised[each.trial.name] = max(known, each.gain)
 
     def _nearest(self, state: State, chosen: Sequence[Ranked]) -> list[tuple[float, Ranked]]:
-        """Return candidates with their evidence to first order, largest first.
-
-        Everything follows them, amplitudes included; infinite where only a whole fit can tell.
-        """
+        """Return candidates with about their evidence, largest first; infinite where open."""
         found: list[tuple[float, Ranked]] = []
         for each in chosen:
             if time.monotonic() > self._end:
                 self.in_time = False
                 break
-            point = self._problem.tangent(state.fit, each)
+            near = self._problem.nearly(state.fit, each)
             log = np.inf
-            if point is not None:
-                log = evidence(point, self._problem.background, state.evidence).log
-                log -= _of_shape(each.shape, point)
-                # Beside flanges that a strained base closed either may fall short.
-                log = max(log, each.log)
+            if near is not None:
+                log = evidence(near.point, self._problem.background, state.evidence).log
                 if not state.names:
                     self.promised[each.trial.name] = log - state.evidence.log
             found.append((log, each))

@@ -94,8 +94,6 @@ class Recipe:
     start : callable
         (factors by name, shape) -> values of the law's parameters with which a fit may begin; they
         may be out of bounds.
-    idle : tuple of str
-        Parameters that do nothing here.
     carried : Carried, optional
         Another way to the same columns.
     """
@@ -103,7 +101,6 @@ class Recipe:
     shape: tuple[ShapeGrid, ...]
     columns: Callable[[Shape], tuple[Column, ...]]
     start: Callable[[Mapping[str, float], Shape], Values]
-    idle: tuple[str, ...] = ()
     carried: Carried | None = None
 
     @property
@@ -117,21 +114,17 @@ def factor(parameter: Parameter) -> Factor:
     return Factor(parameter.key, parameter.lower, parameter.upper, parameter.scale)
 
 
-def tangents(
-    parameters: Sequence[Parameter], idle: Collection[str] = (), held: Collection[str] = ()
-) -> Recipe:
+def tangents(parameters: Sequence[Parameter], held: Collection[str] = ()) -> Recipe:
     """Return the recipe of a law that is linear in all parameters without a grid.
 
     Parameters
     ----------
     parameters : sequence of Parameter
         Of the law at a place.
-    idle : collection of str
-        Those that do nothing there; they stay zero.
     held : collection of str
-        Those that are left to a fit of the law itself, which begins with zero.
+        Those that do nothing there, or are left to a fit of the law itself, which begins with zero.
     """
-    active = [each for each in parameters if each.key not in {*idle, *held}]
+    active = [each for each in parameters if each.key not in held]
     gridded = [each for each in active if each.grid]
     other = [each for each in active if not each.grid]
     nothing = {each.key: 0.0 for each in parameters}
@@ -149,7 +142,7 @@ def tangents(
         return still(at) | {each.key: found[each.key] for each in other}
 
     shape = tuple(ShapeGrid(each.key, each.grid) for each in gridded)
-    return Recipe(shape, columns, start, tuple(p.key for p in parameters if p.key in idle))
+    return Recipe(shape, columns, start)
 
 
 def at_usual_size(parameter: Parameter, size: float) -> Recipe:
