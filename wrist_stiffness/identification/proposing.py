@@ -249,15 +249,14 @@ class _Search:
         bare = fit.without_numbers(effect.name)
         change = np.einsum("i,iua->ua", z, self.library.moved(law, parts))
         bare = replace(bare, left=bare.left + self._table.whiten(change))
-        found = self._judged(law, first.price, parts, bare, state)
-        here = replace(found.state, point=bare)
+        here = replace(first.state, point=bare)
 
         def gain(row: Array) -> tuple[float, Array]:
             moved = parts * row[None, :, None]
             return here.gains([-self._table.whiten(np.moveaxis(moved, 0, -1))])[0]
 
-        refined = self._judged(*self.library.refined(law, gain), parts, bare, found.state)
-        return max((first, found, refined), key=_log)
+        refined = self._judged(*self.library.refined(law, gain), parts, bare, first.state)
+        return max(first, refined, key=_log)
 
     def _judged(
         self, law: Asked, price: float, parts: Array, point: Point, state: Evidence

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +26,9 @@ AMPLITUDES = np.geomspace(0.02, 1e4, 60)
 
 MOST_STEPS, ENOUGH = 15, 0.1
 """Steps of the search for the amplitudes, and the gain of log evidence below which it ends."""
+
+FURTHEST, MOST_HALVINGS = 1.5, 5
+"""Longest step of the logarithm of an amplitude, and how often one that gains nothing is halved."""
 
 LOG_EXCESS = np.linspace(-0.7, 16.0, 1600)
 """Logarithms of the excess among which the best is sought."""
@@ -61,7 +64,16 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
 def settled(at: Evidence) -> Evidence:
     """Return a set at the best amplitudes of the groups that are there."""
     for _ in range(MOST_STEPS):
-        trial = _improved(at)
+        step, excess = _step(at), _excess_beside(at)
+        for halvings in range(MOST_HALVINGS):
+            share = 0.5**halvings
+            trial = replace(
+                at,
+                amplitude=np.maximum(at.amplitude * np.exp(share * step), OFF),
+                excess=at.excess * (excess / at.excess) ** share,
+            )
+            if trial.log > at.log:
+                break
         gained = trial.log - at.log
         at = trial if gained > 0.0 else at
         if gained < ENOUGH:
@@ -134,34 +146,35 @@ def _pruned(at: Evidence) -> Evidence:
     return at
 
 
-def _improved(at: Evidence) -> Evidence:
-    """Return fixed points of the evidence's slope, one step on (MacKay 1992)."""
-    ground = at.background
+def _step(at: Evidence) -> Array:
+    """Return the step of the logarithms of the amplitudes, (g,) within what a step may reach.
+
+    By the average of observed and expected information (Gilmour, Thompson and Cullis 1995).
+    """
+    ground, size = at.background, at.amplitude
     second = at.unnamed**2 + at.variances[len(at.variances) - len(ground.group) :]
-    squares = np.bincount(ground.group, second, minlength=len(ground.groups))
-    amplitude = [
-        _amplitude(float(square), int(count), group)
-        for square, count, group in zip(squares, ground.sizes, ground.groups, strict=True)
-    ]
+    squares = np.bincount(ground.group, second, minlength=len(size))
+    slope, curvature = _priors(size, ground.groups)
+    information = at.average_information + np.diag(curvature)
+    step = np.linalg.lstsq(information, squares / size**2 - ground.sizes - slope, rcond=1e-12)[0]
+    return np.clip(step, -FURTHEST, FURTHEST)
+
+
+def _priors(size: Array, groups: Sequence[Group]) -> tuple[Array, Array]:
+    """Return slope and curvature of minus the log prior over the logarithm of each amplitude."""
+    known = np.array([each.expected or np.nan for each in groups])
+    width = np.array([each.width for each in groups])
+    # A half-Cauchy density of scale 1 where no size is expected.
+    cauchy = (size**2 - 1.0) / (size**2 + 1.0), 4.0 * size**2 / (size**2 + 1.0) ** 2
+    slope = np.where(np.isnan(known), cauchy[0], np.log(size / known) / width**2)
+    return slope, np.where(np.isnan(known), cauchy[1], 1.0 / width**2)
+
+
+def _excess_beside(at: Evidence) -> float:
+    """Return the best excess for what is left, all else held (expectation maximisation)."""
     # Of the products times the covariance, the inverse of products over excess plus precision.
     trace = at.excess * float(np.sum(1.0 - at.precision * at.variances))
-    excess = _excess(at.square + trace, at.point.count, ground.noise_width)
-    return replace(at, amplitude=np.array(amplitude), excess=excess)
-
-
-def _amplitude(square: float, count: int, group: Group) -> float:
-    size = float(np.sqrt(square / count))
-    for _ in range(5):
-        if group.expected:
-            slope = float(np.log(size / group.expected)) / group.width**2
-        else:
-            # Of the logarithm of a half-Cauchy density of scale 1 over the logarithm of the size.
-            slope = (size**2 - 1.0) / (size**2 + 1.0)
-        size = float(np.sqrt(square / max(count + slope, 0.3 * count)))
-    return max(size, OFF)
-
-
-def _excess(square: float, count: int, width: float) -> float:
+    square, width = at.square + trace, at.background.noise_width
     grid = np.exp(LOG_EXCESS)
-    log = -0.5 * (count * LOG_EXCESS + square / grid) + log_excess(grid, width)
+    log = -0.5 * (at.point.count * LOG_EXCESS + square / grid) + log_excess(grid, width)
     return float(grid[np.argmax(log)])

@@ -229,6 +229,18 @@ class Evidence:
         return np.asarray(np.sum(np.tril(inverse) ** 2, axis=0) * scale**2)
 
     @cached_property
+    def average_information(self) -> Array:
+        """Average of observed and expected information of the logarithms of amplitudes, (g, g)."""
+        gram, ground, (factor, scale, _, _) = self._known[0], self.background, self._solved
+        values = np.zeros((len(gram), len(ground.groups)))
+        own = len(gram) - len(ground.group)
+        values[np.arange(own, len(gram)), ground.group] = self.unnamed
+        products = gram @ values
+        beside = solve_triangular(factor, scale[:, None] * products, lower=True, check_finite=False)
+        squares = values.T @ products - beside.T @ beside / self.excess
+        return np.asarray(2.0 * squares / self.excess)
+
+    @cached_property
     def square(self) -> float:
         """Sum of squares of what is left when everything is explained."""
         gram, target, own = self._known
