@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
-from wrist_stiffness.identification import wrist_diagnosis, wrist_problem
+from wrist_stiffness.identification import wrist_problem
 from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.proposal import twins
 from wrist_stiffness.identification.proposing import propose
@@ -192,21 +192,3 @@ def test_what_comes_with_time_is_not_put_down_to_a_thermometer_that_hardly_moved
     )
     found = proposed(model, session)
     assert not any("T_" in name for law in found.terms for name in law.form.of)
-
-
-def test_a_name_that_laws_do_not_need_is_not_handed_over(model, day, monkeypatch):
-    asked = [(find_law("encoder_eccentricity"), place) for place in ("motor_1", "motor_2")]
-    asked.append((find_law("cable_wrench"), "platform"))
-    monkeypatch.setattr(
-        wrist_problem,
-        "searched",
-        lambda absent: [each for each in asked if f"{each[0].id}@{each[1]}" not in absent],
-    )
-    text = "lift_um * exp(-((turn_3 - 0.1) ** 2) / 0.005)"
-    session = planted(model, day, "joint_3", [0, 0.8, 0.6, 0, 0, 0], text, lift_um=20.0)
-    # So low a probability names whatever looks a little like it, if held-out units may not object.
-    monkeypatch.setattr(wrist_diagnosis, "refuted", lambda before, after: False)
-    found = diagnose_sessions(model, [session], naming=0.01)
-    assert found.diagnosis.verdict == "unknown"
-    assert "is not needed beside the proposed law" in [e.why_not for e in found.diagnosis.standings]
-    assert found.proposals.terms[0].form.name == "a spot of turn_3"

@@ -12,16 +12,14 @@ from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_clean
 from wrist_stiffness.identification.candidates import compensable, turns_normal
 from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.problem import require_units
-from wrist_stiffness.identification.proposal import Proposal, Proposals
+from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.strained import Strain, strain
 from wrist_stiffness.identification.taken_up import TakenUp, taken_up
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import (
-    GROWS,
     NAMING,
-    NEEDLESS,
     Class,
     Diagnosis,
     Finding,
@@ -161,15 +159,6 @@ def diagnose_sessions(
     proposals = None
     if search.in_time and (reading.verdict == "unknown" or reading.depends_on):
         proposals = propose(problem, reading.state.fit, naming, tell)
-        if reading.named and proposals.terms:
-            tell("asking whether laws alone explain it")
-            alone = _settled(reading.refute(search.base, NEEDLESS))
-            instead = propose(problem, alone.state.fit, naming, tell)
-            # Of as many parts: two laws, or what is named and one.
-            if _with_laws(search, alone, instead.terms) > _with_laws(
-                search, reading, proposals.terms[:1]
-            ):
-                reading, proposals = judge.unnamed(alone), instead
     state = reading.state
     absorbed = taken_up(state.fit.base, [session.name for session in sessions])
     findings = [_finding(search, each, reading, judge) for each in reading.named]
@@ -213,12 +202,6 @@ def diagnose_sessions(
     )
 
 
-def _with_laws(search: Search, reading: Reading, laws: Sequence[Proposal]) -> float:
-    """Return the log evidence of what a reading names and of laws beside it."""
-    found = search.log_of(reading.state.fit, reading.state.evidence)
-    return found + sum(each.log_gain for each in laws)
-
-
 def _settled(reading: Reading) -> Reading:
     """Return a reading with its set as it is handed over."""
     found = reading.state.fit.settled()
@@ -259,12 +242,8 @@ class _Judged:
         """Return a reading without what the held-out part speaks against: it is not handed over."""
         if not reading.named or not refuted(self.stages[0], self.stages[-1]):
             return reading
-        return self.unnamed(reading.refute(search.base, GROWS))
-
-    def unnamed(self, reading: Reading) -> Reading:
-        """Return a reading without names; the answer is the nominal model."""
         self.stages = self.stages[:1]
-        return reading
+        return reading.refute(search.base)
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
         """Return what is left without one of the effects."""

@@ -30,8 +30,7 @@ CHANCE = 1.0
 """Gain of log evidence below which a candidate explains no more than chance would (assumed)."""
 
 GROWS = "makes the held-out error grow"
-NEEDLESS = "is not needed beside the proposed law"
-"""Why something is not named that the evidence of the catalogue alone speaks for."""
+"""Why something is not named that only held-out units speak against."""
 
 AS_MUCH = "explains as much, with less usual values"
 """Why something is not named that only what is usual speaks against."""
@@ -122,9 +121,7 @@ class Reading:
     unexplained : float
         Share of what the nominal model left above the noise that is left, in [0, 1].
     refuted : tuple of Class
-        What would be named, if something else did not speak against it.
-    against : str
-        What that is.
+        What would be named, if the held-out error did not grow by it.
     """
 
     state: State
@@ -135,10 +132,9 @@ class Reading:
     depends_on: Mapping[str, float]
     unexplained: float
     refuted: tuple[Class, ...] = ()
-    against: str = ""
 
-    def refute(self, nominal: State, against: str) -> Reading:
-        """Return the same without what is named, and why."""
+    def refute(self, nominal: State) -> Reading:
+        """Return the same without what is named, because the held-out error grows by it."""
         unknown = replace(self, state=nominal, named=(), verdict="unknown", unexplained=1.0)
         doubt = 1.0 - stands_in(1.0)
         doubted = {
@@ -148,7 +144,7 @@ class Reading:
             for each in self.named
         }
         classes = tuple(doubted.get(each.name, each) for each in self.classes)
-        return replace(unknown, classes=classes, refuted=tuple(doubted.values()), against=against)
+        return replace(unknown, classes=classes, refuted=tuple(doubted.values()))
 
 
 def probabilities(search: Search) -> dict[Names, float]:
@@ -291,7 +287,7 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
         if why and name in alike:
             why = AS_MUCH
         if name in refuted:
-            why = reading.against
+            why = GROWS
         if name not in fitted and gain >= CHANCE and not search.in_time:
             why = "was not fitted: the time was over"
         found.append(Standing(name, probability, gain, name in fitted, why))

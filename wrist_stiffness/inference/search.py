@@ -365,17 +365,14 @@ class Search:
     def _known(self, fit: Any, near: State | None) -> State:
         found = evidence(fit.point, self._problem.background, near.evidence if near else None)
         fit, found = self._giving(fit, found)
-        new = State(fit, found, self.log_of(fit, found))
+        log = found.log - self.price * len(fit.names) - PRICE_OF_GIVING * len(found.point.gives)
+        new = State(fit, found, log)
         known = self.states.get(new.names)
         if known is None or known.log < new.log:
             self.states[new.names] = new
             if not new.names:
                 self.base = new
         return self.states[new.names]
-
-    def log_of(self, fit: Fit, found: Evidence) -> float:
-        """Return the log evidence of a fitted set with the log prior of its effects."""
-        return found.log - self.price * len(fit.names) - PRICE_OF_GIVING * len(found.point.gives)
 
     def _giving(self, fit: Any, found: Evidence) -> tuple[Any, Evidence]:
         """Let laws give, one way after the other, for as long as that pays."""

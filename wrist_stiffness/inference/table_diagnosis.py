@@ -11,7 +11,6 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import (
-    GROWS,
     NAMING,
     Class,
     Diagnosis,
@@ -136,7 +135,7 @@ def diagnose(
     refused = bool(reading.named) and refuted(before, after)
     if refused:
         after = before
-        reading = reading.refute(search.base, GROWS)
+        reading = reading.refute(search.base)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
     answer = Diagnosis(
