@@ -80,31 +80,11 @@ def export_csv(
     to the bit.  Nothing is taken for an outlier and no clock is put right.  Where poses are far
     apart, rows without a measured value tell the way that friction and play remember.
 
-    Parameters
-    ----------
-    recording : path
-        rosbag2 folder with MCAP storage, or `.mcap` file.
-    table : Table
-        Of the wrist: turns loads that are measured on the platform into F, and knows how small a
-        swing of a motor is the chatter of a count.
-    remaps : mapping, optional
-        Actual by standard topic name.
-    settings : StreamSettings, optional
-        Joint names, sensor frames and age limit of loads.
-    progress : callable
-        Told rows done and in all.
-
-    Returns
-    -------
-    Exported
-        Counts.
-
-    Raises
-    ------
-    InputError
-        If the output exists, is no table, or cannot be written.
-    WristError
-        If the recording cannot be read, lacks a topic or has a frame that is not known.
+    `table`: of the wrist: turns loads that are measured on the platform into F, and knows how small
+    a swing of a motor is the chatter of a count; `remaps`: actual by standard topic name;
+    `settings`: joint names, sensor frames and age limit of loads; `progress`: told rows done and in
+    all.  Raises `InputError` if the output exists, is no table, or cannot be written; `WristError`
+    if the recording cannot be read, lacks a topic or has a frame that is not known.
     """
     settings = settings or StreamSettings()
     output = Path(output)

@@ -108,29 +108,11 @@ def replay(
 ) -> ReplaySummary:
     """Write a recording again with predicted errors and corrected commands added.
 
-    Parameters
-    ----------
-    recording : path
-        Folder or `.mcap` file.
-    output : path
-        Folder or `.mcap` file to write: the input, plus the outputs that the nodes would have sent.
-    settings : (StreamSettings, StreamSettings), optional
-        As the nodes'; the defaults if None.
-    topics : mapping, optional
-        Actual by standard topic name.
-    progress : callable
-        Called with messages done and in all.
-
-    Returns
-    -------
-    ReplaySummary
-        Counts and reasons.
-
-    Raises
-    ------
-    WristError
-        If the model or the recording cannot be used, or no joint state at all can be predicted;
-        then nothing is written.
+    `recording`, `output`: folders or `.mcap` files; the output holds the input and what the nodes
+    would have sent; `settings`: of predictor and corrector, as the nodes'; the defaults if None;
+    `topics`: actual by standard topic name; `progress`: called with messages done and in all.
+    Raises `WristError` if the model or the recording cannot be used, or no joint state at all can
+    be predicted; then nothing is written.
     """
     prediction, correction = settings or node_settings(None)
     error_model = load_model(model)

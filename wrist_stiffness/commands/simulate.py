@@ -61,25 +61,11 @@ def simulate_recording(
 ) -> Simulated:
     """Let the virtual cell work and record it.
 
-    Parameters
-    ----------
-    path : path
-        rosbag2 folder, or file where it ends in `.mcap`.
-    settings : CellSettings
-        Program, rate, sensors; sessions are days.
-    seconds : float
-        Duration [s].
-    seed : int
-        Of all noise; the same seed gives the same bytes.
-    progress : callable, optional
-        Is told samples done and samples in all.
-
-    Raises
-    ------
-    InputError
-        If duration or rate are out of bounds or the seed is negative.
-    RecordingError
-        If the recording exists or cannot be written.
+    `path`: rosbag2 folder, or file where it ends in `.mcap`; `settings`: program, rate, sensors;
+    sessions are days; `seconds`: duration [s]; `seed`: of all noise; the same seed gives the same
+    bytes; `progress`: told samples done and in all.  Raises `InputError` if duration or rate are
+    out of bounds or the seed is negative; `RecordingError` if the recording exists or cannot be
+    written.
     """
     check_bounds(seconds, settings.rate_hz, seed)
     cell = VirtualCell(table, settings, np.random.default_rng(seed))

@@ -42,27 +42,12 @@ def build(
 
     Condensed parts are kept beside the table until it is written.
 
-    Parameters
-    ----------
-    output : path
-        Table file to write, `.npz`.
-    evaluation : str
-        What the nodes shall use, `closed_form` or `spline`.
-    interface : str
-        `rigid`, `distributing` or `sliding` walls.
-    tolerance : float
-        Relative error of s and phi that mesh, contact rings and grid are refined to.
-    per_axis : int or None
-        Fixed grid, 5 for the paper's 25 poses; None refines it too.
-    progress : callable
-        Called with steps done and in all.
-
-    Raises
-    ------
-    WristError
-        If the geometry is wrong, the tolerance is not met or the file cannot be written.
-    KeyboardInterrupt
-        Says what is kept.
+    `output`: table file, `.npz`; `evaluation`: what the nodes shall use, `closed_form` or `spline`;
+    `interface`: `rigid`, `distributing` or `sliding` walls; `tolerance`: relative error of s and
+    phi that mesh, contact rings and grid are refined to; `per_axis`: fixed grid, 5 for the paper's
+    25 poses; None refines it too; `progress`: called with steps done and in all.  Raises
+    `WristError` if the geometry is wrong, the tolerance is not met or the file cannot be written;
+    `KeyboardInterrupt` that says what is kept.
     """
     from wrist_stiffness.fem.condensed_store import CondensedStore
     from wrist_stiffness.fem.sweep import BuildSettings, build_table

@@ -81,32 +81,12 @@ def plan(
     earlier: Sequence[Experiment] = (),
     progress: Progress | None = None,
 ) -> Plan:
-    """Plan an experiment.
+    """Plan an experiment that is not longer than asked for.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        What is known of the wrist.
-    question : Question
-        What is asked.
-    conditions : Conditions
-        Loads, durations, noise.
-    earlier : sequence of Experiment
-        What was measured on this wrist before, each with instruments set up anew.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    Plan
-        Not longer than asked for.
-
-    Raises
-    ------
-    InputError
-        If not even the fixed part fits into the duration.
-    LoadRangeError
-        If a load cannot be applied within the table's range.
+    `model`: what is known of the wrist; `conditions`: loads, durations, noise; `earlier`: what was
+    measured on this wrist before, each with instruments set up anew; `progress`: called with (done,
+    total).  Raises `InputError` if not even the fixed part fits into the duration; `LoadRangeError`
+    if a load cannot be applied within the table's range.
     """
     rng = np.random.default_rng(conditions.seed)
     whole = question.goals is None

@@ -33,25 +33,11 @@ def picture_folder(folder: str | Path) -> Path:
 def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> list[Path]:
     """Draw what a load does (maps, shares, the bent wrist), and what its prediction errs by.
 
-    Parameters
-    ----------
-    folder : path
-        Where the PNG files go; made if missing.
-    push : Push, optional
-        The load; the rated one if None, for which the maps are the table's splines of s and phi
-        (the paper's Figs. 5 and 6), else the closed form.
-
-    Returns
-    -------
-    list of Path
-        `map_s.png`, `map_phi.png`, `budget.png`, `bent.png` and `uncertainty.png`.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made.
-    LoadRangeError
-        If the load is outside the table's range.
+    `folder`: where the PNG files go; made if missing; `push`: the load; the rated one if None, for
+    which the maps are the table's splines of s and phi (the paper's Figs. 5 and 6), else the closed
+    form.  Gives `map_s.png`, `map_phi.png`, `budget.png`, `bent.png` and `uncertainty.png`.  Raises
+    `InputError` if the folder cannot be made; `LoadRangeError` if the load is outside the table's
+    range.
     """
     folder = picture_folder(folder)
     load = push or Push.rated(table)

@@ -53,28 +53,13 @@ class PoseTrack:
 
 
 def pose_track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
-    """Return the measured poses of a recording.
+    """Return the measured poses of a recording in the order of their stamps.
 
-    Parameters
-    ----------
-    samples : Samples
-        With poses or markers; poses are used where there are both.
-    markers : (k, 3) float
-        Nominal places of the markers in U [m].
-    frames : Frames
-        Sensor frames that are mapped to `wrist_base`.
-
-    Returns
-    -------
-    PoseTrack
-        In the order of their stamps.
-
-    Raises
-    ------
-    FrameError
-        If they are in a frame that is neither `wrist_base` nor mapped to it nor `instrument`.
-    InputError
-        If the markers are not those of the geometry or too few of them were ever seen.
+    `samples`: with poses or markers; poses are used where there are both; `markers` (k, 3): nominal
+    places of the markers in U [m]; `frames`: sensor frames that are mapped to `wrist_base`.  Raises
+    `FrameError` if poses are in a frame that is neither `wrist_base` nor mapped to it nor
+    `instrument`; `InputError` if the markers are not those of the geometry or too few of them were
+    ever seen.
     """
     measured = [each for each in (samples.poses, samples.markers) if len(each.time_ns)]
     unplaced = INSTRUMENT_FRAME in measured[0].frame_id

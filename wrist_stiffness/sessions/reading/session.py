@@ -86,36 +86,19 @@ def read_session(
 ) -> MeasuredSession:
     """Read a recording with measured poses.
 
-    Parameters
-    ----------
-    path : path
-        rosbag2 folder with MCAP storage, or `.mcap` file.
-    table : Table
-        Of the wrist: its rigid kinematics, and its readout points as the nominal markers.
-    remaps : mapping, optional
-        Actual by standard topic name.
-    joints : sequence of str
-        Joint names of motor 1 and 2.
-    frames : Frames, optional
-        Sensor frames of loads, poses and markers, beside `wrist_base`, `wrist_platform` and those
-        on the recording's `/tf_static`.
-    load_age_limit_s : float
-        Oldest load that still belongs to a measured pose [s].
+    `path`: rosbag2 folder with MCAP storage, or `.mcap` file; `table`: of the wrist: its rigid
+    kinematics, and its readout points as the nominal markers; `remaps`: actual by standard topic
+    name; `joints`: names of motor 1 and 2; `frames`: sensor frames of loads, poses and markers,
+    beside `wrist_base`, `wrist_platform` and those on the recording's `/tf_static`;
+    `load_age_limit_s`: oldest load that still belongs to a measured pose [s].
 
-    Returns
-    -------
-    MeasuredSession
-        Named after the recording, with remarks on everything that could not be used.  Where poses
-        are far apart, rows without a measurement tell where angles and load turned back in between.
+    The session is named after the recording, with remarks on everything that could not be used.
+    Where poses are far apart, rows without a measurement tell where angles and load turned back in
+    between.
 
-    Raises
-    ------
-    RecordingError
-        If the recording cannot be read, lacks a topic, or its clocks do not overlap.
-    FrameError
-        If loads or poses are in an unknown frame.
-    InputError
-        If too few poses are left, or they are those of another wrist.
+    Raises `RecordingError` if the recording cannot be read, lacks a topic, or its clocks do not
+    overlap; `FrameError` if loads or poses are in an unknown frame; `InputError` if too few poses
+    are left, or they are those of another wrist.
     """
     recording = open_recording(path)
     samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
