@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.sessions.reading.held_angles import without_held
+from wrist_stiffness.sessions.reading.joint_states import without_held
 from wrist_stiffness.sessions.reading.signals import Signal
 
 COUNT = np.radians(0.015)

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.recording.messages import Header, Pose, PoseStamped
-from wrist_stiffness.sessions.reading.instrument import Registration
+from wrist_stiffness.sessions.reading.registration import Registration
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.topics import INSTRUMENT_FRAME
 

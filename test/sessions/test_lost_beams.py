@@ -5,12 +5,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.simulate import simulate_recording
+from wrist_stiffness.sessions.in_pieces import rigid_rotation
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
 from wrist_stiffness.sessions.reading.pose_track import PoseTrack
 from wrist_stiffness.sessions.reading.session import read_session, session_of
 from wrist_stiffness.sessions.reading.signals import Signal
-from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 

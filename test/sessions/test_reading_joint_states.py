@@ -212,9 +212,10 @@ def test_a_motor_that_moves_into_a_long_pause_has_no_angles_in_it():
         theta = np.radians(speed) * np.stack([way, way], axis=1)
         time_ns = np.round(1e9 * time).astype(np.int64)
         still = Signal(time_ns, np.zeros((len(time), 6)))
-        machine = MachineSignals(Signal(time_ns, theta), None, still, False, {}, {})
+        signals = Signal(time_ns, theta), None, still, False, {}, {}
+        machine = MachineSignals(*signals, load_age_limit_s=100.0)
         poses = np.round(1e9 * (9.99 + np.array([0.1, 0.2, 0.3, 0.45]))).astype(np.int64)
-        assert (machine.usable(poses, 100.0)[0] == known).all()
+        assert (machine.usable(poses)[0] == known).all()
 
 
 def test_speeds_of_repeated_angles_are_taken_when_they_were_read(tmp_path, campaign, table):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.sessions.reading.spikes import spikes
+from wrist_stiffness.sessions.reading.lost_beams import spikes
 
 LEAST = 1e-6
 STILL = np.zeros(500)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.sessions.in_pieces import rigid_rotation
 from wrist_stiffness.sessions.reading.registration import place_left, turn_left
-from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
 
 
 def test_wild_positions_have_no_say_in_where_the_target_is(table):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.sessions.reading.joint_states import fault_of, gains
 from wrist_stiffness.sessions.reading.signals import Signal
-from wrist_stiffness.sessions.reading.told_speeds import fault_of, gains
 
 COUNT = np.radians(8e-3)
 

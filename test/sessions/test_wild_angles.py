@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.sessions.reading.joint_states import without_wild
 from wrist_stiffness.sessions.reading.signals import Signal
-from wrist_stiffness.sessions.reading.wild_angles import without_wild
 
 COUNT = np.radians(0.015)
 

@@ -52,7 +52,7 @@ from wrist_stiffness.sessions.reading.csv_columns import (
 )
 from wrist_stiffness.sessions.reading.gauge_readings import GAUGES
 from wrist_stiffness.sessions.reading.gauges_file import gauge_of, read_gauges
-from wrist_stiffness.sessions.reading.marker_poses import LEAST_MARKERS
+from wrist_stiffness.sessions.reading.pose_track import LEAST_MARKERS
 from wrist_stiffness.topics import BASE_FRAME
 
 NAN = float("nan")
