@@ -284,6 +284,6 @@ def test_time_rises_however_fast_the_motors_are(model, speed_deg_per_s):
     """What is sampled just before an observed moment lies after the one observed before it."""
     pace = Pace(np.radians(speed_deg_per_s), 2.0, True)
     visit = Visit(np.array([0.3, -0.2]), np.array([1.0, 1.0]))
-    timeline = run_through([visit], model.table.workspace, pace, np.zeros(2))
+    timeline = run_through([visit], model.table.workspace, pace)
     assert np.all(np.diff(timeline.block.time) >= 0.0)
     assert timeline.moving.sum() == 3

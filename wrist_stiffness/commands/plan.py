@@ -12,13 +12,12 @@ from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.planning.earlier import as_experiment
 from wrist_stiffness.planning.information import MeasurementNoise
 from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.planning.question import Question, between, commissioning
 from wrist_stiffness.planning.rivals import read_rivals
-from wrist_stiffness.planning.timeline import Pace, Timeline
+from wrist_stiffness.planning.timeline import Pace, Timeline, as_experiment
 from wrist_stiffness.progress import Progress, silent
 
 MDEG = float(np.radians(1e-3))
@@ -108,7 +107,7 @@ def plan_experiment(
     options: Options,
     diagnosis: str | Path | None = None,
     recordings: Recordings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Planned:
     """Plan the first experiment on a wrist, or the next one between rivals.
 

@@ -14,7 +14,7 @@ from wrist_stiffness.commands.cell_messages import CellMessages
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.registry import unknown_effect
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.sessions.refitted import SET_UP
@@ -56,7 +56,7 @@ def simulate_recording(
     settings: CellSettings,
     seconds: float,
     seed: int,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     overwrite: bool = False,
 ) -> Simulated:
     """Let the virtual cell work and record it.
@@ -83,8 +83,7 @@ def simulate_recording(
             block = cell.run(time_s, sent)
             stamps_ns = start_ns + np.round(time_s * 1e9).astype(np.int64)
             messages.write(stamps_ns.tolist(), sent, block, number % thermometer == 0)
-            if progress is not None:
-                progress(int(number[-1]) + 1, total)
+            progress(int(number[-1]) + 1, total)
     return Simulated(Path(path), total, total / settings.rate_hz)
 
 

@@ -7,7 +7,7 @@ computed again on its own path, in its own order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,6 @@ from wrist_stiffness.planning.pool import (
     draw_settings,
     fixed_visits,
     moved_outward,
-    reference_pose,
 )
 from wrist_stiffness.planning.question import Question
 from wrist_stiffness.planning.refit import rivals_alike
@@ -43,7 +42,7 @@ from wrist_stiffness.planning.timeline import (
     Visit,
     run_through,
 )
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 
 LONGEST_S = 3600.0
 """Of a plan between rivals for which no duration is asked [s]."""
@@ -79,7 +78,7 @@ def plan(
     question: Question,
     conditions: Conditions,
     earlier: Sequence[Experiment] = (),
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Plan:
     """Plan an experiment that is not longer than asked for.
 
@@ -100,12 +99,12 @@ def plan(
             "warm-up, reference poses and two long holds take"
         )
     agree = bool(earlier and question.alike)
-    stage = _Stages(progress, 2 + len(earlier) + agree)
+    stages = _stages(progress, 2 + len(earlier) + agree)
     if agree:
-        question = rivals_alike(model, question, earlier, conditions.noise, stage.next())
-    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
+        question = rivals_alike(model, question, earlier, conditions.noise, next(stages))
+    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, next(stages))
     question = question.without(lacking)
-    before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
+    before = [evaluated(model, question, e, conditions.noise, next(stages))[0] for e in earlier]
     own = aims(known, before, question, rng)
     if not own.reachable and not whole:
         return Plan(None, (), own.at_most, lacking, {})
@@ -115,13 +114,14 @@ def plan(
         own.start + pool.fixed_gram(own.pool.grams),
         seconds - shortest.duration_s,
         own.worth,
-        own.settled if conditions.seconds is None else _never,
+        # All the time that is asked for is used.
+        own.settled if conditions.seconds is None else lambda gram: False,
         rng,
         LOOKED_AT if whole else len(pool.cost_s),
         per_second=conditions.seconds is not None,
     )
     visits, timeline = pool.within(seconds, chosen, shortest, rng)
-    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
+    final = evaluated(model, question, timeline, conditions.noise, next(stages))[0]
     gram = own.start + own.truths.of(final.total)
     return Plan(
         timeline,
@@ -132,27 +132,14 @@ def plan(
     )
 
 
-def _never(gram: Array) -> bool:
-    """Tell that no experiment is enough: all the time asked for is used."""
-    return False
+def _stages(progress: Progress, count: int) -> Iterator[Progress]:
+    """Yield the progress of each of several evaluations of about the same length."""
+    for behind in range(count):
 
+        def told(done: int, total: int, behind: int = behind) -> None:
+            progress(behind * total + done, count * total)
 
-class _Stages:
-    """One progress for several evaluations of about the same length."""
-
-    def __init__(self, progress: Progress | None, count: int) -> None:
-        self._progress, self._count, self._begun = progress, count, 0
-
-    def next(self) -> Progress:
-        """Return the progress of the next evaluation."""
-        behind = self._begun
-        self._begun += 1
-
-        def told(done: int, total: int) -> None:
-            if self._progress is not None:
-                self._progress(behind * total + done, self._count * total)
-
-        return told
+        yield told
 
 
 class _Pool:
@@ -172,8 +159,7 @@ class _Pool:
         self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
         self.in_unit = 2 if both_sides else 1
         ordered = [*(self._visits[i] for i in order), *fixed]
-        reference = reference_pose(self._workspace)
-        self.timeline = run_through(ordered, self._workspace, pace, reference)
+        self.timeline = run_through(ordered, self._workspace, pace)
         self._place = np.argsort(order)
         visit_s = np.diff(self.timeline.ends, prepend=0.0)
         self.cost_s = self.by_unit(visit_s)
@@ -221,7 +207,7 @@ def _drawn(
     """Draw settings: both sides of each for a whole wrist, moved outward as well between rivals."""
     workspace, pace = model.table.workspace, conditions.pace
     settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
-    fixed = fixed_visits(settings, pace, workspace)
+    fixed = fixed_visits(settings, pace)
     if not whole:
         settings += [moved_outward(setting, workspace) for setting in settings]
     order = rng.permutation(2 * len(settings))
@@ -233,7 +219,7 @@ def evaluated(
     question: Question,
     experiment: Experiment,
     noise: MeasurementNoise,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> tuple[Information, dict[str, str]]:
     """Return what an experiment tells of the effects in question.
 

@@ -20,7 +20,7 @@ from wrist_stiffness.planning.information import (
 from wrist_stiffness.planning.question import SESSION, TARE, Question
 from wrist_stiffness.planning.signatures import Signature, signatures
 from wrist_stiffness.planning.timeline import Experiment
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 
 EVALUATIONS = 20
 """Of the model at most; a fit nearby is good enough to plan from."""
@@ -106,7 +106,7 @@ def rivals_alike(
     question: Question,
     earlier: Sequence[Experiment],
     noise: MeasurementNoise,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Question:
     """Return the question with each rival as what would have left what the first one has left.
 
@@ -128,6 +128,5 @@ def rivals_alike(
         ]
         for place, name in enumerate(members[1:], start=1):
             by_name[name] = (fitted(model, data, by_name[name][0], question.free, noise),)
-            if progress is not None:
-                progress(number * len(members) + place, len(question.alike) * len(members))
+            progress(number * len(members) + place, len(question.alike) * len(members))
     return replace(question, effects=tuple(by_name.values()))

@@ -13,7 +13,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 
 STEP = 0.1
 """Step of a difference, in plausible sizes; a law linear in its parameters is taken at full size
@@ -55,13 +55,13 @@ def signatures(
     model: ErrorModel,
     block: Block,
     candidates: Sequence[Sequence[Effect]],
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> list[Signature]:
     """Evaluate what effects would leave.
 
     `model`: without them, or with them at other values.  `block`: the experiment's path.
     `candidates`: each effect at one or more sets of values; the differences are taken at the first.
-    `progress`: called with (done, total).  Gives one for each.  Raises `InputError` if a sample
+    Gives one for each.  Raises `InputError` if a sample
     lies outside the table's domain or load range.
     """
     if model.evaluation == "spline":
@@ -69,8 +69,7 @@ def signatures(
     found = []
     for number, sets in enumerate(candidates):
         found.append(_signature(model, block, sets))
-        if progress is not None:
-            progress(number + 1, len(candidates))
+        progress(number + 1, len(candidates))
     return found
 
 
