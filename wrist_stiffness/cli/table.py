@@ -192,8 +192,8 @@ def _check(arguments: argparse.Namespace) -> int:
 def _show(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands import modes, table
     from wrist_stiffness.commands.budget import Push
+    from wrist_stiffness.report.pictures.table import draw_maps, draw_modes
     from wrist_stiffness.report.table_lines import fact_lines, load_lines, mode_lines
-    from wrist_stiffness.report.table_pictures import draw_maps, draw_modes
 
     shown = table_named(arguments)
     values: Any

@@ -59,6 +59,12 @@ class Curve:
         """One standard uncertainty of the fitted law, (c,)."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
+    def along(self, values: Array) -> Array:
+        """Return the part of values (u, m) along the direction in the quantity's unit, (u,)."""
+        columns, used = list(self.quantity.components), self.direction != 0.0
+        part = values[:, columns][:, used] @ self.direction[used]
+        return np.asarray(part * self.quantity.per_si)
+
     @property
     def where(self) -> str:
         """The direction in words, as `extend --direction` takes it."""

@@ -19,7 +19,6 @@ from wrist_stiffness.report.page import (
     drawn,
 )
 from wrist_stiffness.report.parts import (
-    against,
     number,
     provenance_section,
     typeset,
@@ -173,8 +172,7 @@ def _depends(compared: Compared) -> tuple[Part, ...]:
             "95 % band. On a map the fields are the law and the dots what was measured. Squares "
             "are means of what the other models leave."
         )
-        pictures = [against(each.curve, each.name, shown) for each in told]
-        parts.append(drawn(draw_against(pictures), caption))
+        parts.append(drawn(draw_against(told, shown), caption))
     return tuple(parts)
 
 

@@ -25,7 +25,6 @@ from wrist_stiffness.report.page import (
     drawn,
 )
 from wrist_stiffness.report.parts import (
-    against,
     number,
     plus_minus,
     provenance_section,
@@ -163,10 +162,9 @@ def _depends(found: Diagnosed, left: Explained) -> tuple[Part, ...]:
     if found.result.findings:
         after = left.observations.with_values(found.answer.fitted.residual)
         series.append(("with the findings", after))
-    pictures = [against(each.curve, each.name, series) for each in left.told[:MOST_PICTURED]]
     parts.append(
         drawn(
-            draw_against(pictures),
+            draw_against(left.told[:MOST_PICTURED], series),
             "What the refitted base leaves against the conditions that show it best, everything "
             "else that was found taken out: every dwell and half second in motion, and the fitted "
             "law with its 95 % band.",

@@ -9,6 +9,12 @@ from wrist_stiffness.atomic_file import writing
 
 DPI = 130
 
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""For series, in their order; more repeat: any colour vision tells them apart (Okabe and Ito)."""
+
+FLOOR = "#444444"
+"""For what noise alone does."""
+
 
 def new_figure(width_in: float, height_in: float) -> Any:
     """Return a figure that needs no screen."""
@@ -25,3 +31,8 @@ def save_figure(figure: Any, path: Path) -> None:
     """
     with writing(path) as written:
         figure.savefig(written, dpi=DPI, format="png")
+
+
+def colour(number: int) -> str:
+    """Return the colour of a series."""
+    return COLOURS[number % len(COLOURS)]
