@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 
 from wrist_stiffness.cli.options import add_sensor_names, recordings_named, table_named
 from wrist_stiffness.cli.output import say
@@ -47,12 +48,6 @@ def _run(arguments: argparse.Namespace) -> int:
         progress=Progress("rows"),
     )
     turns = f", {found.turns} rows of the way between them" if found.turns else ""
-    lines = [f"{found.path}: {found.rows} measured poses{turns}"]
+    lines = [f"{found.table}: {found.rows} measured poses{turns}"]
     lines += [f"  {remark}" for remark in found.remarks]
-    values = {
-        "table": str(found.path),
-        "rows": found.rows,
-        "turns": found.turns,
-        "remarks": found.remarks,
-    }
-    return say(arguments, lines, values)
+    return say(arguments, lines, {**asdict(found), "table": str(found.table)})

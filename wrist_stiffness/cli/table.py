@@ -208,7 +208,7 @@ def _show(arguments: argparse.Namespace) -> int:
         if arguments.load is not None:
             push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
         pictures = draw_maps(shown, arguments.output, push)
-        summary = table.summarise(shown)
-        lines, values = [*fact_lines(shown), *load_lines(summary)], asdict(summary)
+        values = table.summarise(shown)
+        lines = [*fact_lines(shown), *load_lines(values)]
     lines += [f"written: {picture}" for picture in pictures]
     return say(arguments, lines, values)

@@ -57,7 +57,7 @@ LONGEST_HEAD = 100_000
 class Exported:
     """What was written."""
 
-    path: Path  # the table
+    table: Path
     rows: int  # measured poses in it
     # rows without a measured value: where the wrist or its load turned back between poses
     turns: int

@@ -81,7 +81,7 @@ LONGEST_LINE = csv.field_size_limit()
 class Imported:
     """What was written."""
 
-    path: Path
+    recording: Path
     # `rows`, `measured`: rows of the table; those in which something was measured
     rows: int
     measured: int

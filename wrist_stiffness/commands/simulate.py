@@ -45,7 +45,7 @@ LONGEST_S, FASTEST_HZ = 24.0 * 3600.0, 5000.0
 class Simulated:
     """What was written."""
 
-    path: Path
+    recording: Path
     samples: int  # samples on each topic
     seconds: float  # duration [s]
 
@@ -140,17 +140,6 @@ def hide(
     )
     hidden = Scale(table, settings, seconds, tell).sized(start, size)
     return replace(settings, hidden=(*settings.hidden, hidden))
-
-
-def hide_blind(
-    seed: int,
-    table: Table,
-    settings: CellSettings,
-    seconds: float,
-    tell: Callable[[str], None] = lambda text: None,
-) -> CellSettings:
-    """Return the settings with the effect that a seed draws."""
-    return replace(settings, hidden=(secret(seed, table, settings, seconds, tell).hidden,))
 
 
 def secret(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -102,19 +102,11 @@ def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
     return replace(found, stiffness=in_millimetres(found.stiffness))
 
 
-@dataclass(frozen=True)
-class MapSummary:
-    """Statistics of the rated load's map."""
-
-    # mean, min and max by quantity over the operative workspace, with the unit in the name
-    operative: dict[str, dict[str, float]]
-    domain_max: dict[str, float]  # maxima over the whole map
-
-
-def summarise(table: Table) -> MapSummary:
+def summarise(table: Table) -> dict[str, dict[str, Any]]:
     """Return the statistics of Tables 1 and 2 for a table, on a fine grid over the map.
 
-    Gives `MapSummary`: in micrometres and millidegrees.
+    Gives as `operative` mean, min and max over the operative workspace, as `domain_max` the maxima
+    over the whole map, both by quantity with its unit.
     """
     workspace = table.workspace
     poses = workspace.grid(FINE)
@@ -130,4 +122,4 @@ def summarise(table: Table) -> MapSummary:
         for name, column in zip(names, inside.T, strict=True)
     }
     domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
-    return MapSummary(operative, domain)
+    return {"operative": operative, "domain_max": domain}

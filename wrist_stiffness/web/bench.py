@@ -155,7 +155,7 @@ class Bench:
             return path
         folder = self._workspace.folder / ".imported"
         folder.mkdir(exist_ok=True)
-        return import_csv(path, folder / f"{path.stem}.mcap", overwrite=True).path
+        return import_csv(path, folder / f"{path.stem}.mcap", overwrite=True).recording
 
     def _open(self, paths: Sequence[Path], model: Path) -> Changes:
         self._tell("reading")
