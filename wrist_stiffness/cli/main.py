@@ -108,11 +108,7 @@ COMMANDS: tuple[CommandModule, ...] = (
 
 
 def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
-    """Return the parser of all commands.
-
-    `commands`: modules in the order in which the help lists them.  Gives `OneLineParser`: its
-    result has the attribute `run`, a function of the parsed arguments.
-    """
+    """Return the parser of commands, listed in their order; its result has a function `run`."""
     parser = OneLineParser(
         prog=PROG,
         description=DESCRIPTION,

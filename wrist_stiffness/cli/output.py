@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
 
 def say(arguments: argparse.Namespace, lines: Iterable[str], values: Any) -> int:
-    """Print the answer, write it for programs where `--json` asks for that; return the exit code.
-
-    Raises `InputError` if the file cannot be written.
-    """
+    """Print the answer, write it where `--json` asks for that, and return the exit code."""
     print("\n".join(lines))
     if arguments.json:
         write_json(arguments.json, values)
@@ -30,10 +27,7 @@ def say(arguments: argparse.Namespace, lines: Iterable[str], values: Any) -> int
 
 
 def write_json(path: str | Path, content: Any) -> None:
-    """Write a result for programs, complete or not at all; a device or pipe is written to.
-
-    Raises `InputError` if the file cannot be written.
-    """
+    """Write a result for programs, complete or not at all (InputError if that fails)."""
     with writing(path) as written:
         written.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 

@@ -124,10 +124,7 @@ def add_command(
 
 
 def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
-    """Return the numbers of an option that takes NAME=NUMBER, by their names.
-
-    Raises `InputError` if a text is no such pair, or a name comes twice.
-    """
+    """Return the numbers of NAME=NUMBER options by name (InputError for others, or twice)."""
     values: dict[str, float] = {}
     for text in texts:
         name, _, number = text.partition("=")

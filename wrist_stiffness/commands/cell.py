@@ -123,10 +123,7 @@ def run_cell(
 
 
 def check_numbers(seconds: float | None, rate_hz: float = 100.0, seed: int = 0) -> None:
-    """Refuse numbers with which no run can be, before any node is started.
-
-    Raises `InputError` with the limits.
-    """
+    """Refuse numbers with which no run can be, before any node is started (InputError)."""
     if seconds is not None and not SHORTEST_S <= seconds <= LONGEST_S:
         raise InputError(f"seconds: {seconds:g} is not {SHORTEST_S:g} to {LONGEST_S:g}")
     if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:

@@ -92,8 +92,8 @@ def compare(
     """Compare models with recordings of one wrist.
 
     `models`: model files, the one to be improved upon first; `progress`: from a label to a function
-    that is told steps done and in all.  Gives `Compared`: errors, on what they depend, worst poses.
-    Raises `WristError` if a model or a recording cannot be used.
+    that is told steps done and in all.  Raises `WristError` if a model or a recording cannot be
+    used.
     """
     names = unique_names(models)
     loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]

@@ -90,8 +90,8 @@ def each_recording(
 ) -> list[FleetRow[dict[str, Any]]]:
     """Run a command on every recording by itself, as of a wrist of its own, in parallel.
 
-    `command`: of recordings; can be pickled.  `progress`: as that of `map_recordings`.  Gives with
-    what the command gives for a program.  Raises `InputError` if there is no recording.
+    `command`: of recordings; can be pickled.  Gives with what the command gives for a program.
+    Raises `InputError` if there is no recording.
     """
     one = partial(_values, command=command, recordings=recordings)
     paths = recordings_in(recordings.paths)
@@ -110,12 +110,10 @@ def map_recordings(
     workers: int | None = None,
     progress: Progress = silent,
 ) -> list[FleetRow[Result]]:
-    """Call a function of one recording for each of many.
+    """Call a function of one recording for each of many, in the order of the paths.
 
-    `function`: of a path; can be pickled.  `paths`: recordings (see
-    `sessions.reading.folder.recordings_in`).  `workers`: processes; one for each processor, at most
-    one for each recording, if None.  `progress`: told recordings done and in all.  Gives in the
-    order of the paths.  A recording that fails is a row with its error, not a stop.
+    `function`: of a path; can be pickled.  `workers`: processes; one for each processor, at most
+    one for each recording, if None.  A recording that fails is a row with its error, not a stop.
     """
     answers = spread(function, paths, workers, progress)
     return [FleetRow(path, *answer) for path, answer in zip(paths, answers, strict=True)]
@@ -127,11 +125,9 @@ def spread(
     workers: int | None = None,
     progress: Progress = silent,
 ) -> list[Answer[Result]]:
-    """Call a function of one item for each of many, as `map_recordings` does for paths.
+    """Call a function of one item for each of many, in their order, as `map_recordings` for paths.
 
     A worker that dies loses nothing: what it had in hand goes to another one, up to three times.
-
-    Gives in the order of the items.
     """
     if len(items) <= 1:
         return [attempt(function, item) for item in items]

@@ -63,9 +63,8 @@ class ModeMap:
 def mode_map(table: Table, payload: RigidBody | None = None, per_axis: int = PER_AXIS) -> ModeMap:
     """Solve for the natural modes on a grid over the map domain.
 
-    `table`: with masses; `payload`: what the platform carries; `per_axis`: grid points along each
-    motor angle.  Raises `TableError` if the table is of an older version and holds no masses;
-    `LoadRangeError` if the payload weighs more than the table's range.
+    Raises `TableError` if the table is of an older version and holds no masses; `LoadRangeError` if
+    the payload weighs more than the table's range.
     """
     poses = table.workspace.rectangle_grid(per_axis)
     inside = table.workspace.domain(poses)

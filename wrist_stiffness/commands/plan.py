@@ -114,9 +114,8 @@ def plan_experiment(
     `loads`: file of the loads that the user can apply; `options`: the first experiment needs a
     duration, the next one takes what it needs without; `diagnosis`: result of `diagnose --json`;
     what it could not tell apart is asked; `recordings`: those of the diagnosis: its rivals are
-    fitted to them, and what it left open counts as open; `progress`: called with (done, total).
-    Raises `WristError` if a file is wrong, nothing is left to separate, or nothing fits into the
-    duration.
+    fitted to them, and what it left open counts as open.  Raises `WristError` if a file is wrong,
+    nothing is left to separate, or nothing fits into the duration.
     """
     model, rng, earlier = load_model(model_file), np.random.default_rng(options.seed), []
     if diagnosis is None:

@@ -61,9 +61,9 @@ def predict(
     """Predict the pose error at one pose under one load.
 
     `angles`: motor angles [rad]; `load`: wrench on the platform at O [N, N m]; `on_platform`:
-    whether the wrench is given in `wrist_platform` instead of `wrist_base`; `both`: also evaluate
-    the table in the way that the nodes do not use.  Gives `PosePrediction`: the error and where it
-    comes from.  Raises `WristError` if the model cannot be read, or pose or load are out of range.
+    whether it is given in `wrist_platform` instead of `wrist_base`; `both`: also evaluate the table
+    in the way that the nodes do not use.  Raises `WristError` if the model cannot be read, or pose
+    or load are out of range.
     """
     error_model = load_model(model)
     theta, wrench = np.array(angles, dtype=float), Load(np.array(load, dtype=float), on_platform)

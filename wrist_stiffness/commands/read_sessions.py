@@ -159,10 +159,7 @@ def sha256_by_name(sessions: Mapping[Path, MeasuredSession]) -> dict[str, str]:
 
 
 def recording_sha256(path: Path) -> str:
-    """Return the SHA-256 of a recording's storage file, or of the checksums of several.
-
-    Raises `InputError` if a file cannot be read.
-    """
+    """Return the SHA-256 of a recording's file, or of the checksums of several (InputError)."""
     if not path.is_dir():
         return file_sha256(path)
     files = sorted(path.glob("*.mcap"))

@@ -296,10 +296,7 @@ def _plan(
 
 
 def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
-    """Return a twist as a recording's message.
-
-    `twist` (6,): at O in F [m, rad]; `covariance` (6, 6): of the twist.
-    """
+    """Return a twist (6,) at O in F [m, rad] with its covariance (6, 6) as a message."""
     position, quaternion = pose_of_twist(twist)
     pose = Pose(Point(*position.tolist()), Quaternion(*quaternion.tolist()))
     return PoseWithCovarianceStamped(

@@ -88,10 +88,7 @@ def simulate_recording(
 
 
 def check_bounds(seconds: float, rate_hz: float, seed: int) -> None:
-    """Refuse what would be no recording, or never end.
-
-    Raises `InputError` with the limit.
-    """
+    """Refuse what would be no recording, or never end (InputError with the limit)."""
     if not 0.0 < seconds <= LONGEST_S:
         raise InputError(
             f"simulate: a duration of {seconds:g} s is not more than 0 and at most {LONGEST_S:g} s"
@@ -159,9 +156,8 @@ def secret(
 def on_day(day: int, settings: CellSettings) -> CellSettings:
     """Return the settings of another day, from 1, of the same wrist with the same hidden effects.
 
-    The instrument was set up anew, and the wrist moves to other poses under other loads.
-
-    Raises `InputError` if there is no such day.
+    The instrument was set up anew, and the wrist moves to other poses under other loads.  Raises
+    `InputError` if there is no such day.
     """
     if not 1 <= day <= LAST_DAY:
         raise InputError(f"simulate: day {day} is not 1 to {LAST_DAY}")

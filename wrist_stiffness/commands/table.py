@@ -92,8 +92,7 @@ def build(
 def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
     """Condense a link drawn in CAD, its stiffness in the units of a geometry file [N, mm].
 
-    `step`: STEP file, see `fem/step_part.py`.  Gives `StepPart`: as `matrix_N_mm` reads.  Raises
-    `GeometryError` if a file is wrong.
+    `step`: STEP file, see `fem/step_part.py`.  Raises `GeometryError` if a file is wrong.
     """
     from wrist_stiffness.fem.components import SHIPPED_SIZES
     from wrist_stiffness.fem.step_part import step_part

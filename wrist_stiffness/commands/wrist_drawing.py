@@ -68,10 +68,7 @@ class Pace:
 
 
 class WristDrawing:
-    """Draws one wrist.
-
-    `exaggeration`: factor on the error's twist [-]; `frame_id`: name of F.
-    """
+    """Draws one wrist; `exaggeration`: factor on the error's twist [-]; `frame_id`: name of F."""
 
     def __init__(self, geometry: Geometry, exaggeration: float, frame_id: str = BASE_FRAME) -> None:
         self._geometry = geometry

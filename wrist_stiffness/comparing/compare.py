@@ -36,10 +36,8 @@ def compare_models(
 ) -> Comparison:
     """Say how far models are off from measured sessions, where and under which condition.
 
-    `models`: name of each for the report, and the model; all of one wrist.  `sessions`: in the
-    order of time.  `progress`: told steps done and in all.  Gives `Comparison`: in the order of the
-    models.  Raises `InputError` if there is too little to compare, or the models are not of one
-    wrist.
+    `models`: name of each for the report, and the model; `sessions`: in the order of time.  Raises
+    `InputError` if there is too little to compare, or the models are not of one wrist.
     """
     steps = len(models) + 1
     progress(0, steps)
@@ -72,8 +70,7 @@ def suspicion_in(
 ) -> Suspicion | None:
     """Return the mistake of signs, units or names that explains most of an error; None for none.
 
-    `model`: with which the sessions are compared; `sessions`: in the order of time; `mistakes`:
-    those that are tried.  Raises `InputError` if there is too little to compare.
+    Raises `InputError` if there is too little to compare.
     """
     cuts = all_units(model, sessions)
     calibrated = said_calibrated(sessions)

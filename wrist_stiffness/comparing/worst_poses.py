@@ -46,8 +46,7 @@ def worst_poses(
 ) -> tuple[WorstPose, ...]:
     """Return the units with the largest errors against the noise, worst first.
 
-    `observations`: residuals with the covariates of `observing.observe`; `noise`: what noise alone
-    gives each quantity; `sessions`: names; `most`: how many at most.
+    `observations`: residuals with the covariates of `observing.observe`; `noise`: by quantity.
     """
     errors = {q.key: lengths(observations, q) for q in observations.reported}
     relative = [np.nan_to_num(error) / (noise[key] or np.inf) for key, error in errors.items()]

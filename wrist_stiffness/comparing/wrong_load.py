@@ -33,9 +33,8 @@ def wrong_load(
 ) -> str:
     """Return the mistake that a fit hides, in a sentence for a technician; empty for none.
 
-    `model`, `fitted`: before and after the fit; `found`: the fit, if it was one, else it is made;
-    `progress`: told steps of the fit without the mistake.  Raises `InputError` if there is too
-    little to compare.
+    `model`, `fitted`: before and after the fit; `found`: the fit, if it was one, else it is made.
+    Raises `InputError` if there is too little to compare.
     """
     suspicion = suspicion_in(answering_as(model, fitted), sessions, LOAD_MISTAKES)
     if suspicion is None:

@@ -115,8 +115,8 @@ def aims(
     """Return what settings are chosen by.
 
     `known`: of the pool; `before`: of earlier experiments on this wrist, each with instruments set
-    up anew; `question`: what is asked, without what no experiment shows; `rng`: draws rivals that
-    agree with what was measured before.
+    up anew; `question`: without what no experiment shows; `rng`: draws rivals that agree with what
+    was measured before.
     """
     start = np.zeros_like(known.total)
     for each in before:
@@ -174,8 +174,7 @@ class Truths:
 def as_asked(known: Information, alike: Sequence[Sequence[str]]) -> Truths:
     """Take truths as they are, the members of each class made as large as its first one.
 
-    `known`: of an experiment that shows how large they are; `alike`: classes.  Gives `Truths`: only
-    scaled.
+    `known`: of an experiment that shows how large they are.
     """
     layout = known.layout
     size = np.ones(len(known.total))

@@ -82,10 +82,9 @@ def plan(
 ) -> Plan:
     """Plan an experiment that is not longer than asked for.
 
-    `model`: what is known of the wrist; `conditions`: loads, durations, noise; `earlier`: what was
-    measured on this wrist before, each with instruments set up anew; `progress`: called with (done,
-    total).  Raises `InputError` if not even the fixed part fits into the duration; `LoadRangeError`
-    if a load cannot be applied within the table's range.
+    `earlier`: what was measured on this wrist before, each with instruments set up anew.  Raises
+    `InputError` if not even the fixed part fits into the duration; `LoadRangeError` if a load
+    cannot be applied within the table's range.
     """
     rng = np.random.default_rng(conditions.seed)
     whole = question.goals is None

@@ -210,10 +210,8 @@ def arrange(
 ) -> Timeline:
     """Put chosen visits into a random order, with everything that an experiment needs besides.
 
-    `chosen`: both sides of a pose, where both are chosen, come at different times; `fixed`: of
-    `fixed_visits`; `workspace`: of the wrist; `pace`: speeds and durations; `rng`: chooses the
-    order.  Gives `Timeline`: warm-up, visits, returns to the reference pose at the beginning, in
-    between and at the end.
+    Both sides of a pose, where both are chosen, come at different times.  Gives warm-up, visits,
+    and returns to the reference pose at the beginning, in between and at the end.
     """
     reference, *holds = fixed
     visits = [chosen[i] for i in rng.permutation(len(chosen))]

@@ -54,9 +54,8 @@ class Rivals:
 def read_rivals(path: str | Path) -> Rivals:
     """Read the result of `diagnose --json`.
 
-    `path`: JSON file.  Gives `Rivals`: classes, silent effects and noise floor.  Raises
-    `InputError` if the file cannot be read, a key is missing or wrong, or an effect is not of the
-    catalogue.
+    Raises `InputError` if the file cannot be read, a key is missing or wrong, or an effect is not
+    of the catalogue.
     """
     found = DIAGNOSIS(read_json(path, InputError))
     floor, silent = found["noise"], found["not_excited"]

@@ -61,8 +61,8 @@ def signatures(
 
     `model`: without them, or with them at other values.  `block`: the experiment's path.
     `candidates`: each effect at one or more sets of values; the differences are taken at the first.
-    Gives one for each.  Raises `InputError` if a sample
-    lies outside the table's domain or load range.
+    Gives one for each.  Raises `InputError` if a sample lies outside the table's domain or load
+    range.
     """
     if model.evaluation == "spline":
         model = model.with_evaluation("closed_form")

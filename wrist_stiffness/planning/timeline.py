@@ -129,11 +129,10 @@ def straight(workspace: Workspace, start: Array, end: Array) -> bool:
 def run_through(
     visits: Sequence[Visit], workspace: Workspace, pace: Pace, warm_up: Sequence[Array] = ()
 ) -> Timeline:
-    """Perform visits one after the other, from rest without load at home and back to it.
+    """Perform visits in their order, from rest without load at home and back to it.
 
-    `visits`: in their order.  `workspace`: moves stay in it; where a straight one would not, it
-    goes by way of home.  `warm_up` sequence of (2,): poses to move through first without measuring
-    [rad].
+    Where a straight move would not stay in the workspace, it goes by way of home.  `warm_up`: poses
+    (2,) to move through first without measuring [rad].
     """
     clock = _Clock(workspace, pace)
     for theta in warm_up:
@@ -248,12 +247,10 @@ class _Clock:
 
 
 def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
-    """Return where and when a session measured.
+    """Return where and when a session measured, a row for each dwell and each moment in motion.
 
-    `model`: for the table's domain and load range; measurements outside are left out.  `session`:
-    any.  Gives `Experiment`: one row for each dwell and each single moment in motion.  Dwells
-    between which no motor moved belong to one visit.  Raises `InputError` if no measurement lies in
-    the table's domain and load range, or gauges measured.
+    Dwells between which no motor moved belong to one visit.  Raises `InputError` if no measurement
+    lies in the table's domain and load range, or gauges measured.
     """
     if session.readings is not None:
         raise InputError(f"{session.name}: readings of gauges; plans are made for measured poses")

@@ -54,10 +54,7 @@ HOW = (
 
 
 def report_of_comparison(compared: Compared) -> Page:
-    """Return the report of a comparison.
-
-    `compared`: of `commands.compare.compare`.
-    """
+    """Return the report of a comparison."""
     found = compared.comparison
     models = ", ".join(model.name for model in found.models)
     units = found.models[0].refitted.n_units

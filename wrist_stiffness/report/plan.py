@@ -26,10 +26,7 @@ MOST_LINES = 15
 
 
 def require_new_folder(folder: str | Path) -> None:
-    """Refuse a place that is taken or cannot be.
-
-    Raises `InputError` if it exists, or its parent does not.
-    """
+    """Refuse a folder that exists, or whose parent does not (InputError)."""
     folder = Path(folder)
     if folder.exists():
         raise InputError(
@@ -42,8 +39,7 @@ def require_new_folder(folder: str | Path) -> None:
 def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) -> None:
     """Write `plan.csv`, the recording `trajectory`, `plan.png` and `summary.txt`, all or nothing.
 
-    `folder`: to make; its parent must exist.  Raises `InputError` if the folder exists or cannot be
-    written.
+    Raises `InputError` if the folder exists or cannot be written.
     """
     folder = Path(folder)
     require_new_folder(folder)

@@ -240,9 +240,8 @@ class UnitSession:
 def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     """Cut a session into units and average what was measured.
 
-    Measurements outside the model's domain or load range belong to no unit.
-
-    Raises `InputError` if none lies in it; the message names the limits.
+    Measurements outside the model's domain or load range belong to no unit.  Raises `InputError`
+    with the limits if none lies in it.
     """
     accepted = model.accepts(session.block)
     if not accepted.any():

@@ -113,10 +113,7 @@ def minutes(table: Observations) -> Array:
 
 
 def error_map(shown: Shown, border: Array) -> Figure:
-    """Return the error over both motor angles.
-
-    `border` (n, 2): border of the operative workspace [rad].
-    """
+    """Return the error over both motor angles, with the workspace's border (n, 2) [rad]."""
     table = shown.view.left
     left = table.values if shown.after is None else shown.after
     size = length(left, shown.quantity)
@@ -196,10 +193,7 @@ def time_line(shown: Shown) -> Figure:
 
 
 def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
-    """Return what is left against one condition, with the law that the comparison found.
-
-    `told`: of the comparison, where it is of this condition and version.
-    """
+    """Return what is left against one condition, with the law that the comparison found."""
     table, part, label = shown.view.left, shown.part, shown.part_label
     if told is not None and len(told.measured) == table.n_units:
         label = f"{SYMBOL[told.quantity.name]} {told.where} [{unit_of(told.quantity)}]"

@@ -203,10 +203,7 @@ class FormulaForm:
         ui.run_javascript(f"getHtmlElement({self._look.id}).scrollIntoView({{block: 'nearest'}})")
 
     def _effect(self) -> FormulaEffect:
-        """Return what is typed; it is read here and in no case run.
-
-        Raises `InputError` if it cannot be an effect.
-        """
+        """Return what is typed, read and in no case run (InputError if it is no effect)."""
         way = direction_of(str(self._way.value).split())
         own = str(self._name.value), str(self._place.value), way, str(self._formula.value)
         found = FormulaEffect(*own, {})

@@ -66,10 +66,7 @@ def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> l
 
 
 def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
-    """Draw the wrist at a pose, rigid in grey and bent in colours of its displacement.
-
-    `theta` (2,): motor angles [rad].
-    """
+    """Draw the wrist at angles (2,) [rad], rigid in grey, bent in colours of its displacement."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -95,10 +92,7 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
 def draw_mode_shapes(
     table: Table, configuration: Configuration, modes: NaturalModes, path: Path
 ) -> None:
-    """Draw the shapes of the four slowest natural modes at a pose, rigid in grey.
-
-    `configuration`: one pose, as a stack of one.
-    """
+    """Draw the four slowest natural modes at one pose, a stack of one; rigid in grey."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

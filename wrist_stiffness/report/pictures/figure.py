@@ -24,11 +24,7 @@ def new_figure(width_in: float, height_in: float) -> Any:
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a picture, complete or not at all.
-
-    `figure`: of `new_figure`; `path`: PNG file; an older one is replaced.  Raises `InputError` if
-    the file cannot be written.
-    """
+    """Write a figure as PNG, complete or not at all (InputError if that fails)."""
     with writing(path) as written:
         figure.savefig(written, dpi=DPI, format="png")
 

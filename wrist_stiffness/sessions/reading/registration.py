@@ -33,10 +33,7 @@ class Agreement:
 
 
 def agreement(measured: Array, rigid: Array) -> Agreement:
-    """Compare measured with rigid rotations.
-
-    `measured`, `rigid` (n, 3, 3): U -> F, finite.
-    """
+    """Compare measured with rigid rotations U -> F, both (n, 3, 3) and finite."""
     used = np.unique(np.linspace(0, len(measured) - 1, POSES_USED).astype(int))
     seen, said = Rotation.from_matrix(measured[used]), Rotation.from_matrix(rigid[used])
     turn = _instrument(seen, said, np.ones(len(used)))
