@@ -25,11 +25,7 @@ from wrist_stiffness.planning.information import (
     whitened,
 )
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad
-from wrist_stiffness.planning.question import (
-    SESSION,
-    between,
-    commissioning,
-)
+from wrist_stiffness.planning.question import SESSION, between, commissioning
 from wrist_stiffness.planning.rivals import LEAST_WHITE, Rivals
 from wrist_stiffness.planning.signatures import plausible, signatures
 from wrist_stiffness.planning.timeline import LOAD_RAMP_S, Pace, Visit, as_experiment, run_through

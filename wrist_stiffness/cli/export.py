@@ -6,8 +6,7 @@ import argparse
 from dataclasses import asdict
 
 from wrist_stiffness.cli.options import add_sensor_names, recordings_named, table_named
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 
 DESCRIPTION = """\
 Write the measured poses of a recording as a table, one row each, with the motor angles, the load at

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import asdict
 
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 

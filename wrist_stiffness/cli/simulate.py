@@ -8,8 +8,7 @@ from math import pi
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.options import table_named
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:

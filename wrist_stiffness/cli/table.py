@@ -7,8 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from wrist_stiffness.cli.options import table_named, whole_load
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command, say
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015.yaml")

@@ -9,14 +9,9 @@ from typing import Any
 from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.commands.fit_values import fit_values, parameter_values
 from wrist_stiffness.commands.provenance import Run
-from wrist_stiffness.commands.read_sessions import (
-    Recordings,
-    read_sessions,
-    was_fitted_to,
-)
-from wrist_stiffness.comparing.compare import suspicion_in
+from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
+from wrist_stiffness.comparing.compare import doubts_load, suspicion_in, wrong_load
 from wrist_stiffness.comparing.wiring import told_mistake
-from wrist_stiffness.comparing.wrong_load import doubts_load, wrong_load
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
 from wrist_stiffness.identification.free_effects import unfitted

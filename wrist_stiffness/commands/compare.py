@@ -17,9 +17,8 @@ from wrist_stiffness.commands.read_sessions import (
     was_fitted_to,
 )
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, WorstPose, worst_poses
 from wrist_stiffness.comparing.wiring import WORTH_ASKING
-from wrist_stiffness.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent

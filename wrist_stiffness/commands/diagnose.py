@@ -17,10 +17,9 @@ from wrist_stiffness.commands.read_sessions import (
     sha256_by_name,
     was_fitted_to,
 )
-from wrist_stiffness.comparing.compare import suspicion_in
+from wrist_stiffness.comparing.compare import suspicion_in, wrong_load
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.wiring import WORTH_ASKING, told_mistake
-from wrist_stiffness.comparing.wrong_load import wrong_load
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions

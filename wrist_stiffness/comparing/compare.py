@@ -10,6 +10,7 @@ from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.set_up import FREE, without_set_up
 from wrist_stiffness.comparing.wiring import (
+    LOAD_MISTAKES,
     MISTAKES,
     Mistake,
     Suspicion,
@@ -17,16 +18,23 @@ from wrist_stiffness.comparing.wiring import (
     told_mistake,
 )
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.identification.calibration import said_calibrated
+from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
+from wrist_stiffness.identification.free_effects import answering_as
+from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import Observed
+from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
 from wrist_stiffness.sessions.repeatability import by_side, repeatability
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Prepared = tuple[Observed, Explained, tuple[str, ...]]
+
+VERY_STRONG = 5.0
+"""Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
+"""
 
 
 def compare_models(
@@ -111,3 +119,52 @@ def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:
     """Tell whether the rigid wrists are the same; parts may differ, they are what is compared."""
     first, second = one.table.geometry, other.table.geometry
     return all(np.array_equal(first.axes[joint], second.axes[joint]) for joint in first.axes)
+
+
+def wrong_load(
+    model: ErrorModel,
+    fitted: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    found: Calibration | None = None,
+    progress: Progress = silent,
+) -> str:
+    """Return the mistake of a load that a fit hides, in a sentence; empty for none.
+
+    A fit takes such a load up in parts as stiff or as soft as can be, in the sensor's scale and
+    tare, and in axes off their drawing.  Beside all these a load that is put right explains only
+    part of what is left.  So where it explains some, the wrist is fitted anew under that load.
+
+    `model`, `fitted`: before and after the fit; `found`: the fit, if it was one, else it is made.
+    Raises `InputError` if there is too little to compare.
+    """
+    suspicion = suspicion_in(answering_as(model, fitted), sessions, LOAD_MISTAKES)
+    if suspicion is None:
+        return ""
+    before = found or calibrate(model, sessions)
+    right = tuple(suspicion.mistake.measured_right(session) for session in sessions)
+    after = calibrate(model, right, progress)
+    if _gain(before, after) < VERY_STRONG:
+        return ""
+    left = " and ".join(
+        f"{after.after[q.key]:.3g} {q.unit} of {q.name}, not {before.after[q.key]:.3g},"
+        for q in before.fit.problem.table.reported
+    )
+    return suspicion.told(f"a fit leaves {left} and parts nearer to their drawing")
+
+
+def answers_load(parameter: FittedParameter) -> bool:
+    """Tell whether a parameter says how much a load does."""
+    return parameter.effect.partition("@")[0] in ANSWERS_LOAD
+
+
+def doubts_load(found: Calibration) -> bool:
+    """Tell whether the wrist answers loads so unusually that these may be wrong."""
+    return any(each.far or each.at_bound for each in found.parameters if answers_load(each))
+
+
+def _gain(before: Calibration, after: Calibration) -> float:
+    """Return the gain of log evidence; under another load other units may lie in the range."""
+    found = [each.fit.fit.evidence for each in (before, after)]
+    counts = [len(each.point.left) for each in found]
+    first, second = (each.log / count for each, count in zip(found, counts, strict=True))
+    return (second - first) * min(counts)

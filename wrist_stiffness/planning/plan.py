@@ -35,13 +35,7 @@ from wrist_stiffness.planning.pool import (
 from wrist_stiffness.planning.question import Question
 from wrist_stiffness.planning.refit import rivals_alike
 from wrist_stiffness.planning.signatures import signatures
-from wrist_stiffness.planning.timeline import (
-    Experiment,
-    Pace,
-    Timeline,
-    Visit,
-    run_through,
-)
+from wrist_stiffness.planning.timeline import Experiment, Pace, Timeline, Visit, run_through
 from wrist_stiffness.progress import Progress, silent
 
 LONGEST_S = 3600.0

@@ -12,14 +12,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad, Source
-from wrist_stiffness.planning.timeline import (
-    HOME,
-    Pace,
-    Timeline,
-    Visit,
-    run_through,
-    straight,
-)
+from wrist_stiffness.planning.timeline import HOME, Pace, Timeline, Visit, run_through, straight
 
 POOL = 100
 """Settings to choose from."""

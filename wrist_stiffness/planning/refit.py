@@ -12,11 +12,7 @@ from scipy.optimize import least_squares
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.planning.information import (
-    FREE,
-    MeasurementNoise,
-    whitened,
-)
+from wrist_stiffness.planning.information import FREE, MeasurementNoise, whitened
 from wrist_stiffness.planning.question import SESSION, TARE, Question
 from wrist_stiffness.planning.signatures import Signature, signatures
 from wrist_stiffness.planning.timeline import Experiment

@@ -9,21 +9,8 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel, lengths
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.inference import Quantity
-from wrist_stiffness.report.page import (
-    Bullets,
-    Page,
-    Part,
-    Section,
-    Table,
-    Text,
-    drawn,
-)
-from wrist_stiffness.report.parts import (
-    number,
-    provenance_section,
-    typeset,
-    unit_of,
-)
+from wrist_stiffness.report.page import Bullets, Page, Part, Section, Table, Text, drawn
+from wrist_stiffness.report.parts import number, provenance_section, typeset, unit_of
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars, draw_map, draw_time_line
 

@@ -15,22 +15,8 @@ from wrist_stiffness.report.diagnosis_lines import (
     rest_lines,
     verdict_lines,
 )
-from wrist_stiffness.report.page import (
-    Bullets,
-    Page,
-    Part,
-    Section,
-    Table,
-    Text,
-    drawn,
-)
-from wrist_stiffness.report.parts import (
-    number,
-    plus_minus,
-    provenance_section,
-    typeset,
-    unit_of,
-)
+from wrist_stiffness.report.page import Bullets, Page, Part, Section, Table, Text, drawn
+from wrist_stiffness.report.parts import number, plus_minus, provenance_section, typeset, unit_of
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars
 
