@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,6 @@ class Calibrated:
 
     calibration: Calibration
     sessions: tuple[MeasuredSession, ...]  # what was measured, in the order of time
-    output: Path
     mistake: str  # of signs, units or names, where one explains most of what is left; else empty
 
     def as_values(self) -> dict[str, Any]:
@@ -60,26 +60,31 @@ def calibrate_model(
     sessions = read_sessions(recordings, [parent], progress)
     step = run.step(model, sessions)
     again = was_fitted_to(parent, sessions)
-    found = calibrate(parent, tuple(sessions.values()), progress, again)
+    measured = tuple(sessions.values())
+    found = calibrate(parent, measured, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
-    calibrated = Calibrated(found, tuple(sessions.values()), output, "")
-    start = unfitted(parent) if again else parent
-    calibrated = replace(calibrated, mistake=_mistake(start, child, calibrated, asking))
+    mistake = _mistake(unfitted(parent) if again else parent, child, measured, found, asking)
     save_model(child, output)
-    return calibrated
+    return Calibrated(found, measured, mistake)
 
 
-def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, asking: Progress) -> str:
+def _mistake(
+    start: ErrorModel,
+    child: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    found: Calibration,
+    asking: Progress,
+) -> str:
     """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
 
     What is wrong with positions or angles shows in the model as it was; what is wrong with the load
     hides there behind axes that are a little off their drawing.
     """
-    sessions, mistake, much = calibrated.sessions, "", calibrated.calibration.fit.rough
+    mistake, much = "", found.fit.rough
     if much:
         mistake = told_mistake(suspicion_in(start, sessions))
-    if not mistake and (much or doubts_load(calibrated.calibration)):
-        mistake = wrong_load(start, child, sessions, calibrated.calibration, asking)
+    if not mistake and (much or doubts_load(found)):
+        mistake = wrong_load(start, child, sessions, found, asking)
     return mistake
 
 

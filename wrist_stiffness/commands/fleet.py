@@ -18,7 +18,7 @@ import os
 import pickle
 import signal
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -145,7 +145,9 @@ def spread(
                 if waiting and worker not in in_hand:
                     in_hand[worker] = waiting.pop()
                     worker.ask(items[in_hand[worker]])
-            for worker in _answered(in_hand):
+            ready = wait([worker.pipe for worker in in_hand])
+            # They have answered or died.
+            for worker in [each for each in in_hand if each.pipe in ready]:
                 i = in_hand.pop(worker)
                 try:
                     answers[i] = worker.pipe.recv()
@@ -196,12 +198,6 @@ class _Worker:
         self._process.join()
         self.pipe.close()
         return self._process.exitcode
-
-
-def _answered(workers: Collection[_Worker]) -> list[_Worker]:
-    """Return those that have answered or died; wait for one."""
-    ready = wait([worker.pipe for worker in workers])
-    return [worker for worker in workers if worker.pipe in ready]
 
 
 def _serve(pickled: bytes, pipe: Connection) -> None:

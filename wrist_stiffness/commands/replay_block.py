@@ -84,39 +84,24 @@ class _Joints:
         return first
 
 
+@dataclass(frozen=True, eq=False)
 class BlockReplay:
-    """Answers blocks of messages.
+    """Answers blocks of messages."""
 
-    `writer`: gets the messages and their answers; `predicting`, `correcting`: as in nodes; `ahead`:
-    feeds both; `sampled`: standard by actual name of the topics that are answered; `left_out`:
-    topics of an earlier run; `drawings`: draws some of the samples; `summary`: counts.
-    """
-
-    def __init__(
-        self,
-        writer: RecordingWriter,
-        predicting: PredictionStream,
-        correcting: CorrectionStream,
-        ahead: SignalsAhead,
-        sampled: Mapping[str, str],
-        left_out: frozenset[str],
-        drawings: Drawings,
-        summary: ReplaySummary,
-    ) -> None:
-        self._writer = writer
-        self._predicting = predicting
-        self._correcting = correcting
-        self._ahead = ahead
-        self._sampled = sampled
-        self._left_out = left_out
-        self._drawings = drawings
-        self._summary = summary
+    writer: RecordingWriter  # gets the messages and their answers
+    predicting: PredictionStream
+    correcting: CorrectionStream
+    ahead: SignalsAhead  # feeds both
+    sampled: Mapping[str, str]  # standard by actual name of the topics that are answered
+    left_out: frozenset[str]  # topics of an earlier run
+    drawings: Drawings
+    summary: ReplaySummary
 
     def answer(self, block: RawBlock) -> bool:
         """Write a block with its answers; False, and nothing is done, where that cannot be."""
         found: dict[str, _Joints] = {}
         for topic, rows in block.topics().items():
-            standard = self._sampled.get(topic)
+            standard = self.sampled.get(topic)
             if standard == MOTOR_TRAJECTORY:
                 return False
             if standard is not None:
@@ -126,17 +111,17 @@ class BlockReplay:
                 found[standard] = joints
         last_ns = int(block.time_ns[-1])
         first_ns = min((int(joints.stamps[0]) for joints in found.values()), default=0)
-        alone = self._predicting.in_blocks and self._correcting.in_blocks
-        if found and not self._ahead.rises_until(last_ns, first_ns, not alone):
+        alone = self.predicting.in_blocks and self.correcting.in_blocks
+        if found and not self.ahead.rises_until(last_ns, first_ns, not alone):
             return False
-        self._ahead.read_for(last_ns)
+        self.ahead.read_for(last_ns)
         out = Messages()
         self._copy(block, out)
         if JOINT_STATES in found:
             self._predict(found[JOINT_STATES], out)
         if MOTOR_COMMANDS in found:
             self._correct(found[MOTOR_COMMANDS], out)
-        self._writer.write_block(out)
+        self.writer.write_block(out)
         return True
 
     def _joints(self, block: RawBlock, rows: Integers, standard: str) -> _Joints | None:
@@ -147,9 +132,9 @@ class BlockReplay:
         like, columns = batches[0].first, batches[0].columns
         if not isinstance(like, JointState) or len(like.position) != len(like.name):
             return None
-        motors = self._predicting.settings.motors
+        motors = self.predicting.settings.motors
         if standard == MOTOR_COMMANDS:
-            motors = self._correcting.settings.motors
+            motors = self.correcting.settings.motors
             if like.header.frame_id == CORRECTED_FRAME:
                 return None
         try:
@@ -160,7 +145,7 @@ class BlockReplay:
         if not (np.isfinite(positions).all() and stamps[0] > 0 and (np.diff(stamps) >= 0).all()):
             return None
         theta = np.ascontiguousarray(positions[:, list(places)])
-        if standard == MOTOR_COMMANDS and not self._correcting.within_limits(theta):
+        if standard == MOTOR_COMMANDS and not self.correcting.within_limits(theta):
             return None
         theta_dot = None
         if len(like.velocity) == len(like.name):
@@ -170,18 +155,19 @@ class BlockReplay:
     def _copy(self, block: RawBlock, out: Messages) -> None:
         for place, channel in enumerate(block.channels):
             rows = np.flatnonzero(block.channel == place)
-            if channel.topic in self._left_out:
-                self._summary.replaced += len(rows)
+            if channel.topic in self.left_out:
+                self.summary.replaced += len(rows)
             elif len(rows):
-                number = self._writer.channel_id(channel)
+                number = self.writer.channel_id(channel)
                 out.add(number, ROOM * rows, block.time_ns[rows], block.payloads(rows))
 
     def _predict(self, joints: _Joints, out: Messages) -> None:
-        summary = self._summary
+        summary = self.summary
         summary.joint_states += len(joints.rows)
-        predicted = self._predicting.on_joint_states(joints.stamps, joints.theta, joints.theta_dot)
+        predicted = self.predicting.on_joint_states(joints.stamps, joints.theta, joints.theta_dot)
+        actual = next(name for name, known in self.sampled.items() if known == JOINT_STATES)
         for error in predicted.faults.values():
-            summary.refuse(self._actual(JOINT_STATES), error)
+            summary.refuse(actual, error)
         summary.warnings.update(predicted.warnings)
         known = np.flatnonzero(predicted.known)
         summary.predictions += len(known)
@@ -203,13 +189,13 @@ class BlockReplay:
         self, joints: _Joints, predicted: PredictedBlock, known: Integers, out: Messages
     ) -> None:
         at = Configuration.of_row(predicted.configuration[known])
-        places, payloads = self._drawings.of(joints.stamps[known], at, predicted.twist[known])
+        places, payloads = self.drawings.of(joints.stamps[known], at, predicted.twist[known])
         drawn = known[places]
         rows, times = joints.rows[drawn], joints.time_ns[drawn]
         self._add(out, WRIST_MARKERS, MarkerArray, 4, rows, times, payloads)
 
     def _correct(self, joints: _Joints, out: Messages) -> None:
-        summary, correcting = self._summary, self._correcting
+        summary, correcting = self.summary, self.correcting
         summary.commands += len(joints.rows)
         block = correcting.on_commands(joints.stamps, joints.theta, joints.theta_dot)
         for place in sorted(block.faults):
@@ -252,11 +238,8 @@ class BlockReplay:
         payloads: NDArray[np.uint8] | Sequence[bytes],
     ) -> None:
         if len(rows):
-            number = self._writer.channel_id(channel_of(topic, kind))
+            number = self.writer.channel_id(channel_of(topic, kind))
             out.add(number, ROOM * rows + rank, time_ns, payloads)
-
-    def _actual(self, standard: str) -> str:
-        return next(actual for actual, known in self._sampled.items() if known == standard)
 
 
 def _lengths(vectors: Array) -> Array:

@@ -20,7 +20,6 @@ from wrist_stiffness.comparing.wiring import (
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
 from wrist_stiffness.identification.free_effects import answering_as
-from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
@@ -152,14 +151,10 @@ def wrong_load(
     return suspicion.told(f"a fit leaves {left} and parts nearer to their drawing")
 
 
-def answers_load(parameter: FittedParameter) -> bool:
-    """Tell whether a parameter says how much a load does."""
-    return parameter.effect.partition("@")[0] in ANSWERS_LOAD
-
-
 def doubts_load(found: Calibration) -> bool:
     """Tell whether the wrist answers loads so unusually that these may be wrong."""
-    return any(each.far or each.at_bound for each in found.parameters if answers_load(each))
+    answering = (p for p in found.parameters if p.effect.partition("@")[0] in ANSWERS_LOAD)
+    return any(each.far or each.at_bound for each in answering)
 
 
 def _gain(before: Calibration, after: Calibration) -> float:

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -26,7 +25,6 @@ from wrist_stiffness.planning.information import (
 )
 from wrist_stiffness.planning.loads_file import Source
 from wrist_stiffness.planning.pool import (
-    Setting,
     arrange,
     draw_settings,
     fixed_visits,
@@ -82,7 +80,7 @@ def plan(
     """
     rng = np.random.default_rng(conditions.seed)
     whole = question.goals is None
-    pool = _drawn(model, conditions, whole, rng)
+    pool = _Pool(model, conditions, whole, rng)
     seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
     shortest = pool.arranged([], rng)
     if shortest.duration_s > seconds:
@@ -136,26 +134,28 @@ def _stages(progress: Progress, count: int) -> Iterator[Progress]:
 
 
 class _Pool:
-    """All settings, performed as one experiment, to be chosen as pairs of visits or singly."""
+    """All settings, performed as one experiment.
+
+    For a whole wrist they are chosen as pairs of visits from both sides; between rivals singly, and
+    moved outward as well.
+    """
 
     def __init__(
-        self,
-        settings: Sequence[Setting],
-        fixed: Sequence[Visit],
-        order: NDArray[np.intp],
-        pace: Pace,
-        model: ErrorModel,
-        both_sides: bool,
+        self, model: ErrorModel, conditions: Conditions, whole: bool, rng: np.random.Generator
     ) -> None:
-        self._fixed, self._pace = fixed, pace
-        self._workspace = model.table.workspace
+        workspace, pace = model.table.workspace, conditions.pace
+        self._workspace, self._pace = workspace, pace
+        settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
+        self._fixed = fixed_visits(settings, pace)
+        if not whole:
+            settings += [moved_outward(setting, workspace) for setting in settings]
         self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
-        self.in_unit = 2 if both_sides else 1
-        ordered = [*(self._visits[i] for i in order), *fixed]
-        self.timeline = run_through(ordered, self._workspace, pace)
+        self.in_unit = 2 if whole else 1
+        order = rng.permutation(len(self._visits))
+        ordered = [*(self._visits[i] for i in order), *self._fixed]
+        self.timeline = run_through(ordered, workspace, pace)
         self._place = np.argsort(order)
-        visit_s = np.diff(self.timeline.ends, prepend=0.0)
-        self.cost_s = self.by_unit(visit_s)
+        self.cost_s = self.by_unit(np.diff(self.timeline.ends, prepend=0.0))
 
     def by_unit(self, of_visits: Array) -> Array:
         """Return the sums (m, ...) over the visits of each unit of values (v, ...)."""
@@ -192,19 +192,6 @@ class _Pool:
     def arranged(self, visits: Sequence[Visit], rng: np.random.Generator) -> Timeline:
         """Return the experiment of some visits."""
         return arrange(visits, self._fixed, self._workspace, self._pace, rng)
-
-
-def _drawn(
-    model: ErrorModel, conditions: Conditions, whole: bool, rng: np.random.Generator
-) -> _Pool:
-    """Draw settings: both sides of each for a whole wrist, moved outward as well between rivals."""
-    workspace, pace = model.table.workspace, conditions.pace
-    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
-    fixed = fixed_visits(settings, pace)
-    if not whole:
-        settings += [moved_outward(setting, workspace) for setting in settings]
-    order = rng.permutation(2 * len(settings))
-    return _Pool(settings, fixed, order, pace, model, both_sides=whole)
 
 
 def evaluated(

@@ -42,13 +42,12 @@ class Signature:
 
 def plausible(effect: Effect, rng: np.random.Generator) -> Effect:
     """Return an effect with values drawn where its parameters would not surprise."""
-    return effect.with_values({p.key: _plausible(p, rng) for p in effect.parameters})
-
-
-def _plausible(parameter: Parameter, rng: np.random.Generator) -> float:
-    size = parameter.scale * rng.uniform(0.5, 1.5)
-    down = parameter.mean - size >= parameter.lower and rng.uniform() < 0.5
-    return float(np.clip(parameter.mean + (-size if down else size), None, parameter.upper))
+    values = {}
+    for each in effect.parameters:
+        size = each.scale * rng.uniform(0.5, 1.5)
+        down = each.mean - size >= each.lower and rng.uniform() < 0.5
+        values[each.key] = float(np.clip(each.mean + (-size if down else size), None, each.upper))
+    return effect.with_values(values)
 
 
 def signatures(

@@ -62,7 +62,11 @@ def lost_beams(
     """
     if len(time) < 2 or np.median(np.diff(time)) > DENSE_S:
         return np.zeros(len(time), dtype=bool)
-    way = in_pieces(_turn_between, rigid[:-1], rigid[1:])
+    way = in_pieces(
+        lambda first, second: rotation_vector(second @ np.swapaxes(first, 1, 2)),
+        rigid[:-1],
+        rigid[1:],
+    )
     swing = _swing(time, way)
     moving = swing > MOVING_RAD
     turn = turn_left(rotation, rigid)
@@ -72,11 +76,6 @@ def lost_beams(
     for each in (turn, _across(turn, way, step)):
         lost |= spikes(each, LEAST_SPIKE_STEPS * step, swing, moving)
     return lost
-
-
-def _turn_between(first: Array, second: Array) -> Array:
-    """Return the rotation vectors (n, 3) that turn rotations (n, 3, 3) into others [rad]."""
-    return rotation_vector(second @ np.swapaxes(first, 1, 2))
 
 
 def _swing(time: Array, way: Array) -> Array:
