@@ -10,7 +10,7 @@ encoder's count is the same on both sides, so nothing is smoothed.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError, RecordingError
@@ -27,7 +26,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.recording import open_recording, read_samples
-from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
+from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
@@ -78,17 +77,14 @@ def read_session(
     table: Table,
     *,
     remaps: Mapping[str, str] | None = None,
-    joints: Sequence[str] = DEFAULT_JOINTS,
-    frames: Frames | None = None,
-    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+    settings: StreamSettings | None = None,
 ) -> MeasuredSession:
     """Read a recording with measured poses.
 
     `path`: rosbag2 folder with MCAP storage, or `.mcap` file; `table`: of the wrist: its rigid
     kinematics, and its readout points as the nominal markers; `remaps`: actual by standard topic
-    name; `joints`: names of motor 1 and 2; `frames`: sensor frames of loads, poses and markers,
-    beside `wrist_base`, `wrist_platform` and those on the recording's `/tf_static`;
-    `load_age_limit_s`: oldest load that still belongs to a measured pose [s].
+    name; `settings`: joint names, age limit of loads, and sensor frames of loads, poses and markers
+    beside `wrist_base`, `wrist_platform` and those on the recording's `/tf_static`.
 
     The session is named after the recording, with remarks on everything that could not be used.
     Where poses are far apart, rows without a measurement tell where angles and load turned back in
@@ -98,13 +94,15 @@ def read_session(
     overlap; `FrameError` if loads or poses are in an unknown frame; `InputError` if too few poses
     are left, or they are those of another wrist.
     """
+    settings = settings or StreamSettings()
+    joints = settings.motors.motor_1, settings.motors.motor_2
     recording = open_recording(path)
     samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(recording, samples, remaps or {})
     notes, unread = notes_of(samples)
-    known = frames_of(recording, remaps or {}, frames or Frames())
+    known = frames_of(recording, remaps or {}, settings.frames)
     try:
-        machine = machine_signals(samples, known.frames, load_age_limit_s)
+        machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         own = recording.path.name, machine
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
             markers = table.geometry.platform.readout_points
