@@ -26,7 +26,7 @@ from wrist_stiffness.planning.information import (
 )
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad
 from wrist_stiffness.planning.question import SESSION, between, commissioning
-from wrist_stiffness.planning.rivals import LEAST_WHITE, Rivals
+from wrist_stiffness.planning.rivals import LEAST_WHITE, dwell_noise
 from wrist_stiffness.planning.signatures import plausible, signatures
 from wrist_stiffness.planning.timeline import LOAD_RAMP_S, Pace, Visit, as_experiment, run_through
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -380,7 +380,7 @@ def test_the_noise_of_a_dwell_is_its_floor_less_the_hidden_count(model, count):
     jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
     hidden = np.sum(jacobian**2) * table.geometry.limits.encoder_step**2 / 12.0
     shift, square = 2e-6, hidden / count
-    noise = Rivals((), (), (shift, float(np.sqrt(square)))).noise(table)
+    noise = dwell_noise(table, (shift, float(np.sqrt(square))))
     assert np.sum(noise.white[:3] ** 2) == pytest.approx(shift**2)
     white = max(1.0 - count, LEAST_WHITE) * square
     assert np.sum(noise.white[3:] ** 2) == pytest.approx(white)

@@ -16,7 +16,7 @@ from wrist_stiffness.planning.information import MeasurementNoise
 from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.planning.question import Question, between, commissioning
-from wrist_stiffness.planning.rivals import read_rivals
+from wrist_stiffness.planning.rivals import dwell_noise, read_rivals
 from wrist_stiffness.planning.timeline import Pace, Timeline, as_experiment
 from wrist_stiffness.progress import Progress, silent
 
@@ -127,7 +127,7 @@ def plan_experiment(
     else:
         rivals = read_rivals(diagnosis)
         question = between(rivals.classes, rivals.silent, rng)
-        noise = rivals.noise(model.table)
+        noise = dwell_noise(model.table, rivals.floor)
         if recordings is not None:
             sessions = read_sessions(recordings, [model], silent)
             earlier = [as_experiment(model, session) for session in sessions.values()]

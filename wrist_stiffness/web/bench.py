@@ -39,7 +39,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.planning.loads_file import Weight
 from wrist_stiffness.planning.plan import Conditions
-from wrist_stiffness.planning.rivals import Rivals
+from wrist_stiffness.planning.rivals import dwell_noise
 from wrist_stiffness.planning.timeline import Pace
 from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
 from wrist_stiffness.report.page import write_page
@@ -266,9 +266,7 @@ class Bench:
             )
         floor = 1e-6 * noise["s_um"], float(np.radians(1e-3 * noise["phi_mdeg"]))
         weight = Weight(f"{grams:g} g", 1e-3 * grams, table.geometry.load_point, HANG_S)
-        conditions = Conditions(
-            (weight,), USUAL_PACE, Rivals((), (), floor).noise(table), None, seed=0
-        )
+        conditions = Conditions((weight,), USUAL_PACE, dwell_noise(table, floor), None, seed=0)
         found = analysis.plan(rivals, conditions)
         text = plan_summary(found)
         if found.timeline is None:

@@ -110,7 +110,7 @@ def draw_uncertainty(table: Table, found: list[Contribution], path: Path) -> Non
     plot = figure.subplots()
     places = np.arange(len(found))
     for offset, name, colour in ((-0.2, "s", "tab:blue"), (0.2, "phi", "tab:orange")):
-        values = [100.0 * getattr(each, name) for each in found]
+        values = [100.0 * each.bound[name] for each in found]
         bars = plot.barh(places + offset, values, height=0.36, color=colour, label=name)
         for bar, each in zip(bars, found, strict=True):
             bar.set_alpha(1.0 if each.stated else 0.4)
