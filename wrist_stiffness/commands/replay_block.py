@@ -8,7 +8,8 @@ that jumps, a trajectory, a payload of another layout) goes message by message.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,12 @@ from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.pose import pose_of_twist
-from wrist_stiffness.compensation.stream import PredictedBlock, PredictionStream
+from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.vectors import dot
-from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.chunk_writer import Messages
 from wrist_stiffness.recording.fixed_layout import FixedLayout
@@ -70,18 +71,11 @@ class _Joints:
 
     rows: Integers
     time_ns: Integers
-    batch: Batch
+    like: JointState  # the first of them
+    columns: Mapping[str, Any]
     stamps: Integers
     theta: Array
     theta_dot: Array | None
-
-    @property
-    def like(self) -> JointState:
-        """The first of them."""
-        first = self.batch.first
-        if not isinstance(first, JointState):
-            raise TypeError(f"{type(first).__name__} is no JointState")
-        return first
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +144,7 @@ class BlockReplay:
         theta_dot = None
         if len(like.velocity) == len(like.name):
             theta_dot = np.ascontiguousarray(columns["velocity"][:, list(places)])
-        return _Joints(rows, block.time_ns[rows], batches[0], stamps, theta, theta_dot)
+        return _Joints(rows, block.time_ns[rows], like, columns, stamps, theta, theta_dot)
 
     def _copy(self, block: RawBlock, out: Messages) -> None:
         for place, channel in enumerate(block.channels):
@@ -183,16 +177,10 @@ class BlockReplay:
         ):
             rows = VECTOR.rows(joints.stamps[known], *vectors.T)
             self._add(out, topic, Vector3Stamped, rank, *answers, rows)
-        self._draw(joints, predicted, known, out)
-
-    def _draw(
-        self, joints: _Joints, predicted: PredictedBlock, known: Integers, out: Messages
-    ) -> None:
         at = Configuration.of_row(predicted.configuration[known])
-        places, payloads = self.drawings.of(joints.stamps[known], at, predicted.twist[known])
-        drawn = known[places]
-        rows, times = joints.rows[drawn], joints.time_ns[drawn]
-        self._add(out, WRIST_MARKERS, MarkerArray, 4, rows, times, payloads)
+        drawn, payloads = self.drawings.of(joints.stamps[known], at, twist)
+        answers = answers[0][drawn], answers[1][drawn]
+        self._add(out, WRIST_MARKERS, MarkerArray, 4, *answers, payloads)
 
     def _correct(self, joints: _Joints, out: Messages) -> None:
         summary, correcting = self.summary, self.correcting
@@ -201,18 +189,10 @@ class BlockReplay:
         for place in sorted(block.faults):
             summary.refuse(MOTOR_COMMANDS, block.faults[place])
         summary.corrections += int(np.count_nonzero(block.corrected))
-        like, columns, n = joints.like, joints.batch.columns, len(joints.rows)
+        like, columns, n = joints.like, joints.columns, len(joints.rows)
         positions = columns["position"].copy()
         positions[:, list(correcting.settings.motors.places(like.name))] = block.theta
-        layout = FixedLayout.of(
-            JointState(
-                Header(frame_id=CORRECTED_FRAME),
-                like.name,
-                like.position,
-                like.velocity,
-                like.effort,
-            )
-        )
+        layout = FixedLayout.of(replace(like, header=Header(frame_id=CORRECTED_FRAME)))
         others = [columns[name] for name in ("velocity", "effort") if name in columns]
         answers = joints.rows, joints.time_ns
         rows = layout.rows(joints.stamps, positions, *others)

@@ -106,9 +106,7 @@ class UnitSession:
 
     def seen(self, twist: Array) -> Array:
         """Return what the instrument shows of small twists at O, (..., u, 6) -> (..., u, m)."""
-        if self.readings is None:
-            return twist
-        return np.asarray((self._rows @ twist[..., None])[..., 0])
+        return self.columns_seen(twist[..., None])[..., 0]
 
     def columns_seen(self, twists: Array) -> Array:
         """Return the same of columns of twists, (u, 6, k) -> (u, m, k)."""
