@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from wrist_stiffness.comparing.wiring import told_mistake
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
 from wrist_stiffness.identification.free_effects import unfitted
-from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -63,29 +61,16 @@ def calibrate_model(
     measured = tuple(sessions.values())
     found = calibrate(parent, measured, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
-    mistake = _mistake(unfitted(parent) if again else parent, child, measured, found, asking)
+    start = unfitted(parent) if again else parent
+    mistake, much = "", found.fit.rough
+    # What is wrong with positions or angles shows in the model as it was; what is wrong with the
+    # load hides there behind axes that are a little off their drawing.
+    if much:
+        mistake = told_mistake(suspicion_in(start, measured))
+    if not mistake and (much or doubts_load(found)):
+        mistake = wrong_load(start, child, measured, found, asking)
     save_model(child, output)
     return Calibrated(found, measured, mistake)
-
-
-def _mistake(
-    start: ErrorModel,
-    child: ErrorModel,
-    sessions: Sequence[MeasuredSession],
-    found: Calibration,
-    asking: Progress,
-) -> str:
-    """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
-
-    What is wrong with positions or angles shows in the model as it was; what is wrong with the load
-    hides there behind axes that are a little off their drawing.
-    """
-    mistake, much = "", found.fit.rough
-    if much:
-        mistake = told_mistake(suspicion_in(start, sessions))
-    if not mistake and (much or doubts_load(found)):
-        mistake = wrong_load(start, child, sessions, found, asking)
-    return mistake
 
 
 def writable(output: str | Path) -> Path:

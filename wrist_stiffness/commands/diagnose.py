@@ -135,8 +135,8 @@ def mistake_beside(
     tell: Callable[[str], None] = lambda text: None,
 ) -> str:
     """Return the mistake of signs, units or names that an answer makes likely; empty for none."""
-    mistake = ""
-    if _leaves_much(answer.diagnosis):
+    mistake, noise = "", answer.diagnosis.noise
+    if any(size > WORTH_ASKING * noise[key] for key, size in answer.diagnosis.after.items()):
         tell("asking for wrong signs, units and names")
         mistake = told_mistake(suspicion_in(known, sessions))
     if not mistake and _doubts_load(answer):
@@ -146,12 +146,6 @@ def mistake_beside(
         fitted = known.with_effects(*answer.fitted.effects(0))
         mistake = wrong_load(known, fitted, sessions)
     return mistake
-
-
-def _leaves_much(result: Diagnosis) -> bool:
-    """Tell whether so much is left that a mistake of the set-up is looked for."""
-    noise = result.noise
-    return any(error > WORTH_ASKING * noise[key] for key, error in result.after.items())
 
 
 def _doubts_load(answer: WristDiagnosis) -> bool:
