@@ -79,18 +79,12 @@ def draw_settings(
         approach = rng.choice([-1.0, 1.0], 2)
         speeds = rng.permutation([1.0, 0.5])
         carried = bool(rng.uniform() < 0.5)
-        load = (
-            None if source is None else _draw_load(source, workspace, theta, approach, gravity, rng)
-        )
-        settings.append(
-            Setting(
-                theta,
-                approach,
-                NO_LOAD if load is None else load,
-                carried and load is not None,
-                (float(speeds[0]), float(speeds[1])),
-            )
-        )
+        load = NO_LOAD
+        if source is not None:
+            load = _draw_load(source, workspace, theta, approach, gravity, rng)
+        carried = carried and load is not NO_LOAD
+        shares = float(speeds[0]), float(speeds[1])
+        settings.append(Setting(theta, approach, load, carried, shares))
     for source in sources:
         if not any(setting.load.name == source.name for setting in settings):
             raise LoadRangeError(
@@ -158,14 +152,14 @@ def _draw_load(
     approach: Array,
     gravity: Array,
     rng: np.random.Generator,
-) -> AppliedLoad | None:
-    """Return a load that stays in the table's range on both approaches, None if none does."""
+) -> AppliedLoad:
+    """Return a load that stays in the table's range on both approaches, no load if none does."""
     platform = _platforms(workspace, theta, approach)
     for _ in range(DRAWS):
         load = source.draw(gravity, rng)
         if within(load.wrench(platform), workspace.limits):
             return load
-    return None
+    return NO_LOAD
 
 
 def within(wrench: Array, limits: Limits) -> bool:
