@@ -271,7 +271,7 @@ def warm_timeline(covariate="/covariates/humidity"):
 def test_temperatures_and_covariates_are_heard_as_by_the_nodes(tmp_path, warm_and_humid, covariate):
     source = write(tmp_path / "in", warm_timeline(covariate))
     names = {} if covariate.startswith("/covariates") else {"/covariates/humidity": covariate}
-    summary = replay(source, warm_and_humid, tmp_path / "out", topics=names)
+    summary = replay(source, warm_and_humid, tmp_path / "out", remaps=names)
     assert not summary.warnings
     wanted = (
         load_model(warm_and_humid)

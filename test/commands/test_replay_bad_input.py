@@ -128,7 +128,7 @@ def test_recordings_that_cannot_be_used(tmp_path, capsys):
         replay(only_loads, MODEL, tmp_path / "out")
     whole = write(tmp_path / "whole", TIMELINE)
     with pytest.raises(RecordingError, match="no topic /cmd .*--topic /motor_commands:=ACTUAL"):
-        replay(whole, MODEL, tmp_path / "out", topics={"/motor_commands": "/cmd"})
+        replay(whole, MODEL, tmp_path / "out", remaps={"/motor_commands": "/cmd"})
     assert not (tmp_path / "out").exists()
     assert main(["replay", str(tmp_path / "none"), "-o", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness import topics
 from wrist_stiffness.commands.replay_summary import ReplaySummary
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
@@ -39,23 +40,7 @@ from wrist_stiffness.recording.messages import (
 )
 from wrist_stiffness.recording.raw_block import Integers, RawBlock
 from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.topics import (
-    BASE_FRAME,
-    CORRECTED_FRAME,
-    JOINT_STATES,
-    MICROMETRES,
-    MILLIDEGREES,
-    MOTOR_COMMANDS,
-    MOTOR_COMMANDS_CORRECTED,
-    MOTOR_POSITIONS_CORRECTED,
-    MOTOR_TRAJECTORY,
-    POSE_ERROR_PHI_MDEG,
-    POSE_ERROR_PREDICTED,
-    POSE_ERROR_RESIDUAL,
-    POSE_ERROR_RESIDUAL_TASK,
-    POSE_ERROR_S_UM,
-    WRIST_MARKERS,
-)
+from wrist_stiffness.topics import BASE_FRAME, CORRECTED_FRAME, MICROMETRES, MILLIDEGREES
 
 ROOM = 8
 """Places for a message and its answers, so that each answer follows its message."""
@@ -96,7 +81,7 @@ class BlockReplay:
         found: dict[str, _Joints] = {}
         for topic, rows in block.topics().items():
             standard = self.sampled.get(topic)
-            if standard == MOTOR_TRAJECTORY:
+            if standard == topics.MOTOR_TRAJECTORY:
                 return False
             if standard is not None:
                 joints = self._joints(block, rows, standard)
@@ -111,10 +96,10 @@ class BlockReplay:
         self.ahead.read_for(last_ns)
         out = Messages()
         self._copy(block, out)
-        if JOINT_STATES in found:
-            self._predict(found[JOINT_STATES], out)
-        if MOTOR_COMMANDS in found:
-            self._correct(found[MOTOR_COMMANDS], out)
+        if topics.JOINT_STATES in found:
+            self._predict(found[topics.JOINT_STATES], out)
+        if topics.MOTOR_COMMANDS in found:
+            self._correct(found[topics.MOTOR_COMMANDS], out)
         self.writer.write_block(out)
         return True
 
@@ -127,7 +112,7 @@ class BlockReplay:
         if not isinstance(like, JointState) or len(like.position) != len(like.name):
             return None
         motors = self.predicting.settings.motors
-        if standard == MOTOR_COMMANDS:
+        if standard == topics.MOTOR_COMMANDS:
             motors = self.correcting.settings.motors
             if like.header.frame_id == CORRECTED_FRAME:
                 return None
@@ -139,7 +124,7 @@ class BlockReplay:
         if not (np.isfinite(positions).all() and stamps[0] > 0 and (np.diff(stamps) >= 0).all()):
             return None
         theta = np.ascontiguousarray(positions[:, list(places)])
-        if standard == MOTOR_COMMANDS and not self.correcting.within_limits(theta):
+        if standard == topics.MOTOR_COMMANDS and not self.correcting.within_limits(theta):
             return None
         theta_dot = None
         if len(like.velocity) == len(like.name):
@@ -159,7 +144,7 @@ class BlockReplay:
         summary = self.summary
         summary.joint_states += len(joints.rows)
         predicted = self.predicting.on_joint_states(joints.stamps, joints.theta, joints.theta_dot)
-        actual = next(name for name, known in self.sampled.items() if known == JOINT_STATES)
+        actual = next(name for name, known in self.sampled.items() if known == topics.JOINT_STATES)
         for error in predicted.faults.values():
             summary.refuse(actual, error)
         summary.warnings.update(predicted.warnings)
@@ -170,24 +155,24 @@ class BlockReplay:
         summary.phi_mdeg.add(_lengths(twist[:, 3:]) * MILLIDEGREES)
         answers = joints.rows[known], joints.time_ns[known]
         rows = _pose_rows(joints.stamps[known], twist, predicted.covariance[known])
-        self._add(out, POSE_ERROR_PREDICTED, PoseWithCovarianceStamped, 1, *answers, rows)
+        self._add(out, topics.POSE_ERROR_PREDICTED, PoseWithCovarianceStamped, 1, *answers, rows)
         for rank, topic, vectors in (
-            (2, POSE_ERROR_S_UM, MICROMETRES * twist[:, :3]),
-            (3, POSE_ERROR_PHI_MDEG, MILLIDEGREES * twist[:, 3:]),
+            (2, topics.POSE_ERROR_S_UM, MICROMETRES * twist[:, :3]),
+            (3, topics.POSE_ERROR_PHI_MDEG, MILLIDEGREES * twist[:, 3:]),
         ):
             rows = VECTOR.rows(joints.stamps[known], *vectors.T)
             self._add(out, topic, Vector3Stamped, rank, *answers, rows)
         at = Configuration.of_row(predicted.configuration[known])
         drawn, payloads = self.drawings.of(joints.stamps[known], at, twist)
         answers = answers[0][drawn], answers[1][drawn]
-        self._add(out, WRIST_MARKERS, MarkerArray, 4, *answers, payloads)
+        self._add(out, topics.WRIST_MARKERS, MarkerArray, 4, *answers, payloads)
 
     def _correct(self, joints: _Joints, out: Messages) -> None:
         summary, correcting = self.summary, self.correcting
         summary.commands += len(joints.rows)
         block = correcting.on_commands(joints.stamps, joints.theta, joints.theta_dot)
         for place in sorted(block.faults):
-            summary.refuse(MOTOR_COMMANDS, block.faults[place])
+            summary.refuse(topics.MOTOR_COMMANDS, block.faults[place])
         summary.corrections += int(np.count_nonzero(block.corrected))
         like, columns, n = joints.like, joints.columns, len(joints.rows)
         positions = columns["position"].copy()
@@ -196,14 +181,14 @@ class BlockReplay:
         others = [columns[name] for name in ("velocity", "effort") if name in columns]
         answers = joints.rows, joints.time_ns
         rows = layout.rows(joints.stamps, positions, *others)
-        self._add(out, MOTOR_COMMANDS_CORRECTED, JointState, 1, *answers, rows)
+        self._add(out, topics.MOTOR_COMMANDS_CORRECTED, JointState, 1, *answers, rows)
         rows = TWO_NUMBERS.rows(np.zeros(n, dtype=np.uint32), block.theta)
-        self._add(out, MOTOR_POSITIONS_CORRECTED, Float64MultiArray, 2, *answers, rows)
+        self._add(out, topics.MOTOR_POSITIONS_CORRECTED, Float64MultiArray, 2, *answers, rows)
         own = np.flatnonzero(block.corrected)
         answers = joints.rows[own], joints.time_ns[own]
-        topics = (POSE_ERROR_RESIDUAL, POSE_ERROR_RESIDUAL_TASK)
+        names = topics.POSE_ERROR_RESIDUAL, topics.POSE_ERROR_RESIDUAL_TASK
         residuals = correcting.residuals(block)
-        for rank, (topic, residual) in enumerate(zip(topics, residuals, strict=False), start=3):
+        for rank, (topic, residual) in enumerate(zip(names, residuals, strict=False), start=3):
             rows = _pose_rows(joints.stamps[own], *residual)
             self._add(out, topic, PoseWithCovarianceStamped, rank, *answers, rows)
 
