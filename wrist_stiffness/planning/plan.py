@@ -24,12 +24,7 @@ from wrist_stiffness.planning.information import (
     information,
 )
 from wrist_stiffness.planning.loads_file import Source
-from wrist_stiffness.planning.pool import (
-    arrange,
-    draw_settings,
-    fixed_visits,
-    moved_outward,
-)
+from wrist_stiffness.planning.pool import arrange, draw_settings, fixed_visits, moved_outward
 from wrist_stiffness.planning.question import Question
 from wrist_stiffness.planning.refit import rivals_alike
 from wrist_stiffness.planning.signatures import signatures
